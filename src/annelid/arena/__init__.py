@@ -1,0 +1,1 @@
+"""Where the worm crawls: attaches to any body's spec."""

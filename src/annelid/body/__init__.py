@@ -1,0 +1,1 @@
+"""The 3D worm as a MuJoCo spec, in two formulations."""

@@ -1,0 +1,28 @@
+"""The explicit clock: how the body's and the nervous system's steps interleave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class StepRatio:
+    """How many physics steps fall due at each control step.
+
+    Attributes:
+        control_timestep_s: Step of the controller, s.
+        physics_timestep_s: Step of the body, s; one of the two is an integer multiple of the other.
+    """
+
+    control_timestep_s: float
+    physics_timestep_s: float
+
+    def physics_steps_due(self, control_step: int) -> int:
+        """Number of physics steps that control step ``control_step`` (counted from 1) completes.
+
+        With a finer physics it is the same number each time. With a coarser one it is 1 whenever
+        the control clock reaches the end of a physics step, else 0.
+        """
+        if self.control_timestep_s >= self.physics_timestep_s:
+            return round(self.control_timestep_s / self.physics_timestep_s)
+        return int(control_step % round(self.physics_timestep_s / self.control_timestep_s) == 0)

@@ -1,0 +1,579 @@
+"""What a user may set: frozen models with the unit in every field's name, and the named presets.
+
+A configuration is a tree of sections. A preset is a commented TOML file in ``annelid/presets`` that states
+every field with its source; a user's own TOML file may start from one (``extends = "riddle2023"``), and any
+field can be overridden by its dotted path (``body.mesh.n_segments=4``).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import ErrorDetails
+
+from annelid.errors import ConfigError, suggest
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Range = tuple[Positive, Positive]
+
+
+def _is_multiple(large: float, small: float) -> bool:
+    ratio = large / small
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-6 * ratio
+
+
+class Section(BaseModel):
+    """Base of every section: immutable, and no field but the declared ones."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Mesh(Section):
+    """Geometry of the helical mesh (lengths in m)."""
+
+    n_segments: Annotated[int, Field(ge=3)] = Field(default=3, description="actuated segments")
+    n_helices: Annotated[int, Field(ge=6, le=96)] = Field(
+        default=12, description="strands, half of each handedness; even"
+    )
+    radius_m: Positive = Field(default=0.16, description="radius of the tube at rest")
+    angular_rate_rad_per_m: Positive = Field(
+        default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"
+    )
+    elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
+        default=3, description="straight elements between neighbouring crossings"
+    )
+    planes_between_rings: Annotated[int, Field(ge=2)] = Field(
+        default=4, description="crossing planes from one ring to the next"
+    )
+    free_planes_at_ends: Annotated[int, Field(ge=1)] = Field(
+        default=3, description="crossing planes before the first and after the last ring"
+    )
+    rear_overhang_m: Positive | None = Field(
+        default=None,
+        description="free strand behind the last crossing, along the body; default half a plane spacing",
+    )
+
+    @field_validator("n_helices")
+    @classmethod
+    def _even(cls, value: int) -> int:
+        if value % 2:
+            raise ValueError("the number of helices must be even, half of each handedness, and at least 6")
+        return value
+
+
+class Strands(Section):
+    """Material of the strands."""
+
+    radius_m: Positive = Field(default=0.002, description="radius of the solid round cross-section")
+    young_modulus_Pa: Positive = Field(default=0.3e9, description="resists bending")
+    shear_modulus_Pa: Positive = Field(default=0.2e9, description="resists twisting")
+    linear_density_kg_per_m: Positive = Field(default=0.01291, description="mass per length of strand")
+    joint_damping_Nms_per_rad: NonNegative = Field(
+        default=0.12, description="viscous resistance to bending between two elements"
+    )
+
+
+class Pins(Section):
+    """The pins that join two strands at a crossing."""
+
+    mass_kg: Positive = Field(default=0.00052, description="mass of one pin")
+    radius_m: Positive = Field(default=0.005, description="radius of the drawn sphere")
+
+
+class Springs(Section):
+    """Axial springs between crossings two planes apart at the same angle."""
+
+    stiffness_N_per_m: NonNegative = Field(default=19.9, description="spring rate")
+    rest_length_m: Positive | None = Field(
+        default=None, description="default: two plane spacings, unstretched at rest"
+    )
+    tension_only: bool = Field(
+        default=False, description="true: slack below rest length; false: pushes as well"
+    )
+
+
+class Rings(Section):
+    """Ring muscles: MuJoCo's force-length-velocity muscle on a closed ring (or two half-rings).
+
+    The muscle's optimal length is ``(length_range[1] - length_range[0]) / (1.05 - 0.75)``: MuJoCo scales the
+    given range to 0.75-1.05 of it. The force is ``peak_force_N * (activation * FL * FV + FP)``.
+    """
+
+    layout: Literal["whole", "halves"] = Field(
+        default="whole", description="one muscle round the body, or a left and a right one"
+    )
+    peak_force_N: Positive = Field(default=117.57, description="isometric force at the optimal length, F0")
+    length_range_m: Range | tuple[Range, ...] = Field(
+        default=(0.566, 1.067),
+        description="operating range of a whole ring, one pair for all or one pair a segment",
+    )
+    minimum_length: Positive = Field(default=0.58, description="lmin, relative to the optimal length")
+    maximum_length: Positive = Field(default=1.6, description="lmax, relative to the optimal length")
+    maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
+    passive_peak: NonNegative = Field(default=1.3, description="fpmax, relative to the peak force")
+    lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
+    activation_dynamics: bool = Field(
+        default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
+    )
+
+    @field_validator("length_range_m")
+    @classmethod
+    def _ordered(cls, value: Any) -> Any:
+        for low, high in value if isinstance(value[0], tuple) else (value,):
+            if low >= high:
+                raise ValueError("each length range needs its lower bound below its upper bound")
+        return value
+
+    def length_ranges(self, n_segments: int) -> list[tuple[float, float]]:
+        """Returns one operating range for each segment's whole ring, m."""
+        if isinstance(self.length_range_m[0], tuple):
+            return [(float(low), float(high)) for low, high in self.length_range_m]  # type: ignore[misc]
+        low, high = self.length_range_m
+        return [(float(low), float(high))] * n_segments  # type: ignore[arg-type]
+
+
+class Rods(Section):
+    """The fast formulation: elastic rods that share one vertex at each crossing, so pins cannot part."""
+
+    kind: Literal["rods"] = "rods"
+    edge_time_constant_s: Positive = Field(
+        default=0.001, description="time constant of the inextensible edges"
+    )
+    solver_iterations: Annotated[int, Field(ge=10)] = Field(
+        default=100, description="Newton iterations at most"
+    )
+    solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
+    friction_impedance_ratio: Positive = Field(
+        default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
+    )
+
+
+class Chain(Section):
+    """The paper's formulation: rigid capsules on damped elastic joints, with a point mass at every pin."""
+
+    kind: Literal["chain"] = "chain"
+    joint: Literal["ball", "hinges"] = Field(
+        default="ball",
+        description="one isotropic ball joint, or three hinges with torsion apart from bending",
+    )
+    armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
+    pin_time_constant_s: Positive = Field(
+        default=0.02, description="solref time constant of the pin constraints"
+    )
+    pin_impedance: tuple[Positive, Positive, Positive] = Field(
+        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
+    )
+    pins: Literal["separate", "direct"] = Field(
+        default="separate", description="strands tied to a pin mass each, or straight to one another"
+    )
+    integrator: Literal["RK4", "Euler"] = Field(default="RK4", description="time integration")
+    solver_iterations: Annotated[int, Field(ge=10)] = Field(default=500, description="PGS iterations at most")
+    solver_tolerance: NonNegative = Field(default=1e-8, description="PGS tolerance")
+
+
+def _kind_or(default: str) -> Discriminator:
+    """Tells a union's member by its ``kind``, or takes the default kind where none is given."""
+
+    def kind_of(value: Any) -> Any:
+        return value.get("kind", default) if isinstance(value, Mapping) else getattr(value, "kind", default)
+
+    return Discriminator(kind_of)
+
+
+Formulation = Annotated[Annotated[Rods, Tag("rods")] | Annotated[Chain, Tag("chain")], _kind_or("rods")]
+
+
+class WormBody(Section):
+    """The 3D worm."""
+
+    kind: Literal["worm"] = "worm"
+    mesh: Mesh = Mesh()
+    strands: Strands = Strands()
+    pins: Pins = Pins()
+    springs: Springs = Springs()
+    rings: Rings = Rings()
+    formulation: Formulation = Rods()
+
+    @property
+    def n_segments(self) -> int:
+        """Number of actuated segments."""
+        return self.mesh.n_segments
+
+    @model_validator(mode="after")
+    def _one_range_a_ring(self) -> Self:
+        n = len(self.rings.length_ranges(self.mesh.n_segments))
+        if n != self.mesh.n_segments:
+            raise ValueError(
+                f"rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
+                "give one pair for all rings or one pair for each"
+            )
+        return self
+
+
+class PlanarBody(Section):
+    """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
+
+    kind: Literal["riddle2022"] = "riddle2022"
+    n_segments: Annotated[int, Field(ge=3)] = Field(default=3, description="actuated segments")
+    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    height_min_m: Positive = Field(default=0.065, description="height when contracted")
+    height_max_m: Positive = Field(default=0.11, description="height when relaxed")
+    gain: Positive = Field(
+        default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
+    )
+
+    @model_validator(mode="after")
+    def _heights_fit_the_rhombus(self) -> Self:
+        if not self.height_min_m < self.height_max_m < 2 * self.side_m:
+            raise ValueError("heights must satisfy height_min_m < height_max_m < 2 side_m")
+        return self
+
+
+Body = Annotated[
+    Annotated[WormBody, Tag("worm")] | Annotated[PlanarBody, Tag("riddle2022")], _kind_or("worm")
+]
+
+
+class Arena(Section):
+    """Where the worm crawls: flat ground under gravity."""
+
+    friction: NonNegative = Field(default=1.0, description="coefficient of sliding friction")
+    floor_gap_m: float = Field(
+        default=0.009, description="distance of the floor below the mesh's lowest line"
+    )
+    gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
+    contact_time_constant_s: Positive = Field(
+        default=0.02, description="solref time constant of the contacts"
+    )
+    contact_impedance: tuple[Positive, Positive, Positive] = Field(
+        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
+    )
+
+
+class StretchSensor(Section):
+    """How the nervous system reads its segments' lengths."""
+
+    tolerance_m: NonNegative = Field(
+        default=0.010, description="on while a segment is within this of its rest length"
+    )
+    hysteresis_m: NonNegative = Field(
+        default=0.0, description="once on, stays on until this much beyond the tolerance"
+    )
+    startup_hold_s: NonNegative = Field(
+        default=0.2, description="sensor of segment 1 held off for this long at the start"
+    )
+    noise_m: NonNegative = Field(default=0.0, description="standard deviation of the noise on every reading")
+
+
+class SnsController(Section):
+    """The paper's synthetic nervous system: one half-centre a segment, gated by its neighbour's stretch."""
+
+    kind: Literal["sns"] = "sns"
+    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C")
+    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
+    range_mV: Positive = Field(default=20.0, description="operating range R")
+    bifurcation_mV: Positive = Field(
+        default=0.01, description="delta: how far past the bifurcation the half-centre sits"
+    )
+    offset_mV: Positive = Field(default=0.1, description="how far below rest an inhibited neuron is held")
+    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(
+        default=-40.0, description="relative to rest"
+    )
+    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
+    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
+    gate_slope_per_mV: Positive = Field(default=0.05, description="slope S of the sodium gates")
+    gate_time_constant_ms: Positive = Field(
+        default=300.0, description="tau_h,max; sets the period: 300, 200 or 100"
+    )
+    sensor_current_nA: NonNegative = Field(default=20.0, description="current of a stretch sensor that is on")
+    kick_nA: NonNegative = Field(
+        default=1.0, description="current into the first contraction neuron at the first step"
+    )
+    activation: Literal["sigmoid", "linear"] = Field(
+        default="sigmoid", description="Eq. 2, or the planar worm's clipped difference of the half-centre"
+    )
+    activation_slope_per_mV: Positive = Field(default=0.35, description="slope of the sigmoid")
+    scheme: Literal["euler", "toolbox", "heun"] = Field(
+        default="euler",
+        description="forward Euler, SNS-Toolbox's order (gates before potentials), or second order",
+    )
+    gate_start: Literal["steady", "toolbox"] = Field(
+        default="steady", description="gates start at h_inf(U), or as SNS-Toolbox starts them"
+    )
+
+
+class Clock(Section):
+    """Time steps: one is an integer multiple of the other."""
+
+    control_timestep_s: Positive = Field(default=0.001, description="step of the nervous system")
+    physics_timestep_s: Positive = Field(default=0.005, description="step of the body")
+
+    @model_validator(mode="after")
+    def _multiples(self) -> Self:
+        small, large = sorted((self.control_timestep_s, self.physics_timestep_s))
+        if not _is_multiple(large, small):
+            raise ValueError(
+                f"control_timestep_s = {self.control_timestep_s:g} and physics_timestep_s = "
+                f"{self.physics_timestep_s:g}: one must be an integer multiple of the other"
+            )
+        return self
+
+
+class Record(Section):
+    """What goes into the run file how often."""
+
+    signals_interval_s: Positive = Field(
+        default=0.005, description="interval of potentials, lengths and forces"
+    )
+    frames_interval_s: Positive = Field(
+        default=0.04, description="interval of whole postures, for pictures and video"
+    )
+
+
+class Guard(Section):
+    """Limits at which a run stops because its numbers have run away."""
+
+    kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body")
+    height_m: Positive = Field(default=1.0, description="of any crossing above the floor")
+    edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
+    pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
+
+
+class RunConfig(Section):
+    """Everything that defines a run; the run file carries it whole."""
+
+    name: str = Field(default="custom", description="name of the preset or of the user's own configuration")
+    summary: str = Field(default="", description="one line for the list of presets")
+    duration_s: Positive = Field(default=5.0, description="simulated time")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
+    body: Body = WormBody()
+    arena: Arena = Arena()
+    controller: SnsController = SnsController()
+    sensor: StretchSensor = StretchSensor()
+    clock: Clock = Clock()
+    record: Record = Record()
+    guard: Guard = Guard()
+
+    @model_validator(mode="after")
+    def _intervals_are_whole_steps(self) -> Self:
+        step = self.clock.control_timestep_s
+        for field, value in (
+            ("record.signals_interval_s", self.record.signals_interval_s),
+            ("record.frames_interval_s", self.record.frames_interval_s),
+            ("duration_s", self.duration_s),
+        ):
+            if not _is_multiple(value, step):
+                raise ValueError(
+                    f"{field} = {value:g} must be an integer multiple of clock.control_timestep_s = {step:g}"
+                )
+        return self
+
+
+def preset_names() -> list[str]:
+    """Returns the names of the presets that come with annelid."""
+    folder = resources.files("annelid") / "presets"
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
+    )
+
+
+def preset_text(name: str) -> str:
+    """Returns the commented TOML of a preset.
+
+    Raises:
+        ConfigError: No preset has that name; the sentence suggests the nearest.
+    """
+    if name not in preset_names():
+        raise ConfigError(f"unknown preset {name!r}: {suggest(name, preset_names())}")
+    return (resources.files("annelid") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load_config(
+    source: str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None = None
+) -> RunConfig:
+    """Loads a preset, a TOML file or a mapping, applies overrides, and checks all of it.
+
+    Args:
+        source: Name of a preset, path of a TOML file (recognised by its suffix ``.toml``), or nested mapping.
+            A file or mapping may name a preset to start from with ``extends``.
+        overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``.
+
+    Returns:
+        The checked configuration.
+
+    Raises:
+        ConfigError: Unknown preset or field, unreadable file, or a value out of its range.
+    """
+    tree = _read_tree(source)
+    for path, value in (overrides or {}).items():
+        nested: Any = value
+        for key in reversed(path.split(".")):
+            nested = {key: nested}
+        tree = _merge(tree, nested)
+    return check_config(tree)
+
+
+def check_config(tree: Mapping[str, Any]) -> RunConfig:
+    """Turns a nested mapping into a checked `RunConfig`, or raises `ConfigError` naming the field."""
+    try:
+        return RunConfig.model_validate(tree)
+    except ValidationError as error:
+        raise ConfigError("; ".join(dict.fromkeys(_explain(detail) for detail in error.errors()))) from None
+
+
+def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
+    """Parses ``field=value`` strings; values are read as TOML, and as plain text where they are none.
+
+    Raises:
+        ConfigError: A string has no ``=`` or no field before it.
+    """
+    parsed: dict[str, Any] = {}
+    for assignment in assignments:
+        path, equals, text = assignment.partition("=")
+        path = path.strip()
+        if not equals or not path or not all(path.split(".")):
+            raise ConfigError(
+                f"{assignment!r} is not of the form field=value, for example arena.friction=0.3"
+            )
+        parsed[path] = _parse_value(text.strip())
+    return parsed
+
+
+def _parse_value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
+    """Returns the dotted path and the description of every field, for help texts and suggestions."""
+    paths: dict[str, str] = {}
+    for name, info in model.model_fields.items():
+        sections = _sections_of(info.annotation)
+        if sections:
+            for section in sections:
+                paths.update(field_paths(section, f"{prefix}{name}."))
+        else:
+            paths[f"{prefix}{name}"] = info.description or ""
+    return paths
+
+
+def _sections_of(annotation: Any) -> list[type[Section]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    found: list[type[Section]] = []
+    for argument in getattr(annotation, "__args__", ()):
+        found.extend(_sections_of(argument))
+    return found
+
+
+def _read_tree(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+    if isinstance(source, Mapping):
+        own = dict(source)
+    elif isinstance(source, Path) or str(source).endswith(".toml"):
+        path = Path(source)
+        try:
+            own = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise ConfigError(f"cannot read the configuration file {path}: {error.strerror}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{path} is not valid TOML: {error}") from None
+        own.setdefault("name", path.stem)
+    else:
+        own = tomllib.loads(preset_text(str(source)))
+    base = own.pop("extends", None)
+    return own if base is None else _merge(_read_tree(base), own)
+
+
+def _merge(base: dict[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
+    """Lays ``change`` over ``base``; a table whose ``kind`` changes starts from that kind's own defaults."""
+    if "kind" in change and change["kind"] != base.get("kind"):
+        base = {}
+    merged = dict(base)
+    for key, value in change.items():
+        if isinstance(value, Mapping):
+            below = merged.get(key)
+            merged[key] = _merge(dict(below) if isinstance(below, Mapping) else {}, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+_KINDS = {"worm", "riddle2022", "rods", "chain", "sns"}
+_WORDS = {
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "must be one of {expected}",
+    "union_tag_invalid": "must be one of {expected_tags}",
+    "int_from_float": "must be a whole number",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "model_type": "is a section; set one of its fields instead",
+    "model_attributes_type": "is a section; set one of its fields instead",
+}
+
+
+def _explain(detail: ErrorDetails) -> str:
+    path = ".".join(str(part) for part in detail["loc"] if part not in _KINDS and not _is_type_label(part))
+    kind = detail["type"]
+    if kind == "extra_forbidden":
+        return f"unknown field {path!r}: {_nearest_fields(path)}"
+    if kind == "value_error":
+        message = str(detail.get("ctx", {}).get("error", detail["msg"]))
+        given = detail["input"]
+        return message if isinstance(given, dict | BaseModel) else f"{path} = {given!r}: {message}"
+    words = _WORDS.get(kind, "").format(**detail.get("ctx", {})) or detail["msg"]
+    if kind == "union_tag_invalid":
+        given = detail["input"].get("kind") if isinstance(detail["input"], Mapping) else detail["input"]
+        return f"{path}.kind = {given!r}: {words}"
+    return f"{path} = {detail['input']!r}: {words}"
+
+
+def _is_type_label(part: int | str) -> bool:
+    """Pydantic puts the label of a union's member into the location; it is no field name."""
+    return isinstance(part, str) and ("[" in part or "constrained" in part)
+
+
+def _nearest_fields(path: str) -> str:
+    section, _, leaf = path.rpartition(".")
+    known = list(field_paths())
+    here = [p.removeprefix(f"{section}.") for p in known if not section or p.startswith(f"{section}.")]
+    siblings = sorted({name.split(".")[0] for name in here})
+    near = get_close_matches(leaf, siblings, n=1, cutoff=0.5)
+    if near:
+        return suggest(near[0], siblings).replace(near[0], f"{section}.{near[0]}" if section else near[0], 1)
+    elsewhere = [
+        p
+        for p in known
+        if p.rsplit(".", 1)[-1]
+        in get_close_matches(leaf, [q.rsplit(".", 1)[-1] for q in known], n=1, cutoff=0.6)
+    ]
+    return (
+        f"did you mean {elsewhere[0]!r}? Valid here: {', '.join(siblings)}"
+        if elsewhere
+        else f"Valid here: {', '.join(siblings)}"
+    )

@@ -1,0 +1,1 @@
+"""Everything that turns sensation into activation."""

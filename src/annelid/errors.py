@@ -1,0 +1,48 @@
+"""The errors that annelid raises, each with one sentence a user can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class AnnelidError(Exception):
+    """Base of every error that annelid raises on purpose; its text is one readable sentence."""
+
+
+class ConfigError(AnnelidError):
+    """A configuration names an unknown preset or field, or gives a field a value it cannot have."""
+
+
+class RunFileError(AnnelidError):
+    """A run file cannot be written, or what was opened is not a readable annelid run."""
+
+
+class RenderingUnavailable(AnnelidError):
+    """No OpenGL back-end works on this machine; the text names the line that installs one."""
+
+
+class MissingDependency(AnnelidError):
+    """An optional package is needed; the text names the line that installs it."""
+
+
+class SimulationStopped(AnnelidError):
+    """A guard stopped the simulation because energy, height or edge strain ran away."""
+
+
+def suggest(name: str, valid: Iterable[str]) -> str:
+    """Completes an error sentence with the nearest valid name and the list of all.
+
+    Args:
+        name: What the user wrote.
+        valid: The names that exist.
+
+    Returns:
+        For example ``"did you mean 'riddle2023'? Valid: riddle2022-planar, riddle2023"``.
+    """
+    names = sorted(valid)
+    nearest = get_close_matches(name, names, n=1, cutoff=0.5) or get_close_matches(
+        name.rsplit(".", 1)[-1], names, n=1, cutoff=0.5
+    )
+    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
+    return f"{hint}Valid: {', '.join(names)}"

@@ -1,0 +1,1 @@
+"""Planar worms of the literature, with the same face as the 3D one."""

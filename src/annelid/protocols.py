@@ -1,0 +1,147 @@
+"""The two protocols, Plant and Controller, and the data that passes between them.
+
+Any body (2D or 3D) is a `Plant`, anything that turns sensation into activation is a `Controller`.
+Both may also be *recordable* (they name signals for the run file) and *stateful* (they can be saved
+and restored bit for bit); the simulation asks for those capabilities and does without where they are absent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+State = dict[str, NDArray[np.generic]]
+"""Named arrays whose shapes and dtypes never change during a run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensation:
+    """What the body feels at one instant; every array is a copy that its receiver may keep.
+
+    Attributes:
+        time_s: Simulated time, s.
+        stretch_m: Lengths of the stretch sensors, m, shape ``(n_segments, n_sensors)``.
+        rest_stretch_m: Their lengths at rest, m, same shape.
+        ring_length_m: Length of every ring muscle, m, shape ``(n_muscles,)``.
+        muscle_force_N: Contractile force of every ring muscle, N, positive when it pulls, ``(n_muscles,)``.
+        contact_force_N: Force of the ground on each segment, N, ``(n_segments, 3)``; zeros without ground.
+        center_of_mass_m: Centre of mass, m, shape ``(3,)``; planar worms use the first component.
+    """
+
+    time_s: float
+    stretch_m: Array
+    rest_stretch_m: Array
+    ring_length_m: Array
+    muscle_force_N: Array
+    contact_force_N: Array
+    center_of_mass_m: Array
+
+
+class Plant(Protocol):
+    """A worm's body: muscle activation in, sensation out, one control step at a time."""
+
+    @property
+    def n_segments(self) -> int:
+        """Number of actuated segments."""
+        ...
+
+    @property
+    def n_muscles(self) -> int:
+        """Number of ring muscles: one a segment, or two with half-rings (left, right, segment by segment)."""
+        ...
+
+    def reset(self, seed: int) -> Sensation:
+        """Returns to the initial posture at time zero, and the first sensation."""
+        ...
+
+    def step(self, activation: Array) -> Sensation:
+        """Advances by one control step under ``activation``, shape ``(n_muscles,)``, each in [0, 1]."""
+        ...
+
+
+class Controller(Protocol):
+    """Anything that turns sensation into muscle activation."""
+
+    def reset(self, seed: int) -> None:
+        """Returns to the initial state; ``seed`` fixes every random draw that follows."""
+        ...
+
+    def step(self, sensation: Sensation) -> Array:
+        """Advances by one control step; returns activation in [0, 1], shape ``(n_muscles,)``."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One variable of the run file.
+
+    Attributes:
+        name: Variable name in the file.
+        dims: Names of the dimensions after time (or frame), for example ``("segment", "sensor")``.
+        shape: Sizes of those dimensions.
+        units: Unit in the form CF uses (``"m"``, ``"N"``, ``"mV"``, ``"1"``).
+        long_name: What it is, in words.
+        every_frame: Recorded at frame rate (large, for pictures) instead of at the rate of the signals.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    shape: tuple[int, ...]
+    units: str
+    long_name: str
+    every_frame: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Recordable:
+    """What a plant or a controller offers to the recorder.
+
+    Attributes:
+        signals: The variables.
+        coords: Labels of dimensions, for example ``{"neuron": ["segment1.contract", ...]}``.
+        attrs: Constants worth a global attribute, for example the total mass.
+    """
+
+    signals: tuple[Signal, ...] = ()
+    coords: Mapping[str, Sequence[str] | Sequence[int]] = field(default_factory=dict)
+    attrs: Mapping[str, float | int | str] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Records(Protocol):
+    """The capability of naming and reading signals for the run file."""
+
+    def recordable(self) -> Recordable:
+        """Names every signal that `read` returns."""
+        ...
+
+    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+        """Reads the present values: of the frame signals if ``frame``, else of all others."""
+        ...
+
+
+@runtime_checkable
+class Stateful(Protocol):
+    """The capability of being saved and continued bit for bit."""
+
+    def get_state(self) -> State:
+        """Returns copies of all that the next step depends on."""
+        ...
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        ...
+
+
+@runtime_checkable
+class Watched(Protocol):
+    """The capability of telling that the numbers have run away."""
+
+    def alarm(self) -> str | None:
+        """Returns one sentence naming the quantity, its value and its limit, or None while all is well."""
+        ...

@@ -1,0 +1,1 @@
+"""The loop of plant, controller and clock, and the run file it writes."""

@@ -1,0 +1,65 @@
+"""Assembles the spec of a worm in its arena: mesh, springs, muscles, floor."""
+
+from __future__ import annotations
+
+import mujoco
+
+from annelid.arena.floor import add_floor
+from annelid.body.actuation import add_ring_muscles, add_springs
+from annelid.body.chain import add_chains
+from annelid.body.rods import add_rods
+from annelid.config import Chain, Mesh, RunConfig, WormBody
+from annelid.errors import ConfigError
+from annelid.morphology import MeshGeometry, helical_mesh
+
+
+def mesh_of(mesh: Mesh) -> MeshGeometry:
+    """Generates the geometry that a configuration asks for."""
+    return helical_mesh(
+        mesh.n_segments,
+        n_helices=mesh.n_helices,
+        radius_m=mesh.radius_m,
+        angular_rate_rad_per_m=mesh.angular_rate_rad_per_m,
+        elements_per_side=mesh.elements_per_side,
+        planes_between_rings=mesh.planes_between_rings,
+        free_planes_at_ends=mesh.free_planes_at_ends,
+        rear_overhang_m=mesh.rear_overhang_m,
+    )
+
+
+def build_spec(config: RunConfig) -> mujoco.MjSpec:
+    """Builds the MuJoCo spec of a 3D worm on its floor.
+
+    Names in the spec: sites ``crossing_<i>``, tendons ``spring_<k>`` and ``ring_<s>`` (or ``ring_<s>_left``
+    and ``_right``), actuators the same as the rings, strands ``strand_<s>``.
+
+    Args:
+        config: The run's configuration; ``body`` must be a 3D worm.
+
+    Returns:
+        A spec of its own for every call; compile it as it is or a copy of it.
+
+    Raises:
+        ConfigError: The body is planar and has no MuJoCo model.
+    """
+    body = config.body
+    if not isinstance(body, WormBody):
+        raise ConfigError(
+            f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has"
+        )
+    geometry = mesh_of(body.mesh)
+    spec = mujoco.MjSpec()
+    spec.modelname = config.name
+    spec.compiler.degree = False
+    spec.option.timestep = config.clock.physics_timestep_s
+    spec.option.gravity = [0.0, 0.0, -config.arena.gravity_m_per_s2]
+    spec.stat.extent = geometry.length_m
+    spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
+    if isinstance(body.formulation, Chain):
+        add_chains(spec, geometry, body, body.formulation, config.arena)
+    else:
+        add_rods(spec, geometry, body, body.formulation, config.arena)
+    add_springs(spec, geometry, body.springs)
+    add_ring_muscles(spec, geometry, body.rings)
+    add_floor(spec, config.arena, geometry.length_m)
+    return spec

@@ -1,0 +1,208 @@
+"""The paper's formulation: rigid capsules on damped elastic joints, pinned to one another by constraints.
+
+Each strand is a kinematic tree rooted in its middle, which halves the cost of a step against a root at its end
+and changes nothing in the physics. Neighbouring capsules are joined by a ball joint of stiffness E I / length, or
+by three hinges that resist torsion (G J / length) apart from bending. A crossing is a point mass on three slides,
+tied by two `connect` constraints to its strands, or one constraint straight between them.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from annelid.arena.floor import contact_options
+from annelid.body.actuation import crossing_site
+from annelid.body.rods import AXES, PIN_RGBA, STRAND_RGBA
+from annelid.config import Arena, Chain, Strands, WormBody
+from annelid.morphology import Array, MeshGeometry
+
+JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
+
+
+def add_chains(
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: Arena
+) -> None:
+    """Adds the mesh as chains of capsules, and the paper's solver settings.
+
+    Args:
+        spec: An empty spec.
+        geometry: The mesh at rest.
+        body: Materials and pins.
+        formulation: Joints, pins and integrator.
+        arena: Contact settings, which the strands share with the floor.
+    """
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{formulation.integrator.upper()}")
+    spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
+    spec.option.iterations = formulation.solver_iterations
+    spec.option.tolerance = formulation.solver_tolerance
+    spec.option.jacobian = JACOBIAN
+    for strand in range(geometry.n_strands):
+        add_chain(
+            spec,
+            f"strand_{strand}",
+            geometry.vertices_m[strand],
+            body.strands,
+            formulation,
+            contact=contact_options(arena),
+            rgba=STRAND_RGBA[strand // geometry.n_per_plane],
+        )
+    for crossing in range(geometry.n_crossings):
+        _add_pin(spec, geometry, crossing, body, formulation)
+
+
+def add_chain(
+    spec: mujoco.MjSpec,
+    name: str,
+    vertices_m: Array,
+    strands: Strands,
+    formulation: Chain,
+    *,
+    contact: dict[str, list[float]] | None = None,
+    rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
+    root: int | None = None,
+    fixed_root: bool = False,
+) -> None:
+    """Adds one chain of capsules; element ``e`` is body ``<name>_<e>`` between vertices ``e`` and ``e + 1``.
+
+    Args:
+        spec: The spec to add to.
+        name: Name of the strand.
+        vertices_m: Rest positions, shape ``(n_vertices, 3)``.
+        strands: Material.
+        formulation: Kind of joint and its numerical inertia.
+        contact: Contact attributes; None for a chain that touches nothing.
+        rgba: Colour.
+        root: Element that the tree grows from, by default the middle one.
+        fixed_root: Welds the root element to the world (a cantilever).
+    """
+    n_elements = len(vertices_m) - 1
+    middle = _middle_element(len(vertices_m)) if root is None else root
+    rigidity = _rigidity(strands)
+
+    def add_element(parent: mujoco.MjsBody, element: int, joint_vertex: int, origin: Array) -> mujoco.MjsBody:  # pyright: ignore[reportAttributeAccessIssue]
+        place = vertices_m[joint_vertex]
+        link = parent.add_body(name=f"{name}_{element}", pos=place - origin)
+        span = vertices_m[[element, element + 1]] - place
+        length = float(np.linalg.norm(span[1] - span[0]))
+        link.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=span.ravel(),
+            size=[strands.radius_m, 0.0, 0.0],
+            mass=strands.linear_density_kg_per_m * length,
+            contype=0,
+            conaffinity=0 if contact is None else 1,
+            rgba=rgba,
+            **(contact or {}),
+        )
+        return link
+
+    first = add_element(spec.worldbody, middle, middle, np.zeros(3))
+    if not fixed_root:
+        first.add_freejoint()
+    for direction in (1, -1):
+        parent, origin = first, vertices_m[middle]
+        for element in range(middle + direction, n_elements if direction > 0 else -1, direction):
+            joint_vertex = element if direction > 0 else element + 1
+            parent = add_element(parent, element, joint_vertex, origin)
+            origin = vertices_m[joint_vertex]
+            _add_joint(parent, vertices_m, joint_vertex, rigidity, strands, formulation)
+
+
+class _Rigidity(NamedTuple):
+    """Resistance of a round strand to bending, E I, and to twisting, G J, N m^2."""
+
+    bending: float
+    torsion: float
+
+
+def _rigidity(strands: Strands) -> _Rigidity:
+    fourth = strands.radius_m**4
+    return _Rigidity(strands.young_modulus_Pa * pi * fourth / 4, strands.shear_modulus_Pa * pi * fourth / 2)
+
+
+def _add_joint(
+    link: mujoco.MjsBody,  # pyright: ignore[reportAttributeAccessIssue]
+    vertices_m: Array,
+    vertex: int,
+    rigidity: _Rigidity,
+    strands: Strands,
+    formulation: Chain,
+) -> None:
+    """Joins two elements at a vertex; the joint stands for half of each."""
+    before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
+    length = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
+    common = {
+        "damping": [strands.joint_damping_Nms_per_rad, 0.0, 0.0],
+        "armature": formulation.armature_kg_m2,
+    }
+    if formulation.joint == "ball":
+        link.add_joint(
+            type=mujoco.mjtJoint.mjJNT_BALL, stiffness=[rigidity.bending / length, 0.0, 0.0], **common
+        )
+        return
+    tangent = before / np.linalg.norm(before) + after / np.linalg.norm(after)
+    tangent /= np.linalg.norm(tangent)
+    normal = np.cross(tangent, AXES[np.argmin(np.abs(tangent))])
+    normal /= np.linalg.norm(normal)
+    for axis, rate in (
+        (normal, rigidity.bending),
+        (np.cross(tangent, normal), rigidity.bending),
+        (tangent, rigidity.torsion),
+    ):
+        link.add_joint(
+            type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, stiffness=[rate / length, 0.0, 0.0], **common
+        )
+
+
+def _add_pin(
+    spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain
+) -> None:
+    name = crossing_site(crossing)
+    position = geometry.crossings_m[crossing]
+    vertex = int(geometry.crossing_vertex[geometry.crossing_plane[crossing]])
+    links = [spec.body(f"strand_{strand}_{vertex}") for strand in geometry.crossing_strands[crossing]]
+    if formulation.pins == "separate":
+        pin = spec.worldbody.add_body(name=name, pos=position)
+        for axis in AXES:
+            pin.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        place, pairs = np.zeros(3), [(name, link.name) for link in links]
+    else:
+        pin = links[0]
+        place = position - _joint_place(geometry, int(geometry.crossing_strands[crossing, 0]), vertex)
+        pairs = [(pin.name, links[1].name)]
+    pin.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        pos=place,
+        size=[body.pins.radius_m, 0.0, 0.0],
+        mass=body.pins.mass_kg,
+        contype=0,
+        conaffinity=0,
+        rgba=PIN_RGBA,
+    )
+    pin.add_site(name=name, pos=place, size=[0.002, 0.002, 0.002], group=4)
+    for k, (first, second) in enumerate(pairs):
+        spec.add_equality(
+            name=f"pin_{crossing}_{k}",
+            type=mujoco.mjtEq.mjEQ_CONNECT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            name1=first,
+            name2=second,
+            data=[*place, *([0.0] * 9)],
+            solref=[formulation.pin_time_constant_s, 1.0],
+            solimp=[*formulation.pin_impedance, 0.5, 2.0],
+        )
+
+
+def _joint_place(geometry: MeshGeometry, strand: int, element: int) -> Array:
+    """Rest position of an element's joint, the origin of its body (whose axes are the world's at rest)."""
+    middle = _middle_element(geometry.vertices_m.shape[1])
+    return geometry.vertices_m[strand, element if element >= middle else element + 1]
+
+
+def _middle_element(n_vertices: int) -> int:
+    return (n_vertices - 1) // 2

@@ -1,0 +1,253 @@
+"""Geometry of the helical mesh: strands, crossings, rhombi, rings and springs, as numpy arrays.
+
+Numbers only: no engine, no configuration. The body axis is x; lengths are in metres, angles in radians.
+
+A strand turns at the rate ``w`` (rad/m) about the axis. Clockwise strand ``i`` lies at the angle
+``w x + i D`` and counter-clockwise strand ``j`` at ``c - w x - j D``, with ``D = 4 pi / n_helices`` and
+``y = R cos(angle)``, ``z = R + R sin(angle)``, so that the lowest line of the tube is z = 0. Two strands
+meet where ``2 w x = c - (i + j) D`` modulo ``2 pi``: on planes spaced ``D / (2 w)`` apart, each carrying one
+crossing of every clockwise strand. The offset ``c`` puts the first plane half a spacing behind the front end
+and equals pi/2 for 12 helices, as in the paper's model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import floor, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class MeshGeometry:
+    """The mesh at rest.
+
+    Crossings are numbered plane by plane: crossing ``p * n_per_plane + i`` lies on plane ``p`` and on
+    clockwise strand ``i``. Strands are numbered clockwise first.
+
+    Attributes:
+        n_segments: Actuated segments.
+        radius_m: Radius of the tube.
+        angular_rate_rad_per_m: Turn of a strand per metre of body.
+        vertices_m: Points of every strand, shape ``(n_strands, n_vertices, 3)``, front to back.
+        crossing_vertex: Index along the strand of each plane's crossing, shape ``(n_planes,)``; the same
+            for every strand.
+        crossing_strands: The clockwise and the counter-clockwise strand of each crossing, ``(n_crossings, 2)``.
+        plane_x_m: Position of each crossing plane, shape ``(n_planes,)``.
+        ring_planes: Plane of each segment's ring, shape ``(n_segments,)``.
+        rings: Crossings round each ring in order of angle, shape ``(n_segments, n_per_plane)``; closed by
+            returning to the first.
+        springs: Front and rear crossing of every axial spring, shape ``(n_springs, 2)``, bay by bay.
+        sensor_springs: The springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the
+            first of each starts on clockwise strand 0, "the first helix".
+        rhombi: Front, left, rear and right crossing of every complete rhombus, shape ``(n_rhombi, 4)``.
+    """
+
+    n_segments: int
+    radius_m: float
+    angular_rate_rad_per_m: float
+    vertices_m: Array
+    crossing_vertex: Indices
+    crossing_strands: Indices
+    plane_x_m: Array
+    ring_planes: Indices
+    rings: Indices
+    springs: Indices
+    sensor_springs: Indices
+    rhombi: Indices
+
+    @property
+    def n_strands(self) -> int:
+        """Number of strands (helices)."""
+        return self.vertices_m.shape[0]
+
+    @property
+    def n_planes(self) -> int:
+        """Number of crossing planes."""
+        return self.plane_x_m.shape[0]
+
+    @property
+    def n_per_plane(self) -> int:
+        """Number of crossings on each plane, half the number of helices."""
+        return self.n_strands // 2
+
+    @property
+    def n_crossings(self) -> int:
+        """Number of crossings, each a pin."""
+        return self.crossing_strands.shape[0]
+
+    @property
+    def length_m(self) -> float:
+        """Length of the mesh along the body axis."""
+        return float(self.vertices_m[0, -1, 0])
+
+    @cached_property
+    def crossings_m(self) -> Array:
+        """Position of every crossing, shape ``(n_crossings, 3)``."""
+        return self.vertices_m[: self.n_per_plane, self.crossing_vertex].swapaxes(0, 1).reshape(-1, 3)
+
+    @cached_property
+    def crossing_plane(self) -> Indices:
+        """Plane of every crossing, shape ``(n_crossings,)``."""
+        return np.arange(self.n_crossings) // self.n_per_plane
+
+    @cached_property
+    def strand_length_m(self) -> float:
+        """Length of one strand along its straight elements."""
+        return float(np.linalg.norm(np.diff(self.vertices_m[0], axis=0), axis=1).sum())
+
+    @cached_property
+    def spring_length_m(self) -> Array:
+        """Length of every axial spring at rest, shape ``(n_springs,)``."""
+        front, rear = self.crossings_m[self.springs[:, 0]], self.crossings_m[self.springs[:, 1]]
+        return np.linalg.norm(rear - front, axis=1)
+
+    @cached_property
+    def ring_length_m(self) -> Array:
+        """Length of every ring at rest (a closed polygon), shape ``(n_segments,)``."""
+        corners = self.crossings_m[self.rings]
+        return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).sum(axis=1)
+
+    @cached_property
+    def segment_of_vertex(self) -> Indices:
+        """Segment (from 0) whose ring is nearest along the body, shape ``(n_vertices,)``."""
+        ring_x = self.plane_x_m[self.ring_planes]
+        return np.abs(self.vertices_m[0, :, 0][:, None] - ring_x[None]).argmin(axis=1)
+
+
+def helical_mesh(
+    n_segments: int,
+    *,
+    n_helices: int = 12,
+    radius_m: float = 0.16,
+    angular_rate_rad_per_m: float = 14.0,
+    elements_per_side: int = 3,
+    planes_between_rings: int = 4,
+    free_planes_at_ends: int = 3,
+    rear_overhang_m: float | None = None,
+) -> MeshGeometry:
+    """Generates the mesh of a worm.
+
+    Args:
+        n_segments: Actuated segments, at least 3.
+        n_helices: Strands, half of each handedness; even and at least 6.
+        radius_m: Radius of the tube at rest.
+        angular_rate_rad_per_m: Turn of a strand per metre of body (2 pi over the pitch).
+        elements_per_side: Straight elements between neighbouring crossings, and in each free end.
+        planes_between_rings: Crossing planes from one ring to the next, at least 2.
+        free_planes_at_ends: Crossing planes before the first and after the last ring, at least 1.
+        rear_overhang_m: Free strand behind the last plane; by default half a plane spacing, as in front.
+
+    Returns:
+        The geometry at rest.
+
+    Raises:
+        ValueError: An argument is outside its range; the sentence names it.
+    """
+    _check(n_segments, n_helices, radius_m, angular_rate_rad_per_m, elements_per_side)
+    if planes_between_rings < 2 or free_planes_at_ends < 1:
+        raise ValueError(
+            f"planes_between_rings = {planes_between_rings} must be at least 2 and "
+            f"free_planes_at_ends = {free_planes_at_ends} at least 1"
+        )
+    half = n_helices // 2
+    step = 2 * pi / half
+    spacing = step / (2 * angular_rate_rad_per_m)
+    overhang = spacing / 2 if rear_overhang_m is None else rear_overhang_m
+    if not overhang > 0:
+        raise ValueError(f"rear_overhang_m = {overhang} must be positive")
+
+    n_planes = 2 * free_planes_at_ends + (n_segments - 1) * planes_between_rings + 1
+    plane_x = spacing * (0.5 + np.arange(n_planes))
+    ring_planes = free_planes_at_ends + planes_between_rings * np.arange(n_segments)
+    offset = step / 2 + step * floor(pi / 2 / step)
+
+    vertices = _strands(plane_x, overhang, half, radius_m, angular_rate_rad_per_m, offset, elements_per_side)
+    strands = _crossing_strands(plane_x, half, angular_rate_rad_per_m, offset)
+    springs, sensor_springs = _springs(ring_planes, n_planes, half)
+    return MeshGeometry(
+        n_segments=n_segments,
+        radius_m=radius_m,
+        angular_rate_rad_per_m=angular_rate_rad_per_m,
+        vertices_m=vertices,
+        crossing_vertex=elements_per_side * (1 + np.arange(n_planes)),
+        crossing_strands=strands,
+        plane_x_m=plane_x,
+        ring_planes=ring_planes,
+        rings=ring_planes[:, None] * half + np.arange(half)[None],
+        springs=springs,
+        sensor_springs=sensor_springs,
+        rhombi=_rhombi(n_planes, half),
+    )
+
+
+def _check(n_segments: int, n_helices: int, radius_m: float, rate: float, elements_per_side: int) -> None:
+    if n_segments < 3:
+        raise ValueError(f"n_segments = {n_segments} must be at least 3")
+    if n_helices < 6 or n_helices % 2:
+        raise ValueError(f"n_helices = {n_helices} must be even and at least 6")
+    if not (radius_m > 0 and rate > 0):
+        raise ValueError(f"radius_m = {radius_m} and angular_rate_rad_per_m = {rate} must be positive")
+    if elements_per_side < 1:
+        raise ValueError(f"elements_per_side = {elements_per_side} must be at least 1")
+
+
+def _strands(
+    plane_x: Array, overhang: float, half: int, radius: float, rate: float, offset: float, elements: int
+) -> Array:
+    """Samples every strand at the planes, at its two ends, and evenly in between."""
+    knots = np.concatenate([[0.0], plane_x, [plane_x[-1] + overhang]])
+    fractions = np.arange(elements) / elements
+    inner = knots[:-1, None] + np.diff(knots)[:, None] * fractions[None]
+    x = np.append(inner.ravel(), knots[-1])
+    phase = (2 * pi / half) * np.arange(half)
+    angle = np.concatenate([rate * x[None] + phase[:, None], offset - rate * x[None] - phase[:, None]])
+    return np.stack(
+        [np.broadcast_to(x, angle.shape), radius * np.cos(angle), radius + radius * np.sin(angle)], axis=-1
+    )
+
+
+def _crossing_strands(plane_x: Array, half: int, rate: float, offset: float) -> Indices:
+    """Pairs strands at each plane: ``i + j`` is the same number on a whole plane, modulo ``half``."""
+    total = np.rint((offset - 2 * rate * plane_x) / (2 * pi / half)).astype(np.int64)
+    clockwise = np.arange(half)
+    counter = (total[:, None] - clockwise[None]) % half + half
+    return np.stack([np.broadcast_to(clockwise, counter.shape), counter], axis=-1).reshape(-1, 2)
+
+
+def _springs(ring_planes: Indices, n_planes: int, half: int) -> tuple[Indices, Indices]:
+    """Lays springs over two planes: one bay round each ring, and further bays end to end where they fit.
+
+    A strand advances by one angular step over two planes, so the crossing at the same angle lies on the
+    clockwise strand one lower.
+    """
+    bays: list[int] = []
+    start = (ring_planes[0] - 1) % 2
+    for ring in ring_planes:
+        bays.extend(range(start, int(ring) - 2, 2))
+        bays.append(int(ring) - 1)
+        start = int(ring) + 1
+    bays.extend(range(start, n_planes - 2, 2))
+    strand = np.arange(half)
+    front = np.asarray(bays)[:, None] * half + strand[None]
+    rear = (np.asarray(bays)[:, None] + 2) * half + (strand[None] - 1) % half
+    springs = np.stack([front, rear], axis=-1).reshape(-1, 2)
+    sensor_bay = np.asarray([bays.index(int(ring) - 1) for ring in ring_planes])
+    return springs, sensor_bay[:, None] * half + strand[None]
+
+
+def _rhombi(n_planes: int, half: int) -> Indices:
+    """Lists every rhombus by its four corners: front, its two neighbours on the next plane, rear."""
+    front_plane, strand = np.meshgrid(np.arange(n_planes - 2), np.arange(half), indexing="ij")
+    corners = (
+        front_plane * half + strand,
+        (front_plane + 1) * half + strand,
+        (front_plane + 2) * half + (strand - 1) % half,
+        (front_plane + 1) * half + (strand - 1) % half,
+    )
+    return np.stack(corners, axis=-1).reshape(-1, 4)

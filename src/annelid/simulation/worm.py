@@ -1,0 +1,329 @@
+"""The 3D worm as a Plant: MuJoCo steps the body, annelid reads what it feels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.body import build_spec, mesh_of
+from annelid.body.actuation import crossing_site, ring_names
+from annelid.clock import StepRatio
+from annelid.config import Chain, RunConfig, WormBody
+from annelid.errors import ConfigError, SimulationStopped
+from annelid.morphology import Array, MeshGeometry
+from annelid.protocols import Recordable, Sensation, Signal, State
+
+STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+"""All that the next step depends on: positions, velocities, activations, warm start, and the rods' frames
+(which the engine keeps as "plastic" state)."""
+
+AXES = ("x", "y", "z")
+ALARM_EVERY = 10
+"""Physics steps between two looks at the kinetic energy, which costs a pass over all joints."""
+
+
+class WormPlant:
+    """The 3D worm on its floor.
+
+    Lengths and positions are those at the end of the step; forces and edge strains are those that acted during
+    the last physics step, since the engine computes them on the way.
+    """
+
+    def __init__(self, config: RunConfig) -> None:
+        """Builds and compiles the body.
+
+        Args:
+            config: The run's configuration.
+
+        Raises:
+            ConfigError: The body is planar, or the engine refuses the model.
+        """
+        spec = build_spec(config)
+        assert isinstance(config.body, WormBody)
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        try:
+            self.model = spec.compile()
+        except ValueError as error:
+            raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+        self.data = mujoco.MjData(self.model)
+        self.geometry: MeshGeometry = mesh_of(config.body.mesh)
+        self._config = config
+        self._body = config.body
+        self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
+        self._muscle_names = ring_names(config.body.n_segments, config.body.rings)
+        self._resolve_names()
+        self._mass = self.model.body_mass / self.model.body_mass.sum()
+        self._control_steps_per_physics = max(
+            1, round(config.clock.physics_timestep_s / config.clock.control_timestep_s)
+        )
+        self._control_step = 0
+        self._forget_forces()
+
+    def _resolve_names(self) -> None:
+        model, geometry = self.model, self.geometry
+        self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(geometry.n_crossings)])
+        springs = np.array([model.tendon(f"spring_{k}").id for k in range(len(geometry.springs))])
+        self._sensor = geometry.sensor_springs
+        self._floor = model.geom("floor").id
+        self._rest_stretch = model.tendon_lengthspring[springs, 1][self._sensor]
+        self._rings = [model.tendon(name).id for name in self._muscle_names]
+        self._ring_path = [self._path_of(tendon) for tendon in self._rings]
+        self._segment_of_geom = self._segments_of_geoms()
+        self._segment_of_flex_vertex = np.tile(geometry.segment_of_vertex, geometry.n_strands)
+
+    def _path_of(self, tendon: int) -> NDArray[np.int64]:
+        """Crossings along a ring tendon."""
+        start, count = self.model.tendon_adr[tendon], self.model.tendon_num[tendon]
+        sites = self.model.wrap_objid[start : start + count]
+        crossing = {int(site): index for index, site in enumerate(self._crossing_site)}
+        return np.array([crossing[int(site)] for site in sites])
+
+    def _segments_of_geoms(self) -> NDArray[np.int64]:
+        """Segment whose ring is nearest to each geom at rest; the engine's rest pose is qpos0."""
+        mujoco.mj_kinematics(self.model, self.data)
+        ring_x = self.geometry.plane_x_m[self.geometry.ring_planes]
+        return np.abs(self.data.geom_xpos[:, :1] - ring_x[None]).argmin(axis=1)
+
+    def _forget_forces(self) -> None:
+        self._muscle_force = np.zeros(self.n_muscles)
+        self._contact_force = np.zeros((self.n_segments, 3))
+        self._edge_strain = 0.0
+        self._pin_gap = 0.0
+
+    @property
+    def n_segments(self) -> int:
+        """Number of actuated segments."""
+        return self.geometry.n_segments
+
+    @property
+    def n_muscles(self) -> int:
+        """Number of ring muscles."""
+        return len(self._muscle_names)
+
+    @property
+    def total_mass_kg(self) -> float:
+        """Mass of strands and pins."""
+        return float(self.model.body_mass.sum())
+
+    def reset(self, seed: int) -> Sensation:
+        """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._control_step = 0
+        self._forget_forces()
+        self._locate()
+        return self._feel()
+
+    def step(self, activation: Array) -> Sensation:
+        """Advances by one control step.
+
+        Args:
+            activation: Muscle activation in [0, 1], shape ``(n_muscles,)``.
+
+        Returns:
+            What the body feels at the end of the step.
+
+        Raises:
+            SimulationStopped: The engine gave up on the step.
+        """
+        self._control_step += 1
+        due = self._ratio.physics_steps_due(self._control_step)
+        if due:
+            self.data.ctrl[:] = activation
+            try:
+                mujoco.mj_step(self.model, self.data, due)
+            except mujoco.FatalError as error:
+                raise SimulationStopped(f"the engine stopped at {self.data.time:.3f} s: {error}") from None
+            self._collect_forces()
+            self._locate()
+        return self._feel()
+
+    def _locate(self) -> None:
+        """Brings positions up to the end of the step, and with them all lengths."""
+        mujoco.mj_kinematics(self.model, self.data)
+        self._crossing = self.data.site_xpos[self._crossing_site]
+        ends = self._crossing[self.geometry.springs]
+        self._spring_length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self._ring_length = np.array(
+            [np.linalg.norm(np.diff(self._crossing[path], axis=0), axis=1).sum() for path in self._ring_path]
+        )
+        self._center_of_mass = self._mass @ self.data.xipos
+
+    def _collect_forces(self) -> None:
+        data = self.data
+        self._muscle_force = -data.actuator_force
+        self._contact_force = self._contact_forces()
+        if self.model.nflexedge:
+            strain = data.flexedge_length / self.model.flexedge_length0 - 1
+            self._edge_strain = float(np.abs(strain).max())
+        else:
+            self._pin_gap = self._largest_pin_gap()
+
+    def _largest_pin_gap(self) -> float:
+        """Distance between the two strands of the crossing that parts most, m."""
+        residual = self.data.efc_pos[: 3 * self.model.neq].reshape(self.model.neq, 3)
+        formulation = self._body.formulation
+        if isinstance(formulation, Chain) and formulation.pins == "separate":
+            residual = residual[0::2] - residual[1::2]
+        return float(np.linalg.norm(residual, axis=1).max())
+
+    def _contact_forces(self) -> Array:
+        """Sums the floor's force over the contacts of each segment, N, shape ``(n_segments, 3)``."""
+        total = np.zeros((self.n_segments, 3))
+        contact = self.data.contact
+        address = contact.efc_address
+        if not len(address):
+            return total
+        active = address >= 0
+        rows = address[active, None] + np.arange(4)[None]
+        edges = self.data.efc_force[rows]
+        friction = contact.friction[active]
+        local = np.stack(
+            [
+                edges.sum(axis=1),
+                (edges[:, 0] - edges[:, 1]) * friction[:, 0],
+                (edges[:, 2] - edges[:, 3]) * friction[:, 1],
+            ],
+            axis=1,
+        )
+        world = np.einsum("ni,nij->nj", local, contact.frame[active].reshape(-1, 3, 3))
+        segment, sign = self._contact_owner(contact, active)
+        np.add.at(total, segment, sign[:, None] * world)
+        return total
+
+    def _contact_owner(
+        self, contact: mujoco._structs._MjContactList, active: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int64], Array]:
+        """Segment of each contact, and the sign that turns the engine's force into that on the worm.
+
+        The engine's force acts on the second partner of the contact.
+        """
+        floor_first = contact.geom[active, 0] == self._floor
+        sign = np.where(floor_first, 1.0, -1.0)
+        mine = np.where(floor_first, 1, 0)
+        row = np.arange(len(mine))
+        geom = contact.geom[active][row, mine]
+        if not self.model.nflex:
+            return self._segment_of_geom[geom], sign
+        flex = contact.flex[active][row, mine]
+        element, vertex = contact.elem[active][row, mine], contact.vert[active][row, mine]
+        first = self.model.flex_elem[self.model.flex_elemdataadr[flex] + 2 * np.maximum(element, 0)]
+        local = np.where(vertex >= 0, vertex, first)
+        return self._segment_of_flex_vertex[self.model.flex_vertadr[flex] + local], sign
+
+    def _feel(self) -> Sensation:
+        return Sensation(
+            time_s=self._control_step * self._config.clock.control_timestep_s,
+            stretch_m=self._spring_length[self._sensor],
+            rest_stretch_m=self._rest_stretch.copy(),
+            ring_length_m=self._ring_length.copy(),
+            muscle_force_N=self._muscle_force.copy(),
+            contact_force_N=self._contact_force.copy(),
+            center_of_mass_m=self._center_of_mass.copy(),
+        )
+
+    def kinetic_energy_J(self) -> float:
+        """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
+        mujoco.mj_energyVel(self.model, self.data)
+        return float(self.data.energy[1])
+
+    def alarm(self) -> str | None:
+        """Tells whether energy, height, edge strain or pin gaps exceed the configured guard.
+
+        Returns:
+            One sentence naming the quantity, its value and its limit, or None.
+        """
+        guard = self._config.guard
+        height = float(self._crossing[:, 2].max())
+        readings = [
+            ("guard.height_m", "height of a crossing", height, guard.height_m, "m"),
+            ("guard.edge_strain", "edge strain of a rod", self._edge_strain, guard.edge_strain, ""),
+            ("guard.pin_gap_m", "gap at a pin", self._pin_gap, guard.pin_gap_m, "m"),
+        ]
+        if self._control_step % (ALARM_EVERY * self._control_steps_per_physics) == 0:
+            energy = self.kinetic_energy_J()
+            readings.append(("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, "J"))
+        for field, words, value, limit, unit in readings:
+            if not value <= limit:
+                return f"{words} is {value:.3g} {unit}, above the limit {field} = {limit:g}".replace("  ", " ")
+        return None
+
+    def recordable(self) -> Recordable:
+        """Names the signals of the body."""
+        n, m, geometry = self.n_segments, self.n_muscles, self.geometry
+        sensors = geometry.sensor_springs.shape[1]
+        stretch = ("segment", "sensor")
+        shape = (n, sensors)
+        strain: tuple[Signal, ...] = (
+            (Signal("edge_strain", (), (), "1", "largest strain of a rod's edge"),)
+            if self.model.nflexedge
+            else (Signal("pin_gap", (), (), "m", "largest gap between two pinned strands"),)
+        )
+        return Recordable(
+            signals=(
+                Signal("stretch_length", stretch, shape, "m", "length of the springs that span a ring"),
+                Signal("spring_length", ("spring",), (len(geometry.springs),), "m", "length of an axial spring"),
+                Signal("ring_length", ("muscle",), (m,), "m", "length of a ring muscle"),
+                Signal("muscle_force", ("muscle",), (m,), "N", "contractile force of a ring muscle"),
+                Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the floor on a segment"),
+                Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass"),
+                Signal("kinetic_energy", (), (), "J", "kinetic energy"),
+                *strain,
+                Signal(
+                    "crossing_position",
+                    ("crossing", "axis"),
+                    (geometry.n_crossings, 3),
+                    "m",
+                    "position of a crossing",
+                    every_frame=True,
+                ),
+                Signal("qpos", ("coordinate",), (self.model.nq,), "1", "generalised position", every_frame=True),
+            ),
+            coords={"muscle": self._muscle_names, "axis": AXES},
+            attrs={
+                "total_mass_kg": self.total_mass_kg,
+                "body_length_m": geometry.length_m,
+                "mujoco_version": mujoco.__version__,
+            },
+        )
+
+    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+        """Reads the present values of the frame signals, or of all others."""
+        if frame:
+            return {"crossing_position": self._crossing, "qpos": self.data.qpos}
+        values: dict[str, NDArray[np.generic] | float] = {
+            "stretch_length": self._spring_length[self._sensor],
+            "spring_length": self._spring_length,
+            "ring_length": self._ring_length,
+            "muscle_force": self._muscle_force,
+            "contact_force": self._contact_force,
+            "center_of_mass": self._center_of_mass,
+            "kinetic_energy": self.kinetic_energy_J(),
+        }
+        if self.model.nflexedge:
+            return values | {"edge_strain": self._edge_strain}
+        return values | {"pin_gap": self._pin_gap}
+
+    def get_state(self) -> State:
+        """Returns the engine's whole state and what was felt last."""
+        engine = np.empty(mujoco.mj_stateSize(self.model, STATE_PARTS))
+        mujoco.mj_getState(self.model, self.data, engine, STATE_PARTS)
+        return {
+            "engine": engine,
+            "control_step": np.array([self._control_step]),
+            "muscle_force": self._muscle_force.copy(),
+            "contact_force": self._contact_force.copy(),
+            "extremes": np.array([self._edge_strain, self._pin_gap]),
+        }
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned; the run then continues bit for bit on the same machine."""
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, np.asarray(state["engine"], dtype=float), STATE_PARTS)
+        self._control_step = int(state["control_step"][0])
+        self._muscle_force = np.asarray(state["muscle_force"], dtype=float).copy()
+        self._contact_force = np.asarray(state["contact_force"], dtype=float).copy()
+        self._edge_strain, self._pin_gap = (float(value) for value in state["extremes"])
+        self._locate()

@@ -163,7 +163,7 @@ def helical_mesh(
         raise ValueError(f"rear_overhang_m = {overhang} must be positive")
 
     n_planes = 2 * free_planes_at_ends + (n_segments - 1) * planes_between_rings + 1
-    plane_x = spacing * (0.5 + np.arange(n_planes))
+    plane_x: Array = spacing * (0.5 + np.arange(n_planes, dtype=np.float64))
     ring_planes = free_planes_at_ends + planes_between_rings * np.arange(n_segments)
     offset = step / 2 + step * floor(pi / 2 / step)
 
@@ -207,9 +207,7 @@ def _strands(
     x = np.append(inner.ravel(), knots[-1])
     phase = (2 * pi / half) * np.arange(half)
     angle = np.concatenate([rate * x[None] + phase[:, None], offset - rate * x[None] - phase[:, None]])
-    return np.stack(
-        [np.broadcast_to(x, angle.shape), radius * np.cos(angle), radius + radius * np.sin(angle)], axis=-1
-    )
+    return np.stack([np.broadcast_to(x, angle.shape), radius * np.cos(angle), radius + radius * np.sin(angle)], axis=-1)
 
 
 def _crossing_strands(plane_x: Array, half: int, rate: float, offset: float) -> Indices:

@@ -38,9 +38,7 @@ def add_floor(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     )
     material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-    spec.worldbody.add_light(
-        name="lamp", pos=[length_m / 2, -1.0, 2.5], dir=[0.0, 0.35, -1.0], diffuse=[0.7, 0.7, 0.7]
-    )
+    spec.worldbody.add_light(name="lamp", pos=[length_m / 2, -1.0, 2.5], dir=[0.0, 0.35, -1.0], diffuse=[0.7, 0.7, 0.7])
     spec.worldbody.add_geom(
         name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,

@@ -42,24 +42,22 @@ def build_spec(config: RunConfig) -> mujoco.MjSpec:
     Raises:
         ConfigError: The body is planar and has no MuJoCo model.
     """
-    body = config.body
-    if not isinstance(body, WormBody):
-        raise ConfigError(
-            f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has"
-        )
+    body, arena = config.body, config.arena
+    if not isinstance(body, WormBody) or arena is None:
+        raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
     spec.compiler.degree = False
     spec.option.timestep = config.clock.physics_timestep_s
-    spec.option.gravity = [0.0, 0.0, -config.arena.gravity_m_per_s2]
+    spec.option.gravity = [0.0, 0.0, -arena.gravity_m_per_s2]
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
     if isinstance(body.formulation, Chain):
-        add_chains(spec, geometry, body, body.formulation, config.arena)
+        add_chains(spec, geometry, body, body.formulation, arena)
     else:
-        add_rods(spec, geometry, body, body.formulation, config.arena)
+        add_rods(spec, geometry, body, body.formulation, arena)
     add_springs(spec, geometry, body.springs)
     add_ring_muscles(spec, geometry, body.rings)
-    add_floor(spec, config.arena, geometry.length_m)
+    add_floor(spec, arena, geometry.length_m)
     return spec

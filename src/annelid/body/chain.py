@@ -23,9 +23,7 @@ from annelid.morphology import Array, MeshGeometry
 JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
 
 
-def add_chains(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: Arena
-) -> None:
+def add_chains(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: Arena) -> None:
     """Adds the mesh as chains of capsules, and the paper's solver settings.
 
     Args:
@@ -83,7 +81,7 @@ def add_chain(
     middle = _middle_element(len(vertices_m)) if root is None else root
     rigidity = _rigidity(strands)
 
-    def add_element(parent: mujoco.MjsBody, element: int, joint_vertex: int, origin: Array) -> mujoco.MjsBody:  # pyright: ignore[reportAttributeAccessIssue]
+    def add_element(parent: mujoco.MjsBody, element: int, joint_vertex: int, origin: Array) -> mujoco.MjsBody:
         place = vertices_m[joint_vertex]
         link = parent.add_body(name=f"{name}_{element}", pos=place - origin)
         span = vertices_m[[element, element + 1]] - place
@@ -125,7 +123,7 @@ def _rigidity(strands: Strands) -> _Rigidity:
 
 
 def _add_joint(
-    link: mujoco.MjsBody,  # pyright: ignore[reportAttributeAccessIssue]
+    link: mujoco.MjsBody,
     vertices_m: Array,
     vertex: int,
     rigidity: _Rigidity,
@@ -140,9 +138,7 @@ def _add_joint(
         "armature": formulation.armature_kg_m2,
     }
     if formulation.joint == "ball":
-        link.add_joint(
-            type=mujoco.mjtJoint.mjJNT_BALL, stiffness=[rigidity.bending / length, 0.0, 0.0], **common
-        )
+        link.add_joint(type=mujoco.mjtJoint.mjJNT_BALL, stiffness=[rigidity.bending / length, 0.0, 0.0], **common)
         return
     tangent = before / np.linalg.norm(before) + after / np.linalg.norm(after)
     tangent /= np.linalg.norm(tangent)
@@ -153,14 +149,10 @@ def _add_joint(
         (np.cross(tangent, normal), rigidity.bending),
         (tangent, rigidity.torsion),
     ):
-        link.add_joint(
-            type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, stiffness=[rate / length, 0.0, 0.0], **common
-        )
+        link.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, stiffness=[rate / length, 0.0, 0.0], **common)
 
 
-def _add_pin(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain
-) -> None:
+def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain) -> None:
     name = crossing_site(crossing)
     position = geometry.crossings_m[crossing]
     vertex = int(geometry.crossing_vertex[geometry.crossing_plane[crossing]])

@@ -26,9 +26,7 @@ TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
 
 
-def add_rods(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: Arena
-) -> None:
+def add_rods(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: Arena) -> None:
     """Adds the mesh as a net of rods, and the solver settings that it needs.
 
     Args:
@@ -69,8 +67,8 @@ def _add_vertices(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody) -
     position = geometry.crossings_m
     for crossing in range(geometry.n_crossings):
         vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
-        pin = _add_point(
-            spec, crossing_site(crossing), position[crossing], 2 * masses[vertex] + body.pins.mass_kg
+        pin = add_vertex(
+            spec, crossing_site(crossing), position[crossing], 2 * float(masses[vertex]) + body.pins.mass_kg
         )
         pin.add_geom(
             name=crossing_site(crossing),
@@ -92,11 +90,12 @@ def _add_vertices(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody) -
     for strand, own in enumerate(names):
         for vertex, name in enumerate(own):
             if vertex not in at_crossing:
-                _add_point(spec, name, geometry.vertices_m[strand, vertex], masses[vertex])
+                add_vertex(spec, name, geometry.vertices_m[strand, vertex], float(masses[vertex]))
     return names
 
 
-def _add_point(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> mujoco.MjsBody:  # pyright: ignore[reportAttributeAccessIssue]
+def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> mujoco.MjsBody:
+    """Adds a point mass on three slides along the world's axes, the form that the Newton solver is fastest on."""
     point = spec.worldbody.add_body(
         name=name,
         pos=position,
@@ -129,12 +128,12 @@ def add_rod(
         spec: The spec that holds the bodies.
         name: Name of the flex; the twist hinges are named after it.
         vertices_m: Rest positions, shape ``(n_vertices, 3)``.
-        bodies: Body of each vertex, at the vertex's place.
+        bodies: Body of each vertex, at the vertex's place; "world" fixes the vertex.
         strands: Material.
         formulation: Settings of the inextensible edges.
         contact: Contact attributes; None for a rod that touches nothing.
         rgba: Colour.
-        clamped: The first edge belongs to a body that holds both of its vertices (a cantilever): it has no hinge.
+        clamped: The first two vertices belong to one body (a cantilever): their edge has no twist hinge.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     n_edges = len(lengths)
@@ -151,6 +150,9 @@ def add_rod(
         conaffinity=0 if contact is None else 1,
     )
     flex.vertbody = bodies
+    fixed = np.array([body == "world" for body in bodies])
+    if fixed.any():
+        flex.vert = np.where(fixed[:, None], vertices_m, 0.0).ravel()
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
     for key, value in (contact or {}).items():
         setattr(flex, key, value)

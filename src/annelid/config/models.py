@@ -1,32 +1,11 @@
-"""What a user may set: frozen models with the unit in every field's name, and the named presets.
-
-A configuration is a tree of sections. A preset is a commented TOML file in ``annelid/presets`` that states
-every field with its source; a user's own TOML file may start from one (``extends = "riddle2023"``), and any
-field can be overridden by its dotted path (``body.mesh.n_segments=4``).
-"""
+"""The sections of a configuration: frozen models with the unit in every field's name."""
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterable, Mapping
-from difflib import get_close_matches
-from importlib import resources
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
-from pydantic_core import ErrorDetails
-
-from annelid.errors import ConfigError, suggest
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator, model_validator
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -100,12 +79,8 @@ class Springs(Section):
     """Axial springs between crossings two planes apart at the same angle."""
 
     stiffness_N_per_m: NonNegative = Field(default=19.9, description="spring rate")
-    rest_length_m: Positive | None = Field(
-        default=None, description="default: two plane spacings, unstretched at rest"
-    )
-    tension_only: bool = Field(
-        default=False, description="true: slack below rest length; false: pushes as well"
-    )
+    rest_length_m: Positive | None = Field(default=None, description="default: two plane spacings, unstretched at rest")
+    tension_only: bool = Field(default=False, description="true: slack below rest length; false: pushes as well")
 
 
 class Rings(Section):
@@ -152,12 +127,8 @@ class Rods(Section):
     """The fast formulation: elastic rods that share one vertex at each crossing, so pins cannot part."""
 
     kind: Literal["rods"] = "rods"
-    edge_time_constant_s: Positive = Field(
-        default=0.001, description="time constant of the inextensible edges"
-    )
-    solver_iterations: Annotated[int, Field(ge=10)] = Field(
-        default=100, description="Newton iterations at most"
-    )
+    edge_time_constant_s: Positive = Field(default=0.001, description="time constant of the inextensible edges")
+    solver_iterations: Annotated[int, Field(ge=10)] = Field(default=100, description="Newton iterations at most")
     solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
     friction_impedance_ratio: Positive = Field(
         default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
@@ -173,9 +144,7 @@ class Chain(Section):
         description="one isotropic ball joint, or three hinges with torsion apart from bending",
     )
     armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
-    pin_time_constant_s: Positive = Field(
-        default=0.02, description="solref time constant of the pin constraints"
-    )
+    pin_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the pin constraints")
     pin_impedance: tuple[Positive, Positive, Positive] = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
     )
@@ -245,22 +214,16 @@ class PlanarBody(Section):
         return self
 
 
-Body = Annotated[
-    Annotated[WormBody, Tag("worm")] | Annotated[PlanarBody, Tag("riddle2022")], _kind_or("worm")
-]
+Body = Annotated[Annotated[WormBody, Tag("worm")] | Annotated[PlanarBody, Tag("riddle2022")], _kind_or("worm")]
 
 
 class Arena(Section):
     """Where the worm crawls: flat ground under gravity."""
 
     friction: NonNegative = Field(default=1.0, description="coefficient of sliding friction")
-    floor_gap_m: float = Field(
-        default=0.009, description="distance of the floor below the mesh's lowest line"
-    )
+    floor_gap_m: float = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
     gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
-    contact_time_constant_s: Positive = Field(
-        default=0.02, description="solref time constant of the contacts"
-    )
+    contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")
     contact_impedance: tuple[Positive, Positive, Positive] = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
     )
@@ -269,12 +232,8 @@ class Arena(Section):
 class StretchSensor(Section):
     """How the nervous system reads its segments' lengths."""
 
-    tolerance_m: NonNegative = Field(
-        default=0.010, description="on while a segment is within this of its rest length"
-    )
-    hysteresis_m: NonNegative = Field(
-        default=0.0, description="once on, stays on until this much beyond the tolerance"
-    )
+    tolerance_m: NonNegative = Field(default=0.010, description="on while a segment is within this of its rest length")
+    hysteresis_m: NonNegative = Field(default=0.0, description="once on, stays on until this much beyond the tolerance")
     startup_hold_s: NonNegative = Field(
         default=0.2, description="sensor of segment 1 held off for this long at the start"
     )
@@ -292,19 +251,13 @@ class SnsController(Section):
         default=0.01, description="delta: how far past the bifurcation the half-centre sits"
     )
     offset_mV: Positive = Field(default=0.1, description="how far below rest an inhibited neuron is held")
-    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(
-        default=-40.0, description="relative to rest"
-    )
+    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
     excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
     sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
     gate_slope_per_mV: Positive = Field(default=0.05, description="slope S of the sodium gates")
-    gate_time_constant_ms: Positive = Field(
-        default=300.0, description="tau_h,max; sets the period: 300, 200 or 100"
-    )
+    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; sets the period: 300, 200 or 100")
     sensor_current_nA: NonNegative = Field(default=20.0, description="current of a stretch sensor that is on")
-    kick_nA: NonNegative = Field(
-        default=1.0, description="current into the first contraction neuron at the first step"
-    )
+    kick_nA: NonNegative = Field(default=1.0, description="current into the first contraction neuron at the first step")
     activation: Literal["sigmoid", "linear"] = Field(
         default="sigmoid", description="Eq. 2, or the planar worm's clipped difference of the half-centre"
     )
@@ -338,12 +291,8 @@ class Clock(Section):
 class Record(Section):
     """What goes into the run file how often."""
 
-    signals_interval_s: Positive = Field(
-        default=0.005, description="interval of potentials, lengths and forces"
-    )
-    frames_interval_s: Positive = Field(
-        default=0.04, description="interval of whole postures, for pictures and video"
-    )
+    signals_interval_s: Positive = Field(default=0.005, description="interval of potentials, lengths and forces")
+    frames_interval_s: Positive = Field(default=0.04, description="interval of whole postures, for pictures and video")
 
 
 class Guard(Section):
@@ -363,12 +312,27 @@ class RunConfig(Section):
     duration_s: Positive = Field(default=5.0, description="simulated time")
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
     body: Body = WormBody()
-    arena: Arena = Arena()
+    arena: Arena | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
     controller: SnsController = SnsController()
     sensor: StretchSensor = StretchSensor()
     clock: Clock = Clock()
     record: Record = Record()
     guard: Guard = Guard()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _ground_under_the_worm(cls, tree: Any) -> Any:
+        if not isinstance(tree, Mapping) or tree.get("arena") is not None:
+            return tree
+        body = tree.get("body", {})
+        kind = body.get("kind", "worm") if isinstance(body, Mapping) else getattr(body, "kind", "worm")
+        return {**tree, "arena": {}} if kind == "worm" else tree
+
+    @model_validator(mode="after")
+    def _no_ground_for_planar_worms(self) -> Self:
+        if isinstance(self.body, PlanarBody) and self.arena is not None:
+            raise ValueError(f"arena has no effect on body.kind = {self.body.kind!r}, which touches no ground")
+        return self
 
     @model_validator(mode="after")
     def _intervals_are_whole_steps(self) -> Self:
@@ -383,197 +347,3 @@ class RunConfig(Section):
                     f"{field} = {value:g} must be an integer multiple of clock.control_timestep_s = {step:g}"
                 )
         return self
-
-
-def preset_names() -> list[str]:
-    """Returns the names of the presets that come with annelid."""
-    folder = resources.files("annelid") / "presets"
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
-    )
-
-
-def preset_text(name: str) -> str:
-    """Returns the commented TOML of a preset.
-
-    Raises:
-        ConfigError: No preset has that name; the sentence suggests the nearest.
-    """
-    if name not in preset_names():
-        raise ConfigError(f"unknown preset {name!r}: {suggest(name, preset_names())}")
-    return (resources.files("annelid") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
-
-
-def load_config(
-    source: str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None = None
-) -> RunConfig:
-    """Loads a preset, a TOML file or a mapping, applies overrides, and checks all of it.
-
-    Args:
-        source: Name of a preset, path of a TOML file (recognised by its suffix ``.toml``), or nested mapping.
-            A file or mapping may name a preset to start from with ``extends``.
-        overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``.
-
-    Returns:
-        The checked configuration.
-
-    Raises:
-        ConfigError: Unknown preset or field, unreadable file, or a value out of its range.
-    """
-    tree = _read_tree(source)
-    for path, value in (overrides or {}).items():
-        nested: Any = value
-        for key in reversed(path.split(".")):
-            nested = {key: nested}
-        tree = _merge(tree, nested)
-    return check_config(tree)
-
-
-def check_config(tree: Mapping[str, Any]) -> RunConfig:
-    """Turns a nested mapping into a checked `RunConfig`, or raises `ConfigError` naming the field."""
-    try:
-        return RunConfig.model_validate(tree)
-    except ValidationError as error:
-        raise ConfigError("; ".join(dict.fromkeys(_explain(detail) for detail in error.errors()))) from None
-
-
-def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
-    """Parses ``field=value`` strings; values are read as TOML, and as plain text where they are none.
-
-    Raises:
-        ConfigError: A string has no ``=`` or no field before it.
-    """
-    parsed: dict[str, Any] = {}
-    for assignment in assignments:
-        path, equals, text = assignment.partition("=")
-        path = path.strip()
-        if not equals or not path or not all(path.split(".")):
-            raise ConfigError(
-                f"{assignment!r} is not of the form field=value, for example arena.friction=0.3"
-            )
-        parsed[path] = _parse_value(text.strip())
-    return parsed
-
-
-def _parse_value(text: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
-
-
-def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
-    """Returns the dotted path and the description of every field, for help texts and suggestions."""
-    paths: dict[str, str] = {}
-    for name, info in model.model_fields.items():
-        sections = _sections_of(info.annotation)
-        if sections:
-            for section in sections:
-                paths.update(field_paths(section, f"{prefix}{name}."))
-        else:
-            paths[f"{prefix}{name}"] = info.description or ""
-    return paths
-
-
-def _sections_of(annotation: Any) -> list[type[Section]]:
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return [annotation]
-    found: list[type[Section]] = []
-    for argument in getattr(annotation, "__args__", ()):
-        found.extend(_sections_of(argument))
-    return found
-
-
-def _read_tree(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    if isinstance(source, Mapping):
-        own = dict(source)
-    elif isinstance(source, Path) or str(source).endswith(".toml"):
-        path = Path(source)
-        try:
-            own = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"cannot read the configuration file {path}: {error.strerror}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ConfigError(f"{path} is not valid TOML: {error}") from None
-        own.setdefault("name", path.stem)
-    else:
-        own = tomllib.loads(preset_text(str(source)))
-    base = own.pop("extends", None)
-    return own if base is None else _merge(_read_tree(base), own)
-
-
-def _merge(base: dict[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
-    """Lays ``change`` over ``base``; a table whose ``kind`` changes starts from that kind's own defaults."""
-    if "kind" in change and change["kind"] != base.get("kind"):
-        base = {}
-    merged = dict(base)
-    for key, value in change.items():
-        if isinstance(value, Mapping):
-            below = merged.get(key)
-            merged[key] = _merge(dict(below) if isinstance(below, Mapping) else {}, value)
-        else:
-            merged[key] = value
-    return merged
-
-
-_KINDS = {"worm", "riddle2022", "rods", "chain", "sns"}
-_WORDS = {
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be at least {ge:g}",
-    "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be at most {le:g}",
-    "literal_error": "must be one of {expected}",
-    "union_tag_invalid": "must be one of {expected_tags}",
-    "int_from_float": "must be a whole number",
-    "int_type": "must be a whole number",
-    "int_parsing": "must be a whole number",
-    "float_type": "must be a number",
-    "float_parsing": "must be a number",
-    "finite_number": "must be a finite number",
-    "bool_type": "must be true or false",
-    "bool_parsing": "must be true or false",
-    "model_type": "is a section; set one of its fields instead",
-    "model_attributes_type": "is a section; set one of its fields instead",
-}
-
-
-def _explain(detail: ErrorDetails) -> str:
-    path = ".".join(str(part) for part in detail["loc"] if part not in _KINDS and not _is_type_label(part))
-    kind = detail["type"]
-    if kind == "extra_forbidden":
-        return f"unknown field {path!r}: {_nearest_fields(path)}"
-    if kind == "value_error":
-        message = str(detail.get("ctx", {}).get("error", detail["msg"]))
-        given = detail["input"]
-        return message if isinstance(given, dict | BaseModel) else f"{path} = {given!r}: {message}"
-    words = _WORDS.get(kind, "").format(**detail.get("ctx", {})) or detail["msg"]
-    if kind == "union_tag_invalid":
-        given = detail["input"].get("kind") if isinstance(detail["input"], Mapping) else detail["input"]
-        return f"{path}.kind = {given!r}: {words}"
-    return f"{path} = {detail['input']!r}: {words}"
-
-
-def _is_type_label(part: int | str) -> bool:
-    """Pydantic puts the label of a union's member into the location; it is no field name."""
-    return isinstance(part, str) and ("[" in part or "constrained" in part)
-
-
-def _nearest_fields(path: str) -> str:
-    section, _, leaf = path.rpartition(".")
-    known = list(field_paths())
-    here = [p.removeprefix(f"{section}.") for p in known if not section or p.startswith(f"{section}.")]
-    siblings = sorted({name.split(".")[0] for name in here})
-    near = get_close_matches(leaf, siblings, n=1, cutoff=0.5)
-    if near:
-        return suggest(near[0], siblings).replace(near[0], f"{section}.{near[0]}" if section else near[0], 1)
-    elsewhere = [
-        p
-        for p in known
-        if p.rsplit(".", 1)[-1]
-        in get_close_matches(leaf, [q.rsplit(".", 1)[-1] for q in known], n=1, cutoff=0.6)
-    ]
-    return (
-        f"did you mean {elsewhere[0]!r}? Valid here: {', '.join(siblings)}"
-        if elsewhere
-        else f"Valid here: {', '.join(siblings)}"
-    )

@@ -1,0 +1,115 @@
+"""Checking a configuration, and saying in one sentence what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from annelid.config.models import RunConfig, Section
+from annelid.errors import ConfigError
+
+
+def check_config(tree: Mapping[str, Any]) -> RunConfig:
+    """Turns a nested mapping into a checked `RunConfig`, or raises `ConfigError` naming the field."""
+    try:
+        return RunConfig.model_validate(tree)
+    except ValidationError as error:
+        raise ConfigError("; ".join(dict.fromkeys(_explain(detail) for detail in error.errors()))) from None
+
+
+def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
+    """Returns the dotted path and the description of every field, for help texts and suggestions."""
+    paths: dict[str, str] = {}
+    for name, info in model.model_fields.items():
+        sections = _sections_of(info.annotation)
+        if sections:
+            for section in sections:
+                paths.update(field_paths(section, f"{prefix}{name}."))
+        else:
+            paths[f"{prefix}{name}"] = info.description or ""
+    return paths
+
+
+def _sections_of(annotation: Any) -> list[type[Section]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    found: list[type[Section]] = []
+    for argument in getattr(annotation, "__args__", ()):
+        found.extend(_sections_of(argument))
+    return found
+
+
+_KINDS = {"worm", "riddle2022", "rods", "chain", "sns"}
+_WORDS = {
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "must be one of {expected}",
+    "union_tag_invalid": "must be one of {expected_tags}",
+    "int_from_float": "must be a whole number",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be a finite number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "model_type": "is a section; set one of its fields instead",
+    "model_attributes_type": "is a section; set one of its fields instead",
+}
+
+
+def _explain(detail: ErrorDetails) -> str:
+    path = ".".join(str(part) for part in detail["loc"] if part not in _KINDS and not _is_type_label(part))
+    kind = detail["type"]
+    if kind == "extra_forbidden":
+        return f"unknown field {path!r}: {_nearest_fields(detail['loc'])}"
+    if kind == "value_error":
+        message = str(detail.get("ctx", {}).get("error", detail["msg"]))
+        given = detail["input"]
+        return message if isinstance(given, dict | BaseModel) else f"{path} = {given!r}: {message}"
+    words = _WORDS.get(kind, "").format(**detail.get("ctx", {})) or detail["msg"]
+    if kind == "union_tag_invalid":
+        given = detail["input"].get("kind") if isinstance(detail["input"], Mapping) else detail["input"]
+        return f"{path}.kind = {given!r}: {words}"
+    return f"{path} = {detail['input']!r}: {words}"
+
+
+def _is_type_label(part: int | str) -> bool:
+    """Pydantic puts the label of a union's member into the location; it is no field name."""
+    return isinstance(part, str) and ("[" in part or "constrained" in part)
+
+
+def _nearest_fields(loc: tuple[int | str, ...]) -> str:
+    """Suggests a field for the last part of a location that names none."""
+    section, leaf = _section_at(loc[:-1]), str(loc[-1])
+    siblings = sorted(section.model_fields)
+    by_leaf = {path.rsplit(".", 1)[-1]: path for path in field_paths()}
+    near = get_close_matches(leaf, siblings, n=1, cutoff=0.6)
+    near_elsewhere = get_close_matches(leaf, by_leaf, n=1, cutoff=0.6)
+    if leaf in by_leaf and set(by_leaf[leaf].split(".")) <= set(map(str, loc)):
+        hint = "it belongs to another kind. "
+    elif leaf in by_leaf or (near_elsewhere and not near):
+        hint = f"did you mean {by_leaf[near_elsewhere[0]]!r}? "
+    else:
+        hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{hint}Valid here: {', '.join(siblings)}"
+
+
+def _section_at(loc: tuple[int | str, ...]) -> type[BaseModel]:
+    """Follows a location through sections and the tags of their kinds."""
+    section: type[BaseModel] = RunConfig
+    members: list[type[Section]] = []
+    for part in loc:
+        if part in section.model_fields and not members:
+            members = _sections_of(section.model_fields[str(part)].annotation)
+        else:
+            members = [member for member in members if member.model_fields["kind"].default == part]
+        if len(members) == 1:
+            section, members = members[0], []
+    return section

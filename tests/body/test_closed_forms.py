@@ -1,0 +1,105 @@
+"""Strands of both formulations against the closed forms of a straight elastic rod."""
+
+from __future__ import annotations
+
+from math import pi
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.body.chain import add_chain
+from annelid.body.rods import add_rod, add_vertex, lumped_masses
+from annelid.config import Chain, Rods, Strands
+
+LENGTH_M = 0.6
+ELEMENTS = 24
+ELEMENT_M = LENGTH_M / ELEMENTS
+STRANDS = Strands(joint_damping_Nms_per_rad=0.02)
+BENDING = STRANDS.young_modulus_Pa * pi * STRANDS.radius_m**4 / 4
+TORSION = STRANDS.shear_modulus_Pa * pi * STRANDS.radius_m**4 / 2
+VERTICES = np.stack([np.linspace(0, LENGTH_M, ELEMENTS + 1), np.zeros(ELEMENTS + 1), np.zeros(ELEMENTS + 1)], axis=-1)
+
+
+def rod_cantilever() -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0, 0, 0]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    spec.option.timestep = 0.005
+    masses = lumped_masses(VERTICES, STRANDS.linear_density_kg_per_m)
+    bodies = ["world", "world", *(f"v{i}" for i in range(2, ELEMENTS + 1))]
+    for index in range(2, ELEMENTS + 1):
+        add_vertex(spec, f"v{index}", VERTICES[index], masses[index])
+    add_rod(spec, "rod", VERTICES, bodies, STRANDS, Rods(), clamped=True)
+    return spec.compile()
+
+
+def chain_cantilever(joint: str = "hinges") -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    spec.option.gravity = [0, 0, 0]
+    spec.option.timestep = 0.005
+    formulation = Chain.model_validate({"joint": joint, "armature_kg_m2": 1e-5})
+    add_chain(spec, "rod", VERTICES, STRANDS, formulation, root=0, fixed_root=True)
+    return spec.compile()
+
+
+def settle(model: mujoco.MjModel, data: mujoco.MjData, seconds: float) -> None:
+    mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
+    mujoco.mj_kinematics(model, data)
+    assert np.abs(data.qvel).max() < 2e-4, "the rod has not come to rest"
+
+
+def apply_at_rest(model: mujoco.MjModel, data: mujoco.MjData, body: int, load_N: float) -> None:
+    """Loads the tip of the last element with a vertical force, as a wrench on its centre of mass at rest."""
+    mujoco.mj_forward(model, data)
+    data.xfrc_applied[body, 2] = load_N
+    data.xfrc_applied[body, 4] = -load_N * (VERTICES[-1, 0] - data.xipos[body, 0])
+
+
+def tip_deflection(load_N: float) -> float:
+    """Euler-Bernoulli, clamped in the middle of the first element, whose direction is held."""
+    return load_N * (LENGTH_M - ELEMENT_M / 2) ** 3 / (3 * BENDING)
+
+
+def test_tip_of_a_rod_cantilever_follows_beam_theory() -> None:
+    model = rod_cantilever()
+    data = mujoco.MjData(model)
+    load = 2e-4
+    tip = model.body(f"v{ELEMENTS}").id
+    data.xfrc_applied[tip, 2] = load
+    settle(model, data, 20.0)
+    assert data.xpos[tip, 2] == pytest.approx(tip_deflection(load), rel=0.01)
+
+
+@pytest.mark.parametrize("joint", ["ball", "hinges"])
+def test_tip_of_a_chain_cantilever_follows_beam_theory(joint: str) -> None:
+    model = chain_cantilever(joint)
+    data = mujoco.MjData(model)
+    load = 2e-4
+    last = model.body(f"rod_{ELEMENTS - 1}").id
+    apply_at_rest(model, data, last, load)
+    settle(model, data, 20.0)
+    tip = data.xpos[last] + data.xmat[last].reshape(3, 3) @ [ELEMENT_M, 0, 0]
+    assert tip[2] == pytest.approx(tip_deflection(load), rel=0.01)
+
+
+def test_a_twisted_rod_turns_by_torque_times_length_over_torsion_stiffness() -> None:
+    model = rod_cantilever()
+    data = mujoco.MjData(model)
+    torque = 2e-3
+    data.qfrc_applied[model.joint("rod_twist").dofadr[0]] = torque
+    settle(model, data, 2.0)
+    turned = data.qpos[model.joint("rod_twist").qposadr[0]]
+    assert turned == pytest.approx(torque * (LENGTH_M - ELEMENT_M) / TORSION, rel=0.01)
+
+
+def test_a_twisted_chain_of_hinges_turns_by_the_same() -> None:
+    model = chain_cantilever("hinges")
+    data = mujoco.MjData(model)
+    torque = 2e-3
+    data.xfrc_applied[model.body(f"rod_{ELEMENTS - 1}").id, 3] = torque
+    settle(model, data, 10.0)
+    last = data.xmat[model.body(f"rod_{ELEMENTS - 1}").id].reshape(3, 3)
+    turned = np.arctan2(last[2, 1], last[1, 1])
+    assert turned == pytest.approx(torque * (LENGTH_M - ELEMENT_M) / TORSION, rel=0.01)

@@ -1,0 +1,148 @@
+"""The two formulations of the same worm: what they promise, and that they agree where pins hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.body import build_spec, mesh_of
+from annelid.config import RunConfig, WormBody, load_config
+from annelid.errors import ConfigError
+
+RODS = {"kind": "rods"}
+TIGHT_CHAIN = {
+    "kind": "chain",
+    "pins": "direct",
+    "pin_time_constant_s": 0.004,
+    "pin_impedance": [0.99, 0.999, 0.001],
+    "joint": "hinges",
+    "integrator": "Euler",
+}
+SOFT_CHAIN = {"kind": "chain"}
+
+
+def worm(formulation: dict[str, Any], **overrides: Any) -> RunConfig:
+    """A worm whose viscous joints are light, so that it comes to rest soon; statics do not depend on it."""
+    body = {"strands": {"joint_damping_Nms_per_rad": 0.02}, "formulation": formulation}
+    config: dict[str, Any] = {"body": body, "clock": {"physics_timestep_s": 0.005}}
+    return load_config(config, overrides)
+
+
+def tendon_lengths(model: mujoco.MjModel, data: mujoco.MjData, prefix: str) -> np.ndarray:
+    mujoco.mj_forward(model, data)
+    return np.array([data.ten_length[i] for i in range(model.ntendon) if model.tendon(i).name.startswith(prefix)])
+
+
+def contracted(config: RunConfig, force_N: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Ring and spring lengths after the middle ring has pulled with a constant force, ramped up over 1 s."""
+    model = build_spec(config).compile()
+    data = mujoco.MjData(model)
+    pull = np.zeros(model.nu)
+    model.actuator_gaintype[:] = mujoco.mjtGain.mjGAIN_FIXED
+    model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_NONE
+    model.actuator_gainprm[:] = 0
+    model.actuator_gainprm[:, 0] = -force_N
+    steps = round(seconds / model.opt.timestep)
+    for step in range(steps):
+        pull[1] = min(1.0, step * model.opt.timestep)
+        data.ctrl[:] = pull
+        mujoco.mj_step(model, data)
+    return tendon_lengths(model, data, "ring_"), tendon_lengths(model, data, "spring_")
+
+
+@pytest.mark.parametrize("formulation", [RODS, TIGHT_CHAIN, SOFT_CHAIN], ids=["rods", "tight chain", "soft chain"])
+@pytest.mark.parametrize("segments", [3, 5])
+def test_mass_and_rest_lengths_are_those_of_the_configuration(formulation: dict[str, Any], segments: int) -> None:
+    config = worm(formulation, **{"body.mesh.n_segments": segments})
+    assert isinstance(config.body, WormBody)
+    geometry = mesh_of(config.body.mesh)
+    model = build_spec(config).compile()
+    strands = geometry.n_strands * geometry.strand_length_m * config.body.strands.linear_density_kg_per_m
+    pins = geometry.n_crossings * config.body.pins.mass_kg
+    assert model.body_mass.sum() == pytest.approx(strands + pins, rel=1e-5)
+    data = mujoco.MjData(model)
+    assert tendon_lengths(model, data, "spring_") == pytest.approx(geometry.spring_length_m, abs=1e-9)
+    assert tendon_lengths(model, data, "ring_") == pytest.approx(geometry.ring_length_m, abs=1e-9)
+    springs = [i for i in range(model.ntendon) if model.tendon(i).name.startswith("spring_")]
+    assert np.allclose(model.tendon_lengthspring[springs], geometry.spring_length_m[:, None])
+
+
+def test_the_paper_s_worm_has_its_published_mass_and_degrees_of_freedom() -> None:
+    rods = build_spec(worm(RODS)).compile()
+    chain = build_spec(worm(TIGHT_CHAIN)).compile()
+    assert rods.body_mass.sum() == pytest.approx(0.260, abs=0.0005)
+    assert (rods.nv, chain.nv) == (2070, 1764)
+
+
+def test_tension_only_springs_are_slack_below_their_rest_length() -> None:
+    model = build_spec(worm(RODS, **{"body.springs.tension_only": True})).compile()
+    spring = model.tendon("spring_0").id
+    assert model.tendon_lengthspring[spring, 0] == 0
+    assert model.tendon_lengthspring[spring, 1] == pytest.approx(0.0748, abs=1e-4)
+
+
+def test_half_rings_share_their_ring_between_left_and_right() -> None:
+    whole = build_spec(worm(RODS)).compile()
+    halves = build_spec(worm(RODS, **{"body.rings.layout": "halves"})).compile()
+    assert halves.nu == 2 * whole.nu
+    lengths = tendon_lengths(halves, mujoco.MjData(halves), "ring_").reshape(-1, 2)
+    assert lengths.sum(axis=1) == pytest.approx(tendon_lengths(whole, mujoco.MjData(whole), "ring_"))
+    data = mujoco.MjData(halves)
+    mujoco.mj_kinematics(halves, data)
+    for side, sign in (("left", 1), ("right", -1)):
+        tendon = halves.tendon(f"ring_1_{side}").id
+        start = halves.tendon_adr[tendon]
+        sites = halves.wrap_objid[start : start + halves.tendon_num[tendon]]
+        assert sign * data.site_xpos[sites, 1].mean() > 0.05
+    assert np.allclose(halves.actuator_lengthrange[0], whole.actuator_lengthrange[0] / 2)
+
+
+def test_the_muscle_pulls_with_its_peak_force_at_its_optimal_length() -> None:
+    model = build_spec(worm(RODS)).compile()
+    low, high = model.actuator_lengthrange[0]
+    optimal = (high - low) / (1.05 - 0.75)
+    at_optimal = low + (1 - 0.75) * optimal
+    gain = mujoco.mju_muscleGain(at_optimal, 0.0, model.actuator_lengthrange[0], 1.0, model.actuator_gainprm[0, :9])
+    assert gain == pytest.approx(-117.57)
+
+
+def test_a_planar_body_has_no_model() -> None:
+    with pytest.raises(ConfigError, match="riddle2022"):
+        build_spec(load_config("riddle2022-planar"))
+
+
+def test_written_xml_is_the_same_model() -> None:
+    spec = build_spec(worm(RODS))
+    model = spec.compile()
+    again = mujoco.MjModel.from_xml_string(spec.to_xml())
+    assert (again.nq, again.nv, again.nu, again.ntendon) == (model.nq, model.nv, model.nu, model.ntendon)
+    assert again.body_mass == pytest.approx(model.body_mass, rel=1e-4)
+    assert again.body_inertia == pytest.approx(model.body_inertia, rel=1e-4)
+
+
+def assert_rings_and_springs_agree(force_N: float, seconds: float, **overrides: Any) -> float:
+    """Compares the formulations to 3 % and returns the length of the middle ring."""
+    rings, springs = contracted(worm(RODS, **overrides), force_N, seconds)
+    other_rings, other_springs = contracted(worm(TIGHT_CHAIN, **overrides), force_N, seconds)
+    assert rings == pytest.approx(other_rings, rel=0.03)
+    assert springs == pytest.approx(other_springs, rel=0.03)
+    return float(rings[1])
+
+
+def test_rods_and_tight_chain_agree_on_a_ring_contracted_by_a_third() -> None:
+    middle = assert_rings_and_springs_agree(2.0, 4.0, **{"arena.gravity_m_per_s2": 0.0})
+    assert middle < 0.7 * 0.96
+
+
+def test_rods_and_tight_chain_agree_on_the_sag_under_their_weight() -> None:
+    assert_rings_and_springs_agree(0.0, 3.0)
+
+
+@pytest.mark.slow
+def test_rods_and_tight_chain_agree_on_a_deep_contraction_with_fine_elements() -> None:
+    """Deep bends need six elements a side: with three, rods are 5 % stiffer (tangent against angle)."""
+    fine = {"arena.gravity_m_per_s2": 0.0, "body.mesh.elements_per_side": 6}
+    assert assert_rings_and_springs_agree(2.5, 4.0, **fine) < 0.46 * 0.96

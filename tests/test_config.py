@@ -1,0 +1,158 @@
+"""What a configuration accepts, what it refuses, and the sentence with which it refuses."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from annelid.config import (
+    PlanarBody,
+    RunConfig,
+    WormBody,
+    field_paths,
+    load_config,
+    parse_assignments,
+    preset_names,
+    preset_text,
+)
+from annelid.config.models import Section
+from annelid.errors import ConfigError
+
+
+def leaves(tree: dict[str, Any], prefix: str = "") -> set[str]:
+    found: set[str] = set()
+    for key, value in tree.items():
+        found |= leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}"}
+    return found
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_preset_states_every_field_that_its_worm_has(name: str) -> None:
+    """No default hides behind a preset: what `annelid presets NAME` prints is the whole truth."""
+    stated = leaves(tomllib.loads(preset_text(name)))
+    config = load_config(name)
+    existing = leaves(config.model_dump(exclude_none=True))
+    optional = {"body.springs.rest_length_m"}
+    planar = {path for path in existing if path.startswith("guard.")} if isinstance(config.body, PlanarBody) else set()
+    assert existing - stated - optional - planar == set()
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_line_of_a_preset_s_physics_names_its_source_or_reason(name: str) -> None:
+    section = ""
+    for line in preset_text(name).splitlines():
+        if line.startswith("["):
+            section = line
+        elif "=" in line and section in ("[body.mesh]", "[body.strands]", "[body.rings]", "[controller]"):
+            assert "#" in line, f"{section} {line}"
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_configuration_survives_the_run_file(name: str) -> None:
+    config = load_config(name)
+    assert RunConfig.model_validate_json(config.model_dump_json()) == config
+
+
+def test_every_field_has_a_description() -> None:
+    undescribed = [path for path, text in field_paths().items() if not text and not path.endswith(".kind")]
+    assert undescribed == []
+
+
+def test_sections_are_immutable() -> None:
+    config = load_config("riddle2023")
+    with pytest.raises(ValueError, match="frozen"):
+        config.seed = 3  # type: ignore[misc]
+    assert issubclass(RunConfig, Section)
+
+
+def test_overrides_go_to_their_field_and_nowhere_else() -> None:
+    plain = load_config("riddle2023-rods")
+    changed = load_config("riddle2023-rods", parse_assignments(["body.mesh.n_segments=6", "arena.friction = 0.3"]))
+    assert isinstance(changed.body, WormBody)
+    assert isinstance(plain.body, WormBody)
+    assert changed.body.mesh.n_segments == 6
+    assert changed.arena is not None
+    assert changed.arena.friction == 0.3
+    assert changed.body.strands == plain.body.strands
+    assert changed.controller == plain.controller
+
+
+def test_changing_a_kind_starts_from_that_kind_s_defaults() -> None:
+    changed = load_config(
+        "riddle2023",
+        parse_assignments(["body.formulation.kind=rods", "body.rings.length_range_m=[0.5, 1.0]"]),
+    )
+    assert isinstance(changed.body, WormBody)
+    assert changed.body.formulation.kind == "rods"
+
+
+def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
+    file = tmp_path / "slippery.toml"
+    file.write_text('extends = "riddle2023-rods"\n[arena]\nfriction = 0.1\n', encoding="utf-8")
+    config = load_config(file)
+    assert config.arena is not None
+    assert (config.arena.friction, config.name) == (0.1, "slippery")
+    assert config.clock == load_config("riddle2023-rods").clock
+
+
+@pytest.mark.parametrize(
+    ("assignment", "sentence"),
+    [
+        ("body.mesh.n_helices=7", "body.mesh.n_helices = 7: .* even"),
+        ("body.mesh.n_helices=4", "body.mesh.n_helices = 4: must be at least 6"),
+        ("body.mesh.n_segments=2", "body.mesh.n_segments = 2: must be at least 3"),
+        ("body.mesh.n_segments=3.5", "must be a whole number"),
+        ("body.mesh.radius_m=0", "body.mesh.radius_m = 0: must be greater than 0"),
+        ("body.strands.radius_m=-0.001", "must be greater than 0"),
+        ("arena.friction=-1", "arena.friction = -1: must be at least 0"),
+        ("arena.friction=inf", "must be a finite number"),
+        ("duration_s=0", "duration_s = 0: must be greater than 0"),
+        ("clock.physics_timestep_s=0.0033", "integer multiple"),
+        ("record.signals_interval_s=0.0015", "record.signals_interval_s = 0.0015 must be an integer multiple"),
+        ("body.formulation.kind=chian", "'chian': must be one of 'rods', 'chain'"),
+        ("body.formulation.joint=glue", "must be one of 'ball' or 'hinges'"),
+        ("body.mesh.segments=4", "unknown field 'body.mesh.segments': did you mean 'n_segments'"),
+        ("friction=1", "did you mean 'arena.friction'"),
+        ("body.formulation.solver_iteration=9", "did you mean 'solver_iterations'"),
+        ("body.rings.length_range_m=[1.0, 0.5]", "lower bound below its upper bound"),
+        ("body.rings.length_range_m=[[0.5, 1.0], [0.5, 1.0]]", "2 ranges for 3 segments"),
+        ("body=3", "is a section"),
+    ],
+)
+def test_a_bad_value_is_named_with_what_would_be_valid(assignment: str, sentence: str) -> None:
+    with pytest.raises(ConfigError, match=sentence) as caught:
+        load_config("riddle2023", parse_assignments([assignment]))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_field_of_the_other_formulation_is_refused() -> None:
+    with pytest.raises(ConfigError, match="another kind"):
+        load_config("riddle2023-rods", parse_assignments(["body.formulation.armature_kg_m2=0.1"]))
+
+
+def test_planar_worms_have_no_ground() -> None:
+    with pytest.raises(ConfigError, match="arena has no effect"):
+        load_config("riddle2022-planar", parse_assignments(["arena.friction=0.1"]))
+
+
+def test_an_unknown_preset_suggests_the_nearest() -> None:
+    with pytest.raises(ConfigError, match="did you mean 'riddle2023'"):
+        load_config("ridle2023")
+
+
+@pytest.mark.parametrize("text", ["friction", "=3", "arena..friction=1"])
+def test_an_assignment_needs_a_field_and_a_value(text: str) -> None:
+    with pytest.raises(ConfigError, match="not of the form field=value"):
+        parse_assignments([text])
+
+
+def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="No such file"):
+        load_config(tmp_path / "absent.toml")
+    broken = tmp_path / "broken.toml"
+    broken.write_text("duration_s = = 3", encoding="utf-8")
+    with pytest.raises(ConfigError, match="not valid TOML"):
+        load_config(broken)

@@ -1,0 +1,174 @@
+"""The paper's controller: stretch sensors, the peristalsis network, and the muscles' activation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid import config as settings
+from annelid.control.stretch_sensor import StretchSensor
+from annelid.errors import ConfigError
+from annelid.nervous import PeristalsisParameters, neuron_names, peristalsis_network
+from annelid.protocols import Array, Recordable, Sensation, Signal, State
+
+_CONTRACTION, _EXPANSION, _NEURONS_A_SEGMENT = 0, 1, 4
+
+
+class SnsController:
+    """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023.
+
+    One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
+    during the whole step; the activation is read from the potentials at t + dt and drives the body from t on.
+    This is the order of the authors' loop. The kick acts during the first step only.
+
+    A segment's activation is a function of its contraction minus its expansion neuron, U1 - U2:
+    ``"sigmoid"``: ``1 / (1 + exp(-slope (U1 - U2)))`` (Riddle et al. 2023, Eq. 2, whose printed exponent has
+    the other sign); ``"linear"``: ``0.5 + clip(U1 - U2, -R, R) / (2 R)`` (Riddle et al. 2022).
+
+    Raises:
+        ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, or network
+            parameters for which a design rule has no solution.
+    """
+
+    def __init__(
+        self,
+        config: settings.SnsController,
+        sensor: settings.StretchSensor,
+        n_segments: int,
+        n_muscles: int,
+        control_timestep_s: float,
+    ) -> None:
+        """Builds the controller in its initial state.
+
+        Args:
+            config: Section of the network, its scheme and its activation.
+            sensor: Section of the stretch sensors; their noise is the simulation's business, not used here.
+            n_segments: Segments, at least 3.
+            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
+            control_timestep_s: Step of the network, s.
+        """
+        if n_muscles not in (n_segments, 2 * n_segments):
+            raise ConfigError(
+                f"n_muscles = {n_muscles} does not fit {n_segments} segments: "
+                f"give {n_segments} (rings) or {2 * n_segments} (half-rings)"
+            )
+        self._config = config
+        self._parameters = PeristalsisParameters(
+            **{field.name: getattr(config, field.name) for field in fields(PeristalsisParameters)}
+        )
+        self._n_segments = n_segments
+        self._muscles_a_segment = n_muscles // n_segments
+        self._stepper = peristalsis_network(n_segments, self._parameters).compile(
+            timestep_ms=1e3 * control_timestep_s, scheme=config.scheme
+        )
+        self._sensor = StretchSensor(sensor, n_segments)
+        self._inputs_nA = np.zeros(n_segments + 1)
+        self.reset(0)
+
+    def reset(self, seed: int) -> None:
+        """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
+        self._state = self._stepper.initial_state(self._config.gate_start)
+        self._sensor.reset()
+        self._n_steps = 0
+
+    def step(self, sensation: Sensation) -> Array:
+        """Advances by one control step.
+
+        Args:
+            sensation: What the body feels at the beginning of the step; lengths and time are used.
+
+        Returns:
+            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
+        """
+        on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, sensation.time_s)
+        np.multiply(on, self._config.sensor_current_nA, out=self._inputs_nA[:-1])
+        self._inputs_nA[-1] = self._config.kick_nA if self._n_steps == 0 else 0.0
+        self._stepper.advance(self._state, self._inputs_nA)
+        self._n_steps += 1
+        activation = self._segment_activation()
+        return activation if self._muscles_a_segment == 1 else activation.repeat(self._muscles_a_segment)
+
+    def recordable(self) -> Recordable:
+        """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""
+        names = neuron_names(self._n_segments)
+        n_neurons = len(names)
+        return Recordable(
+            signals=(
+                Signal("potential", ("neuron",), (n_neurons,), "mV", "membrane potential relative to rest"),
+                Signal(
+                    "sodium_gate",
+                    ("neuron",),
+                    (n_neurons,),
+                    "1",
+                    "inactivation gate h of the persistent sodium channel; NaN for neurons without one",
+                ),
+                Signal(
+                    "sensor_on",
+                    ("segment",),
+                    (self._n_segments,),
+                    "1",
+                    "stretch sensor during the last control step: 1 while the segment is at rest length",
+                ),
+            ),
+            coords={"neuron": names, "segment": list(range(1, self._n_segments + 1))},
+            attrs={
+                "controller": "synthetic nervous system",
+                **{f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()},
+            },
+        )
+
+    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+        """Reads the signals that `recordable` names; there are none at frame rate."""
+        if frame:
+            return {}
+        potential = self._state.potential[0]
+        gate = np.full(potential.shape, np.nan)
+        gate[self._stepper.arrays.channel_neuron] = self._state.gate[0, 0]
+        return {
+            "potential": potential.copy(),
+            "sodium_gate": gate,
+            "sensor_on": self._sensor.on.astype(np.float64),
+        }
+
+    def get_state(self) -> State:
+        """Returns copies of potentials (mV), gates, sensors and the number of steps taken."""
+        return {
+            "potential": self._state.potential.copy(),
+            "gate": self._state.gate.copy(),
+            "sensor_on": self._sensor.on.copy(),
+            "n_steps": np.array(self._n_steps),
+        }
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        self._state.potential[...] = state["potential"]
+        self._state.gate[...] = state["gate"]
+        self._sensor.on[...] = state["sensor_on"]
+        self._n_steps = int(state["n_steps"])
+
+    def alarm(self) -> str | None:
+        """Returns a sentence if a potential has left the range that currents and reversals can explain."""
+        p, c = self._parameters, self._config
+        drive = (c.sensor_current_nA + c.kick_nA) / p.leak_conductance_uS
+        low = p.inhibitory_reversal_mV - drive
+        high = max(p.excitatory_reversal_mV, p.sodium_reversal_mV) + drive
+        potential = self._state.potential[0]
+        within = (potential >= low) & (potential <= high)
+        if within.all():
+            return None
+        worst = int(np.argmin(within))
+        return (
+            f"potential of {self._stepper.arrays.neurons[worst]} is {potential[worst]:.4g} mV, outside "
+            f"{low:g} .. {high:g} mV: the control timestep of {self._stepper.timestep_ms:g} ms is too long"
+        )
+
+    def _segment_activation(self) -> Array:
+        by_segment = self._state.potential[0].reshape(-1, _NEURONS_A_SEGMENT)
+        difference = by_segment[:, _CONTRACTION] - by_segment[:, _EXPANSION]
+        if self._config.activation == "linear":
+            reach = self._parameters.range_mV
+            return 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
+        return 1.0 / (1.0 + np.exp(-self._config.activation_slope_per_mV * difference))

@@ -1,0 +1,57 @@
+"""The stretch sensor: tells which segments are back at rest length."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid import config
+from annelid.errors import ConfigError
+from annelid.protocols import Array
+
+
+class StretchSensor:
+    """A threshold on each segment's mean length, on while it is at most the tolerance beyond rest.
+
+    With hysteresis a sensor that is on stays on until the segment is that much longer still. Segment 1's
+    sensor is held off at the start: its network starts contracted, and its body does not. Riddle et al. 2023.
+
+    Attributes:
+        on: Which segments' sensors are on, shape ``(n_segments,)``; all off before the first reading.
+
+    Raises:
+        ConfigError: Fewer than one segment.
+    """
+
+    def __init__(self, settings: config.StretchSensor, n_segments: int) -> None:
+        """Makes a sensor for ``n_segments`` segments from its section of the configuration."""
+        if n_segments < 1:
+            raise ConfigError(f"n_segments must be at least 1, not {n_segments}")
+        self._tolerance_m = settings.tolerance_m
+        self._hysteresis_m = settings.hysteresis_m
+        # Half a microsecond of slack: sums of time steps miss the end of the hold by rounding.
+        self._hold_until_s = settings.startup_hold_s - 5e-7
+        self.on: NDArray[np.bool_] = np.zeros(n_segments, dtype=bool)
+
+    def reset(self) -> None:
+        """Switches every sensor off, as before the first reading."""
+        self.on[:] = False
+
+    def read(self, stretch_m: Array, rest_stretch_m: Array, time_s: float) -> NDArray[np.bool_]:
+        """Reads the lengths of all segments.
+
+        Args:
+            stretch_m: Lengths of every segment's springs, m, shape ``(n_segments, n_sensors)``.
+            rest_stretch_m: Their lengths at rest, m, same shape.
+            time_s: Simulated time of the reading, s.
+
+        Returns:
+            `on`: true for every segment whose mean length is at most the tolerance (with hysteresis, if it
+            was on) beyond its mean rest length, ``(n_segments,)``; a new array.
+        """
+        n_sensors = stretch_m.shape[1]
+        excess = (stretch_m - rest_stretch_m).sum(axis=1) / n_sensors
+        self.on = excess <= self._tolerance_m + self._hysteresis_m * self.on
+        if time_s < self._hold_until_s:
+            self.on[0] = False
+        return self.on.copy()

@@ -1,0 +1,157 @@
+"""A network of neurons that a user builds by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from annelid.errors import ConfigError, suggest
+from annelid.nervous.arrays import NetworkArrays, build_arrays
+from annelid.nervous.neurons import Neuron
+from annelid.nervous.stepper import Scheme, Stepper
+from annelid.nervous.synapses import GapJunction, Synapse
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A synapse or gap junction between two named neurons."""
+
+    source: str
+    target: str
+    kind: Synapse | GapJunction
+
+
+class Network:
+    """Neurons, synapses, inputs and outputs, each known by its name; `compile` makes it run.
+
+    Neurons, inputs and outputs keep the order in which they were added: it is the order of the columns of
+    every array of the compiled network.
+
+    Attributes:
+        name: What to call the network.
+    """
+
+    def __init__(self, name: str = "network") -> None:
+        self.name = name
+        self._neurons: dict[str, Neuron] = {}
+        self._initial_mV: dict[str, float] = {}
+        self._connections: list[Connection] = []
+        self._inputs: dict[str, tuple[str, ...]] = {}
+        self._outputs: dict[str, str] = {}
+
+    @property
+    def neurons(self) -> Mapping[str, Neuron]:
+        """The neurons by name, in order."""
+        return dict(self._neurons)
+
+    @property
+    def initial_mV(self) -> Mapping[str, float]:
+        """The initial potential of every neuron, mV, in order."""
+        return dict(self._initial_mV)
+
+    @property
+    def connections(self) -> tuple[Connection, ...]:
+        """The synapses and gap junctions, in order."""
+        return tuple(self._connections)
+
+    @property
+    def inputs(self) -> Mapping[str, tuple[str, ...]]:
+        """The neurons that each input drives, in order."""
+        return dict(self._inputs)
+
+    @property
+    def outputs(self) -> Mapping[str, str]:
+        """The neuron that each output reads, in order."""
+        return dict(self._outputs)
+
+    def add_neuron(self, name: str, neuron: Neuron, initial_mV: float | None = None) -> None:
+        """Adds a neuron.
+
+        Args:
+            name: Its name.
+            neuron: Its properties; one object may serve many names.
+            initial_mV: Potential at the start; default: the neuron's rest.
+
+        Raises:
+            ConfigError: The name is taken.
+        """
+        _refuse_duplicate("neuron", name, self._neurons)
+        self._neurons[name] = neuron
+        self._initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
+
+    def add_synapse(self, source: str, target: str, synapse: Synapse) -> None:
+        """Adds a chemical synapse from one neuron onto another; several between the same two add up.
+
+        Raises:
+            ConfigError: No neuron has one of the names; the sentence suggests the nearest.
+        """
+        self._connect(source, target, synapse)
+
+    def add_gap_junction(self, source: str, target: str, junction: GapJunction) -> None:
+        """Adds a gap junction between two neurons; the order matters only for a rectified one.
+
+        Raises:
+            ConfigError: No neuron has one of the names; the sentence suggests the nearest.
+        """
+        self._connect(source, target, junction)
+
+    def add_input(self, name: str, targets: str | Sequence[str]) -> None:
+        """Adds an input: its current (nA) flows into the target, or in full into each of several.
+
+        Raises:
+            ConfigError: The name is taken, or no neuron has the name of a target.
+        """
+        _refuse_duplicate("input", name, self._inputs)
+        neurons = (targets,) if isinstance(targets, str) else tuple(targets)
+        for neuron in neurons:
+            self._require_neuron(neuron)
+        self._inputs[name] = neurons
+
+    def add_output(self, name: str, source: str) -> None:
+        """Adds an output that reads the potential (mV) of one neuron.
+
+        Raises:
+            ConfigError: The name is taken, or no neuron has the name of the source.
+        """
+        _refuse_duplicate("output", name, self._outputs)
+        self._require_neuron(source)
+        self._outputs[name] = source
+
+    def arrays(self) -> NetworkArrays:
+        """Returns the network as frozen arrays.
+
+        Raises:
+            ConfigError: The network has no neurons.
+        """
+        if not self._neurons:
+            raise ConfigError(f"network {self.name!r} has no neurons: add_neuron comes first")
+        return build_arrays(self)
+
+    def compile(self, timestep_ms: float = 1.0, scheme: Scheme = "euler", n_worms: int = 1) -> Stepper:
+        """Returns a stepper that advances ``n_worms`` independent copies of the network at once.
+
+        Args:
+            timestep_ms: Step, ms.
+            scheme: ``"euler"`` (potentials and gates both from the old state, as in Riddle 2022),
+                ``"toolbox"`` (gates first, as SNS-Toolbox does) or ``"heun"`` (second order).
+            n_worms: Copies to advance together.
+
+        Raises:
+            ConfigError: No neurons, an unknown scheme, or a step or number of copies that is not positive.
+        """
+        return Stepper(self.arrays(), timestep_ms, scheme, n_worms)
+
+    def _connect(self, source: str, target: str, kind: Synapse | GapJunction) -> None:
+        self._require_neuron(source)
+        self._require_neuron(target)
+        self._connections.append(Connection(source, target, kind))
+
+    def _require_neuron(self, name: str) -> None:
+        if name not in self._neurons:
+            hint = suggest(name, self._neurons) if self._neurons else "the network has no neurons yet"
+            raise ConfigError(f"unknown neuron {name!r}: {hint}")
+
+
+def _refuse_duplicate(kind: str, name: str, taken: Mapping[str, object]) -> None:
+    if name in taken:
+        raise ConfigError(f"{kind} {name!r} exists already: every {kind} needs a name of its own")

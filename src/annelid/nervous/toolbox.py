@@ -1,0 +1,266 @@
+"""Bridge to SNS-Toolbox (Nourse et al. 2023): its non-spiking networks into ours, and ours into it.
+
+Needs the optional extra: ``pip install "annelid[sns]"``. Traces agree when ours is compiled with
+``scheme="toolbox"`` and started with ``gate_start="toolbox"``, at the same time step in ms.
+
+SNS-Toolbox 1.5.2 advances a membrane by ``dt Gm / C`` times the current instead of ``dt / C``, which is right
+only for Gm = 1 uS. The import can keep the traces or the equation; the export keeps the equation.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from annelid.errors import ConfigError, MissingDependency, suggest
+from annelid.nervous.network import Network
+from annelid.nervous.neurons import Channel, Gate, Neuron
+from annelid.nervous.synapses import GapJunction, Synapse
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+Membrane = Literal["as_run", "as_written"]
+
+
+def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Network:
+    """Turns any non-spiking SNS-Toolbox network into ours.
+
+    Populations become single neurons (``name_0``, ``name_1``, ..); pattern and matrix connections, electrical
+    synapses (also rectified), gated channels, biases, inputs and outputs are all carried over, as the
+    toolbox's own compiler resolves them. Names that occur more than once are numbered.
+
+    Args:
+        toolbox_network: A ``sns_toolbox.networks.Network``.
+        membrane: ``"as_run"``: capacitance C / Gm, so that traces equal those that the toolbox computes;
+            ``"as_written"``: capacitance C, as the neuron's equation says. The same for Gm = 1 uS.
+
+    Returns:
+        The network; neurons, inputs and outputs in the toolbox's order.
+
+    Raises:
+        MissingDependency: SNS-Toolbox or torch is not installed.
+        ConfigError: The network has spiking neurons or synapses, is no toolbox network, has a neuron without
+            leak (for ``"as_run"``), or the membrane is unknown.
+    """
+    toolbox = _toolbox()
+    if membrane not in get_args(Membrane):
+        raise ConfigError(f"unknown membrane {membrane!r}: {suggest(membrane, get_args(Membrane))}")
+    if not isinstance(toolbox_network, toolbox.networks.Network):
+        raise ConfigError(f"import_network takes a sns_toolbox.networks.Network, not {type(toolbox_network).__name__}")
+    title = toolbox_network.params["name"]
+    if toolbox_network.params["spiking"]:
+        raise ConfigError(f"network {title!r} has spiking neurons or synapses; only non-spiking ones can come over")
+    with np.errstate(divide="ignore"):  # it divides by a leak of zero
+        model = toolbox_network.compile(dt=1.0, backend="numpy")
+    names = _neuron_names(toolbox_network)
+    network = Network(title)
+    for i, name in enumerate(names):
+        leak = float(model.g_m[i])
+        if leak == 0.0 and membrane == "as_run":
+            raise ConfigError(
+                f"neuron {name!r} has no leak, so SNS-Toolbox never moves it; import with membrane='as_written'"
+            )
+        neuron = Neuron(
+            capacitance_nF=float(model.c_m[i]) / (leak if membrane == "as_run" else 1.0),
+            leak_conductance_uS=leak,
+            rest_mV=float(model.V_rest[i]),
+            bias_nA=float(model.i_b[i]),
+            channels=_channels(model, i),
+        )
+        network.add_neuron(name, neuron, float(model.V_0[i]))
+    _import_connections(model, names, network)
+
+    input_names = _unique([entry["name"] for entry in toolbox_network.inputs for _ in range(entry["size"])])
+    for column, name in enumerate(input_names):
+        network.add_input(name, [names[i] for i in np.flatnonzero(model.input_connectivity[:, column])])
+    populations = toolbox_network.populations
+    output_names = _unique(
+        [entry["name"] for entry in toolbox_network.outputs for _ in range(populations[entry["source"]]["number"])]
+    )
+    for row, name in enumerate(output_names):
+        network.add_output(name, names[int(np.argmax(model.output_voltage_connectivity[row]))])
+    return network
+
+
+def export_network(network: Network) -> Any:
+    """Turns our network into a ``sns_toolbox.networks.Network``.
+
+    Capacitances are written as C Gm, so that the toolbox's ``dt Gm / C`` steps our equation.
+
+    Args:
+        network: Any network whose neurons all leak.
+
+    Returns:
+        The toolbox's network; populations, inputs and outputs in our order and under our names.
+
+    Raises:
+        MissingDependency: SNS-Toolbox or torch is not installed.
+        ConfigError: Something the toolbox cannot say: two synapses between the same two neurons, an input
+            into several neurons, a neuron without leak, or more than one instantaneous or two slow gates in
+            a channel; the sentence names it.
+    """
+    toolbox = _toolbox()
+    _require_exportable(network)
+    exported = toolbox.networks.Network(name=network.name)
+    n_channels = max(len(neuron.channels) for neuron in network.neurons.values())
+    for name, neuron in network.neurons.items():
+        membrane = {
+            "membrane_capacitance": neuron.capacitance_nF * neuron.leak_conductance_uS,
+            "membrane_conductance": neuron.leak_conductance_uS,
+            "resting_potential": neuron.rest_mV,
+            "bias": neuron.bias_nA,
+        }
+        if neuron.channels:
+            kind = toolbox.neurons.NonSpikingNeuronWithGatedChannels(
+                **_channel_arguments(neuron.channels, n_channels), **membrane
+            )
+        else:
+            kind = toolbox.neurons.NonSpikingNeuron(**membrane)
+        exported.add_neuron(kind, name=name, initial_value=network.initial_mV[name])
+    for connection in network.connections:
+        kind = connection.kind
+        if isinstance(kind, Synapse):
+            synapse = toolbox.connections.NonSpikingSynapse(
+                max_conductance=kind.conductance_uS,
+                reversal_potential=kind.reversal_mV,
+                e_lo=kind.threshold_mV,
+                e_hi=kind.saturation_mV,
+            )
+        else:
+            synapse = toolbox.connections.ElectricalSynapse(kind.conductance_uS, rect=kind.rectified)
+        exported.add_connection(synapse, connection.source, connection.target)
+    for name, targets in network.inputs.items():
+        exported.add_input(targets[0], name=name)
+    for name, source in network.outputs.items():
+        exported.add_output(source, name=name)
+    return exported
+
+
+def _toolbox() -> ModuleType:
+    try:
+        for module in ("connections", "networks", "neurons"):
+            import_module(f"sns_toolbox.{module}")
+        return import_module("sns_toolbox")
+    except ImportError as error:
+        raise MissingDependency(
+            f"SNS-Toolbox cannot be imported ({error}): install it with  pip install 'annelid[sns]'"
+        ) from None
+
+
+def _import_connections(model: Any, names: Sequence[str], network: Network) -> None:
+    for post, pre in np.argwhere(model.g_max_non != 0.0).tolist():
+        synapse = Synapse(
+            conductance_uS=float(model.g_max_non[post, pre]),
+            reversal_mV=float(model.del_e[post, pre]),
+            threshold_mV=float(model.e_lo[post, pre]),
+            saturation_mV=float(model.e_hi[post, pre]),
+        )
+        network.add_synapse(names[pre], names[post], synapse)
+    if model.electrical:
+        for post, pre in np.argwhere(np.triu(model.g_electrical, 1) != 0.0).tolist():
+            junction = GapJunction(float(model.g_electrical[post, pre]))
+            network.add_gap_junction(names[pre], names[post], junction)
+    if model.electrical_rectified:
+        for post, pre in np.argwhere(model.g_rectified != 0.0).tolist():
+            if post != pre:
+                junction = GapJunction(float(model.g_rectified[post, pre]), rectified=True)
+                network.add_gap_junction(names[pre], names[post], junction)
+
+
+def _channels(model: Any, neuron: int) -> tuple[Channel, ...]:
+    """Reads one neuron's channels; a gate of power 0 has no effect and is left out."""
+    if not model.gated:
+        return ()
+    channels = []
+    for c in np.flatnonzero(model.g_ion[:, neuron]):
+        gates = []
+        for letter in "abc":
+            values = {key: float(getattr(model, f"{key}_{letter}")[c, neuron]) for key in ("slope", "e", "k", "pow")}
+            tau = None if letter == "a" else float(getattr(model, f"tau_max_{letter}")[c, neuron])
+            if values["pow"] != 0.0:
+                gates.append(Gate(values["slope"], values["e"], values["k"], values["pow"], tau))
+        channels.append(Channel(float(model.g_ion[c, neuron]), float(model.e_ion[c, neuron]), tuple(gates)))
+    return tuple(channels)
+
+
+def _channel_arguments(channels: Sequence[Channel], n_channels: int) -> dict[str, Any]:
+    """Keyword arguments of the toolbox's gated neuron, filled up with channels that conduct nothing.
+
+    The toolbox needs the same number of channels in every gated neuron of a network: it spreads a single
+    one over all rows. Plain lists, since it asks for the truth of each value.
+    """
+    none = Gate(slope_per_mV=0.0, power=0.0, time_constant_ms=1.0)
+    filled = [*channels, *[Channel(0.0, 0.0)] * (n_channels - len(channels))]
+    arguments: dict[str, Any] = {
+        "g_ion": [channel.conductance_uS for channel in filled],
+        "e_ion": [channel.reversal_mV for channel in filled],
+    }
+    for letter, pick in (("a", 0), ("b", 0), ("c", 1)):
+        gates = [
+            next(iter((c.instant_gates if letter == "a" else c.slow_gates)[pick : pick + 1]), none) for c in filled
+        ]
+        arguments[f"pow_{letter}"] = [gate.power for gate in gates]
+        arguments[f"k_{letter}"] = [gate.factor for gate in gates]
+        arguments[f"slope_{letter}"] = [gate.slope_per_mV for gate in gates]
+        arguments[f"e_{letter}"] = [gate.midpoint_mV for gate in gates]
+        if letter != "a":
+            arguments[f"tau_max_{letter}"] = [gate.time_constant_ms for gate in gates]
+    return arguments
+
+
+def _require_exportable(network: Network) -> None:
+    if not network.neurons:
+        raise ConfigError(f"network {network.name!r} has no neurons to export")
+    for name, neuron in network.neurons.items():
+        if neuron.leak_conductance_uS == 0:
+            raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
+        for channel in neuron.channels:
+            if len(channel.instant_gates) > 1 or len(channel.slow_gates) > 2:
+                raise ConfigError(
+                    f"neuron {name!r} has a channel with {len(channel.instant_gates)} instantaneous and "
+                    f"{len(channel.slow_gates)} slow gates; SNS-Toolbox has room for one and two"
+                )
+    pairs = Counter()
+    for connection in network.connections:
+        kind = connection.kind
+        symmetric = isinstance(kind, GapJunction) and not kind.rectified
+        ends = (connection.source, connection.target)
+        kind_of_pair = "synapse" if isinstance(kind, Synapse) else f"junction, rectified={kind.rectified}"
+        pairs[kind_of_pair, tuple(sorted(ends)) if symmetric else ends] += 1
+    for (_, (source, target)), count in pairs.items():
+        if count > 1:
+            raise ConfigError(
+                f"{count} connections of one kind join {source!r} and {target!r}; SNS-Toolbox keeps only the last"
+            )
+    for name, targets in network.inputs.items():
+        if len(targets) != 1:
+            raise ConfigError(
+                f"input {name!r} drives {len(targets)} neurons; an SNS-Toolbox input drives one, so split it"
+            )
+
+
+def _neuron_names(toolbox_network: Any) -> list[str]:
+    names = []
+    for population in toolbox_network.populations:
+        number, name = population["number"], population["name"]
+        names += [name] if number == 1 else [f"{name}_{i}" for i in range(number)]
+    return _unique(names)
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Numbers names that occur again: a, a, b becomes a, a_2, b."""
+    taken: set[str] = set()
+    result = []
+    for name in names:
+        candidate, number = name, 1
+        while candidate in taken:
+            number += 1
+            candidate = f"{name}_{number}"
+        taken.add(candidate)
+        result.append(candidate)
+    return result

@@ -1,0 +1,82 @@
+"""The stretch sensor's threshold, hysteresis and start-up hold."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid import config
+from annelid.control import StretchSensor
+from annelid.errors import ConfigError
+
+REST_M = np.full((3, 6), 0.07)
+
+
+def sensor(tolerance_m=0.01, hysteresis_m=0.0, startup_hold_s=0.0, n_segments=3) -> StretchSensor:
+    section = config.StretchSensor(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=startup_hold_s)
+    return StretchSensor(section, n_segments)
+
+
+excesses = st.lists(st.lists(st.floats(-0.03, 0.05), min_size=6, max_size=6), min_size=3, max_size=3)
+
+
+@given(excess_m=excesses)
+def test_on_while_the_mean_is_within_the_tolerance(excess_m):
+    excess = np.array(excess_m)
+    mean = excess.mean(axis=1)
+    on = sensor().read(REST_M + excess, REST_M, 5.0)
+    clear = np.abs(mean - 0.01) > 1e-12
+    assert np.array_equal(on[clear], (mean <= 0.01)[clear])
+
+
+@given(excess_m=excesses, swap=st.permutations(range(6)))
+def test_which_spring_is_long_does_not_matter(excess_m, swap):
+    stretch = REST_M + np.array(excess_m)
+    margin = np.abs((stretch - REST_M).mean(axis=1) - 0.01) > 1e-12
+    straight = sensor().read(stretch, REST_M, 5.0)
+    assert np.array_equal(straight[margin], sensor().read(stretch[:, swap], REST_M, 5.0)[margin])
+
+
+def test_each_segment_has_its_own_rest_length():
+    rest = np.array([[0.07], [0.08], [0.09]])
+    on = sensor().read(np.full((3, 1), 0.085), rest, 1.0)
+    assert on.tolist() == [False, True, True]
+
+
+def sweep(one: StretchSensor, excesses_m) -> list[bool]:
+    return [bool(one.read(REST_M + e, REST_M, 1.0)[1]) for e in excesses_m]
+
+
+def test_hysteresis_keeps_a_sensor_on_and_not_off():
+    up_and_down = [0.016, 0.012, 0.008, 0.012, 0.014, 0.016, 0.012, 0.008]
+    assert sweep(sensor(hysteresis_m=0.005), up_and_down) == [
+        False, False, True, True, True, False, False, True,
+    ]  # fmt: skip
+    assert sweep(sensor(), up_and_down) == [False, False, True, False, False, False, False, True]
+
+
+def test_startup_hold_keeps_segment_1_off_until_it_ends():
+    one = sensor(startup_hold_s=0.2)
+    # 200 steps of 1 ms add up to a little less or more than 0.2 s; the hold is over at either.
+    for time_s, first in [(0.0, False), (0.199, False), (0.2 - 1e-12, True), (0.2 + 1e-12, True), (9.0, True)]:
+        assert one.read(REST_M, REST_M, time_s).tolist() == [first, True, True]
+
+
+def test_reset_forgets():
+    one = sensor(hysteresis_m=0.005)
+    assert sweep(one, [0.008, 0.012]) == [True, True]
+    one.reset()
+    assert not one.on.any()
+    assert sweep(one, [0.012]) == [False]
+
+
+def test_the_reading_is_the_callers_to_keep():
+    one = sensor()
+    reading = one.read(REST_M, REST_M, 1.0)
+    reading[:] = False
+    assert one.on.all()
+
+
+def test_no_segments_are_refused():
+    with pytest.raises(ConfigError, match="n_segments"):
+        sensor(n_segments=0)

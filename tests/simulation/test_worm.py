@@ -1,0 +1,155 @@
+"""The 3D worm as a plant: what it feels is what the engine holds, and it continues bit for bit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.config import RunConfig, load_config
+from annelid.simulation.worm import WormPlant
+
+CHAIN = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler"}
+FORMULATIONS = {
+    "rods": {},
+    "soft chain": CHAIN,
+    "tight chain": {
+        **CHAIN,
+        "body.formulation.pins": "direct",
+        "body.formulation.pin_time_constant_s": 0.01,
+        "body.formulation.pin_impedance": [0.99, 0.999, 0.001],
+    },
+}
+
+
+def config(formulation: str = "rods", **changes: Any) -> RunConfig:
+    return load_config(
+        {"clock": {"control_timestep_s": 0.001, "physics_timestep_s": 0.005}},
+        {**FORMULATIONS[formulation], **changes},
+    )
+
+
+def advance(plant: WormPlant, activation: np.ndarray, seconds: float) -> None:
+    for _ in range(round(seconds / 0.001)):
+        plant.step(activation)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_lengths_are_the_engine_s_at_the_end_of_the_step(formulation: str) -> None:
+    plant = WormPlant(config(formulation))
+    plant.reset(0)
+    advance(plant, np.array([0.0, 1.0, 0.0]), 0.05)
+    felt = plant.step(np.array([0.0, 1.0, 0.0]))
+    mujoco.mj_forward(plant.model, plant.data)
+    rings = [plant.model.tendon(f"ring_{s}").id for s in range(3)]
+    springs = [plant.model.tendon(f"spring_{k}").id for k in plant.geometry.sensor_springs.ravel()]
+    assert felt.ring_length_m == pytest.approx(plant.data.ten_length[rings], abs=1e-12)
+    assert felt.stretch_m.ravel() == pytest.approx(plant.data.ten_length[springs], abs=1e-12)
+    assert felt.center_of_mass_m == pytest.approx(plant.data.subtree_com[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_the_floor_carries_the_weight_of_a_resting_worm(formulation: str) -> None:
+    plant = WormPlant(config(formulation, **{"body.strands.joint_damping_Nms_per_rad": 0.02}))
+    plant.reset(0)
+    advance(plant, np.zeros(3), 2.0)
+    force = plant.step(np.zeros(3)).contact_force_N
+    weight = plant.total_mass_kg * 9.81
+    assert force[:, 2].sum() == pytest.approx(weight, rel=0.05)
+    assert np.all(force[:, 2] > 0.1 * weight)
+    assert force[0, 2] == pytest.approx(force[2, 2], rel=0.1), "front and rear are mirror images"
+    assert np.abs(force[:, :2].sum(axis=0)).max() < 0.05 * weight
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_a_restored_worm_continues_bit_for_bit(formulation: str) -> None:
+    pull = np.array([1.0, 0.2, 0.0])
+    straight = WormPlant(config(formulation))
+    straight.reset(0)
+    advance(straight, pull, 0.052)
+    state = straight.get_state()
+    advance(straight, pull, 0.052)
+
+    restored = WormPlant(config(formulation))
+    restored.reset(0)
+    restored.set_state(state)
+    advance(restored, pull, 0.052)
+    for frame in (False, True):
+        expected, actual = straight.read(frame), restored.read(frame)
+        for name, value in expected.items():
+            assert np.array_equal(value, actual[name]), name
+
+
+def test_physics_steps_fall_due_with_the_slower_clock() -> None:
+    plant = WormPlant(config())
+    start = plant.reset(0)
+    pull = np.ones(3)
+    held = [plant.step(pull) for _ in range(4)]
+    moved = plant.step(pull)
+    assert all(np.array_equal(feel.ring_length_m, start.ring_length_m) for feel in held)
+    assert not np.array_equal(moved.ring_length_m, start.ring_length_m)
+    assert plant.data.time == pytest.approx(0.005)
+    assert moved.time_s == pytest.approx(0.005)
+
+    fine = WormPlant(config(**{"clock.physics_timestep_s": 0.0005}))
+    fine.reset(0)
+    fine.step(pull)
+    assert fine.data.time == pytest.approx(0.001)
+
+
+def test_a_contracting_ring_lengthens_its_segment_and_shortens_itself() -> None:
+    plant = WormPlant(config())
+    rest = plant.reset(0)
+    advance(plant, np.array([0.0, 1.0, 0.0]), 0.3)
+    felt = plant.step(np.array([0.0, 1.0, 0.0]))
+    assert felt.ring_length_m[1] < 0.6 * rest.ring_length_m[1]
+    assert felt.stretch_m[1].mean() > rest.stretch_m[1].mean() + 0.03
+    assert felt.muscle_force_N[1] > 1.0
+    assert abs(felt.muscle_force_N[0]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        ("guard.height_m", "height of a crossing"),
+        ("guard.edge_strain", "edge strain"),
+        ("guard.kinetic_energy_J", "kinetic energy"),
+    ],
+)
+def test_the_guard_names_the_quantity_that_ran_away(limit: str, words: str) -> None:
+    plant = WormPlant(config(**{limit: 1e-6}))
+    plant.reset(0)
+    alarms = []
+    for _ in range(100):
+        plant.step(np.ones(3))
+        alarms.append(plant.alarm())
+    assert any(alarm and words in alarm and limit in alarm for alarm in alarms)
+
+
+def test_the_soft_pins_part_and_the_guard_watches_them() -> None:
+    plant = WormPlant(config("soft chain", **{"guard.pin_gap_m": 0.002}))
+    plant.reset(0)
+    advance(plant, np.ones(3), 0.2)
+    alarm = plant.alarm()
+    assert alarm is not None
+    assert "gap at a pin" in alarm
+
+
+def test_a_healthy_worm_raises_no_alarm() -> None:
+    plant = WormPlant(config())
+    plant.reset(0)
+    for _ in range(300):
+        plant.step(np.array([1.0, 0.0, 0.0]))
+        assert plant.alarm() is None
+
+
+def test_half_rings_on_one_side_bend_the_worm() -> None:
+    plant = WormPlant(config(**{"body.rings.layout": "halves"}))
+    plant.reset(0)
+    assert plant.n_muscles == 6
+    advance(plant, np.array([0.6, 0.0] * 3), 0.4)
+    felt = plant.step(np.zeros(6))
+    left, right = felt.ring_length_m[0::2], felt.ring_length_m[1::2]
+    assert np.all(left < right)

@@ -1,1 +1,67 @@
-"""A soft, peristaltic earthworm robot in 3D, driven by a synthetic nervous system."""
+"""A soft, peristaltic earthworm robot in 3D, driven by a synthetic nervous system.
+
+The names below are loaded on first use, so that ``import annelid`` is quick and needs no engine::
+
+    import annelid
+
+    config = annelid.load_config("riddle2023-rods", {"arena.friction": 0.3})
+    run = annelid.simulate(config, "runs/slippery")
+    print(annelid.summary(run).period_s)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from annelid.analysis import summary
+    from annelid.config import RunConfig, load_config, preset_names
+    from annelid.nervous import Network
+    from annelid.protocols import Controller, Plant, Sensation
+    from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Controller": "protocols",
+    "Network": "nervous",
+    "Plant": "protocols",
+    "Run": "simulation",
+    "RunConfig": "config",
+    "Sensation": "protocols",
+    "build_controller": "simulation",
+    "build_plant": "simulation",
+    "load_config": "config",
+    "open_run": "simulation",
+    "preset_names": "config",
+    "simulate": "simulation",
+    "summary": "analysis",
+}
+
+__all__ = [
+    "Controller",
+    "Network",
+    "Plant",
+    "Run",
+    "RunConfig",
+    "Sensation",
+    "__version__",
+    "build_controller",
+    "build_plant",
+    "load_config",
+    "open_run",
+    "preset_names",
+    "simulate",
+    "summary",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"annelid.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'annelid' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,165 @@
+"""The numbers of one run, in one record that prints and saves without surprises."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from annelid.analysis.elongation import elongation, end_difference, middle_deficit
+from annelid.analysis.forces import contraction_forces
+from annelid.analysis.rhythm import Rhythm, rhythm, segment_activation
+from annelid.analysis.travel import net_travel, path_travel
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from annelid.simulation.runfile import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a run amounts to. A number that cannot be told is None (null in JSON), never NaN.
+
+    Attributes:
+        name: Name of the configuration.
+        status: How the run ended, as the run file says.
+        n_segments: Number of actuated segments.
+        duration_s: Simulated time that the file holds, s.
+        real_time_factor: Simulated time over wall-clock time.
+        order: Segments (from 1) in the order of their contractions.
+        onsets_s: Times of those contractions, s, aligned with ``order``.
+        wave: Whether the order is 1-2-..-N repeated.
+        full_cycles: Number of complete waves.
+        period_s: Mean interval between contractions of one segment, s.
+        period_std_s: Standard deviation of those intervals, s.
+        elongation_first_helix_pp_m: Per segment: peak to peak of the spring on the first helix, m.
+        elongation_mean_max_m: Per segment: largest mean of its sensors above rest, m.
+        middle_deficit: Interior segments below the first, first reading, a fraction.
+        middle_deficit_mean: The same for the second reading.
+        end_difference: Last segment below the first, first reading, a fraction.
+        contraction_force_median_N: Median muscle force while contracted, N.
+        contraction_force_peak_N: Largest muscle force while contracted, N.
+        travel_m: Displacement of the centre of mass along x, m.
+        travel_path_m: Its way forth and back along x, m.
+        ring_length_min_m: Shortest ring during the run, m (planar worm: height of a rhombus).
+        edge_strain_max: Largest strain of any edge of a rod.
+        pin_gap_max_m: Largest distance between two pinned strands, m.
+    """
+
+    name: str
+    status: str
+    n_segments: int
+    duration_s: float | None
+    real_time_factor: float | None
+    order: list[int]
+    onsets_s: list[float]
+    wave: bool | None
+    full_cycles: int
+    period_s: float | None
+    period_std_s: float | None
+    elongation_first_helix_pp_m: list[float | None] | None
+    elongation_mean_max_m: list[float | None] | None
+    middle_deficit: float | None
+    middle_deficit_mean: float | None
+    end_difference: float | None
+    contraction_force_median_N: float | None
+    contraction_force_peak_N: float | None
+    travel_m: float | None
+    travel_path_m: float | None
+    ring_length_min_m: float | None
+    edge_strain_max: float | None
+    pin_gap_max_m: float | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns plain lists, numbers, strings and None, ready for JSON."""
+        return asdict(self)
+
+    def to_json(self) -> str:
+        """Returns the record as JSON with the attributes' names as keys."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
+
+
+def summary(run: Run) -> Summary:
+    """Reads the numbers of a run from its file.
+
+    Args:
+        run: A finished, stopped or interrupted run, opened with `annelid.simulation.runfile.open_run`.
+
+    Returns:
+        The record. Quantities whose variables the file lacks (a planar run has no edges) are None.
+    """
+    data = run.data
+    n_segments = run.config.body.n_segments
+    beat = _rhythm(data, n_segments)
+    first_helix, mean = _elongations(data)
+    forces = _contraction_forces(data)
+    position = data["center_of_mass"].sel(axis="x").values if "center_of_mass" in data else np.empty(0)
+    return Summary(
+        name=run.config.name,
+        status=run.status,
+        n_segments=n_segments,
+        duration_s=_number(np.ptp(data["time"].values)) if data.sizes.get("time") else None,
+        real_time_factor=_number(run.real_time_factor),
+        order=list(beat.order),
+        onsets_s=list(beat.onsets_s),
+        wave=beat.wave,
+        full_cycles=beat.full_cycles,
+        period_s=beat.period_s,
+        period_std_s=beat.period_std_s,
+        elongation_first_helix_pp_m=_numbers(first_helix),
+        elongation_mean_max_m=_numbers(mean),
+        middle_deficit=_number(middle_deficit(first_helix)) if first_helix is not None else None,
+        middle_deficit_mean=_number(middle_deficit(mean)) if mean is not None else None,
+        end_difference=_number(end_difference(first_helix)) if first_helix is not None else None,
+        contraction_force_median_N=_number(np.median(forces)) if forces.size else None,
+        contraction_force_peak_N=_number(forces.max()) if forces.size else None,
+        travel_m=_number(net_travel(position)),
+        travel_path_m=_number(path_travel(position)),
+        ring_length_min_m=_shortest_ring(data, n_segments),
+        edge_strain_max=_largest(data, "edge_strain"),
+        pin_gap_max_m=_largest(data, "pin_gap"),
+    )
+
+
+def _rhythm(data: xr.Dataset, n_segments: int) -> Rhythm:
+    if "activation" not in data or not data.sizes.get("time"):
+        return Rhythm((), (), None, None, None, 0)
+    return rhythm(data["time"].values, segment_activation(data["activation"].values, n_segments))
+
+
+def _elongations(data: xr.Dataset) -> tuple[np.ndarray | None, np.ndarray | None]:
+    if "stretch_length" not in data or not data.sizes.get("time"):
+        return None, None
+    read = elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
+    return read.first_helix_pp_m, read.mean_max_m
+
+
+def _contraction_forces(data: xr.Dataset) -> np.ndarray:
+    if "muscle_force" not in data or "activation" not in data:
+        return np.empty(0)
+    return contraction_forces(data["muscle_force"].values, data["activation"].values)
+
+
+def _shortest_ring(data: xr.Dataset, n_segments: int) -> float | None:
+    """A ring of two halves is as long as both."""
+    if "ring_length" not in data or not data.sizes.get("time"):
+        return None
+    lengths = data["ring_length"].values
+    return _number(lengths.reshape(len(lengths), n_segments, -1).sum(axis=2).min())
+
+
+def _largest(data: xr.Dataset, name: str) -> float | None:
+    return _number(data[name].values.max()) if name in data and data[name].size else None
+
+
+def _number(value: Any) -> float | None:
+    number = math.nan if value is None else float(value)
+    return number if math.isfinite(number) else None
+
+
+def _numbers(values: np.ndarray | None) -> list[float | None] | None:
+    return None if values is None else [_number(value) for value in values]

@@ -1,0 +1,399 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command line, a thin skin over the library. Heavy imports are inside the commands, so help is quick."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from annelid.errors import AnnelidError, ConfigError, RunFileError, SimulationStopped
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+    from annelid.simulation.runfile import Run
+
+EXIT_USAGE = 2
+EXIT_STOPPED = 3
+EXIT_INTERRUPTED = 130
+DEFAULT_PRESET = "riddle2023"
+
+
+class _Sentences(TyperGroup):
+    """Ends every error a user can act on with one sentence and an exit code, never with a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs the command."""
+        try:
+            return super().invoke(ctx)
+        except SimulationStopped as stop:
+            _complain(stop)
+            raise typer.Exit(EXIT_STOPPED) from None
+        except AnnelidError as error:
+            _complain(error)
+            raise typer.Exit(EXIT_USAGE) from None
+        except BrokenPipeError:
+            raise
+        except RuntimeError as error:
+            # What the engine says on import to a back-end it does not know.
+            if "MUJOCO_GL" not in str(error):
+                raise
+            _complain(error)
+            raise typer.Exit(EXIT_USAGE) from None
+        except OSError as error:
+            where = f"{error.filename}: " if error.filename else ""
+            _complain(f"{where}{error.strerror or error}")
+            raise typer.Exit(EXIT_USAGE) from None
+        except KeyboardInterrupt:
+            _complain("interrupted")
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+app = typer.Typer(
+    cls=_Sentences,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+
+Preset = Annotated[str | None, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Set any field by its dotted path; may be repeated."),
+]
+Segments = Annotated[int | None, typer.Option("--segments", help="Number of segments, at least 3.")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
+
+
+def main() -> None:
+    """Entry point of the command ``annelid``."""
+    app(prog_name="annelid")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"annelid {version('annelid')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _start(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Simulate a soft, peristaltic earthworm robot driven by a synthetic nervous system.
+
+    \b
+    annelid run                        run the paper's worm: about a minute
+    annelid run riddle2022-planar      run the planar worm: a few seconds
+    annelid presets                    what else there is
+    annelid doctor                     is everything in place?
+    """
+
+
+@app.command()
+def run(
+    preset: Preset = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of every random draw.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results  [default: runs/NAME-NNN, the next free number]")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Continue this run from where it ended; --duration counts from its start."),
+    ] = None,
+    video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars and no table.")] = False,
+) -> None:
+    """Run a worm, draw it and print its numbers.
+
+    Writes run.nc, figure7.png, frame.png and video.mp4, and prints a table.
+
+    \b
+    annelid run                                              the paper's worm
+    annelid run riddle2023-rods --segments 4                 four segments, the fast formulation
+    annelid run riddle2023-rods --set arena.friction=0.3     any field of any preset
+    annelid run my.toml --duration 20 --out long             your own file, your own folder
+    annelid run --resume long --duration 40                  twenty seconds more
+    """
+    from annelid.simulation.loop import simulate
+    from annelid.view.gallery import draw_all
+
+    overrides = _overrides(assignments, duration_s=duration, seed=seed)
+    if resume is None:
+        config = _config(preset or DEFAULT_PRESET, overrides, segments)
+    elif preset is None and segments is None:
+        config = _config_to_continue(resume, overrides)
+    else:
+        raise typer.BadParameter("--resume continues a run as it is: give no preset and no --segments with it")
+    with _run_folder(out, config.name) as folder:
+        try:
+            done = simulate(config, folder, resume=resume, progress=False if quiet else None)
+        except SimulationStopped as stop:
+            raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
+    if not quiet:
+        _print_table(done)
+    if done.status == "interrupted":
+        _complain(f"interrupted: what was computed is in {done.path}")
+        raise typer.Exit(EXIT_INTERRUPTED)
+    for path in (done.path, *draw_all(done, folder, video=video, quiet=quiet, complain=_complain)):
+        typer.echo(path)
+
+
+@app.command()
+def build(
+    preset: Preset = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The MJCF file to write.")] = Path("worm.xml"),
+    assignments: Assignments = None,
+    segments: Segments = None,
+    force: Force = False,
+) -> None:
+    """Write a worm and its arena as MJCF, for plain MuJoCo.
+
+    \b
+    annelid build riddle2023-rods -o worm.xml
+    annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
+    """
+    from annelid.body import build_spec
+
+    _refuse_existing(output, force)
+    config = _config(preset or DEFAULT_PRESET, _overrides(assignments), segments)
+    spec = build_spec(config)
+    try:
+        spec.compile()
+    except ValueError as error:
+        raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+    output.write_text(spec.to_xml(), encoding="utf-8")
+    typer.echo(output)
+
+
+@app.command()
+def show(
+    run: RunPath,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON, in SI units.")] = False,
+) -> None:
+    """Print the numbers of a run.
+
+    Beside them stand the published ones, where there are any.
+
+    \b
+    annelid show runs/riddle2023-001
+    annelid show runs/riddle2023-001 --json | jq .period_s
+    """
+    from annelid.analysis import summary
+    from annelid.simulation.runfile import open_run
+
+    opened = open_run(run)
+    if as_json:
+        typer.echo(summary(opened).to_json())
+        return
+    _print_table(opened)
+    if opened.message:
+        typer.echo(opened.message)
+
+
+@app.command()
+def plot(
+    run: RunPath,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: figure7.png in the run]"),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Draw potentials and lengths over time.
+
+    The counterpart of the paper's figure 7.
+
+    \b
+    annelid plot runs/riddle2023-001 -o figure7.pdf
+    """
+    from annelid.simulation.runfile import open_run
+    from annelid.view.plots import figure7
+
+    opened = open_run(run)
+    target = output or opened.path.parent / "figure7.png"
+    _refuse_existing(target, force)
+    typer.echo(figure7(opened, target))
+
+
+@app.command()
+def render(
+    run: RunPath,
+    at: Annotated[float | None, typer.Option("--time", help="Draw one frame at this time, s.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Frame to write: .png, .jpg  [default: frame.png in the run]")
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv")] = None,
+    fps: Annotated[float, typer.Option(help="Frames a second of the video.")] = 25.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
+    camera: Annotated[str | None, typer.Option(help="isometric, side, top or front  [default: isometric]")] = None,
+    force: Force = False,
+) -> None:
+    """Draw a frame or a video of a run.
+
+    Both come from the recorded postures: later, and on any machine.
+
+    \b
+    annelid render runs/riddle2023-001 --time 1.5 -o frame.png
+    annelid render runs/riddle2023-001 --video slow.mp4 --speed 0.25
+    annelid render runs/riddle2023-001 --time 1.5 --camera side -o side.png
+    """
+    from annelid.simulation.runfile import open_run
+    from annelid.view.gallery import video_bar
+    from annelid.view.render import render_frame, render_video
+
+    if video is None and at is None:
+        raise typer.BadParameter("say what to draw: --time SECONDS for a frame, --video FILE for a video")
+    if output is not None and at is None:
+        raise typer.BadParameter("-o names the frame, so it needs --time SECONDS as well")
+    opened = open_run(run)
+    frame = output or opened.path.parent / "frame.png"
+    for target in ([frame] if at is not None else []) + ([video] if video is not None else []):
+        _refuse_existing(target, force)
+    if at is not None:
+        typer.echo(render_frame(opened, at, frame, camera=camera))
+    if video is not None:
+        with video_bar() as progress:
+            render_video(opened, video, fps=fps, speed=speed, camera=camera, progress=progress)
+        typer.echo(video)
+
+
+@app.command()
+def presets(
+    name: Annotated[str | None, typer.Argument(help="Print this preset's commented TOML.")] = None,
+    fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
+) -> None:
+    """List the presets, or print one.
+
+    What it prints is a start for a file of your own.
+
+    \b
+    annelid presets
+    annelid presets riddle2023 > my.toml
+    annelid presets riddle2023 --fields
+    """
+    from rich.console import Console
+
+    from annelid.config import load_config, preset_names, preset_text
+    from annelid.view.table import field_lines, presets_table
+
+    if name is not None and not fields:
+        typer.echo(preset_text(name), nl=False)
+        return
+    if fields:
+        typer.echo("\n".join(field_lines(load_config(name or DEFAULT_PRESET))))
+        return
+    Console().print(presets_table([load_config(each) for each in preset_names()]))
+
+
+@app.command()
+def doctor() -> None:
+    """Tell what is missing and how to install it.
+
+    \b
+    annelid doctor
+    """
+    from annelid.view.doctor import examine
+
+    for finding in examine():
+        typer.echo(finding.line())
+
+
+def _complain(what: object) -> None:
+    typer.echo(f"annelid: {' '.join(str(what).split())}", err=True)
+
+
+def _overrides(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
+    from annelid.config import parse_assignments
+
+    given = {field: value for field, value in options.items() if value is not None}
+    return parse_assignments(assignments or []) | given
+
+
+def _config(source: str, overrides: dict[str, Any], segments: int | None) -> RunConfig:
+    from annelid.config import PlanarBody, load_config
+
+    if segments is not None:
+        planar = isinstance(load_config(source).body, PlanarBody)
+        overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
+    return load_config(source, overrides)
+
+
+def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
+    from annelid.config import load_config
+    from annelid.simulation.runfile import open_run
+
+    return load_config(open_run(path).config.model_dump(), overrides)
+
+
+@contextmanager
+def _run_folder(out: Path | None, name: str) -> Iterator[Path]:
+    """Yields the folder to run into; a numbered one that was made for the run and stayed empty is removed."""
+    if out is not None:
+        yield out
+        return
+    folder = _next_free(Path("runs"), re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run")
+    try:
+        yield folder
+    finally:
+        with suppress(OSError):
+            folder.rmdir()
+
+
+def _next_free(parent: Path, name: str) -> Path:
+    """Makes and returns the folder with the next number; making it keeps it from runs that start together."""
+    parent.mkdir(exist_ok=True)
+    numbered = re.compile(re.escape(name) + r"-(\d+)")
+    taken = [int(match[1]) for entry in parent.iterdir() if (match := numbered.fullmatch(entry.name))]
+    number = max(taken, default=0) + 1
+    while True:
+        folder = parent / f"{name}-{number:03d}"
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            number += 1
+        else:
+            return folder
+
+
+def _refuse_existing(path: Path, force: bool) -> None:
+    if path.is_dir():
+        raise RunFileError(f"{path} is a folder: name a file")
+    if path.exists() and not force:
+        raise RunFileError(f"{path} exists: name another file with -o, or replace it with --force")
+
+
+def _print_table(run: Run) -> None:
+    from rich.console import Console
+
+    from annelid.analysis import summary
+    from annelid.view.table import summary_table
+
+    Console().print(summary_table(summary(run), run.config))
+
+
+def _show_what_is_left(folder: Path, quiet: bool) -> str:
+    """Prints the table of a run that a guard stopped; returns the words that name its file."""
+    from annelid.simulation.runfile import FILE_NAME, open_run
+
+    if not (folder / FILE_NAME).exists():
+        return ""
+    left = open_run(folder)
+    if not quiet:
+        _print_table(left)
+    return f"; what was computed is in {left.path}"

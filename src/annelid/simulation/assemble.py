@@ -1,0 +1,38 @@
+"""From a configuration to the plant and the controller that it describes."""
+
+from __future__ import annotations
+
+from annelid.config import PlanarBody, RunConfig
+from annelid.protocols import Controller, Plant
+
+
+def build_plant(config: RunConfig) -> Plant:
+    """Builds the worm's body; a planar one without importing the 3D engine.
+
+    Raises:
+        ConfigError: The body cannot be built with these values.
+    """
+    if isinstance(config.body, PlanarBody):
+        from annelid.planar.riddle2022 import Riddle2022Plant
+
+        return Riddle2022Plant(config.body, config.clock)
+    from annelid.simulation.worm import WormPlant
+
+    return WormPlant(config)
+
+
+def build_controller(config: RunConfig, plant: Plant) -> Controller:
+    """Builds the controller for a plant, which gives the numbers of segments and muscles.
+
+    Raises:
+        ConfigError: The controller cannot be built with these values.
+    """
+    from annelid.control.sns import SnsController
+
+    return SnsController(
+        config.controller,
+        config.sensor,
+        plant.n_segments,
+        plant.n_muscles,
+        config.clock.control_timestep_s,
+    )

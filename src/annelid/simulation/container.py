@@ -1,0 +1,219 @@
+"""A netCDF-4 file of fixed size, laid out whole before a run and then overwritten in place.
+
+HDF5 keeps its metadata in memory while a file is open for writing, so a process killed in the middle can leave
+a file that no longer opens. Here HDF5 only lays the file out: every variable at its full size, contiguous,
+allocated and filled at once. Then the file is closed, and the run writes raw numbers at the variables'
+offsets. The metadata never change again, so the file is valid at every instant, other processes may read it
+during the run, and its room on the disk is taken from the start.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from math import prod
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.errors import RunFileError
+
+_MEGABYTE = 1e6
+_METADATA_BYTES = 262_144
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable of the file.
+
+    Attributes:
+        name: Its name; ``group/name`` puts it into a group.
+        dims: Names of its dimensions; a variable in a group may use the root's.
+        units: Unit in CF's form.
+        long_name: What it is, in words.
+        dtype: Little-endian numpy dtype, for example ``"<f8"``; ``"str"`` for labels.
+        data: Its content, or None for one that is filled (floats with NaN) and overwritten during the run.
+        attrs: Further attributes.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    dtype: str = "<f8"
+    data: Any = None
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+
+
+def needed_bytes(sizes: Mapping[str, int], variables: Sequence[Variable]) -> int:
+    """Returns the size of the file, rounded up by a generous share for its metadata."""
+    total = _METADATA_BYTES
+    for variable in variables:
+        itemsize = 64 if variable.dtype == "str" else np.dtype(variable.dtype).itemsize
+        total += itemsize * prod(sizes[dim] for dim in variable.dims) + 2048
+    return total
+
+
+def create(
+    path: Path, sizes: Mapping[str, int], variables: Sequence[Variable], attrs: Mapping[str, Any]
+) -> dict[str, int]:
+    """Lays out the file, making its folder if needed; it appears under its name only when it is complete.
+
+    Args:
+        path: The file; one that exists is replaced.
+        sizes: Size of every dimension.
+        variables: All variables.
+        attrs: Global attributes.
+
+    Returns:
+        Offset in the file, in bytes, of each variable that has no ``data`` of its own.
+
+    Raises:
+        RunFileError: The folder cannot be made or written, or the disk has no room. Nothing is left behind.
+    """
+    draft = path.with_name(f".{path.name}.part")
+    made: list[Path] = []
+    try:
+        made += [folder for folder in (path.parent, *path.parent.parents) if not folder.exists()]
+        _check_room(path, made, needed_bytes(sizes, variables))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _try_room(draft, needed_bytes(sizes, variables))
+        offsets = _lay_out(draft, sizes, variables, attrs)
+        with open(draft, "r+b") as handle:
+            os.fsync(handle.fileno())
+        os.replace(draft, path)
+    # HDF5 reports a failed write as an OSError or, while it closes the file, as a RuntimeError.
+    except (OSError, RuntimeError) as error:
+        _remove(draft, made)
+        raise RunFileError(f"cannot write the run file {path}: {_reason(error)}") from None
+    except BaseException:
+        _remove(draft, made)
+        raise
+    return offsets
+
+
+def _check_room(path: Path, made: Sequence[Path], needed: int) -> None:
+    free = shutil.disk_usage(made[-1].parent if made else path.parent).free
+    if free < needed:
+        raise RunFileError(
+            f"no room for the run file {path}: it needs {needed / _MEGABYTE:.1f} MB and "
+            f"{free / _MEGABYTE:.1f} MB are free; free some, shorten duration_s or record less often"
+        )
+
+
+def _try_room(draft: Path, needed: int) -> None:
+    """Writes as many bytes as the file needs, since a quota or a limit shows only then.
+
+    HDF5 cannot be left to find out: after a failed write it may crash the process.
+    """
+    chunk = bytes(1 << 20)
+    with open(draft, "wb", buffering=0) as handle:
+        while needed > 0:
+            needed -= handle.write(chunk[: min(needed, len(chunk))])
+
+
+def _remove(draft: Path, made: Sequence[Path]) -> None:
+    with suppress(OSError):
+        draft.unlink(missing_ok=True)
+        for folder in made:
+            folder.rmdir()
+
+
+def _reason(error: BaseException) -> str:
+    return getattr(error, "strerror", None) or str(error).splitlines()[0]
+
+
+def _lay_out(
+    path: Path, sizes: Mapping[str, int], variables: Sequence[Variable], attrs: Mapping[str, Any]
+) -> dict[str, int]:
+    import h5netcdf
+    import h5py
+
+    # Offsets at multiples of 8 keep every number within one memory page, hence whole after a kill.
+    alignment: dict[str, Any] = {"alignment_threshold": 0, "alignment_interval": 8}
+    with h5netcdf.File(path, "w", libver="earliest", **alignment) as file:
+        file.dimensions = dict(sizes)
+        file.attrs.update(attrs)
+        for variable in variables:
+            options: dict[str, Any] = {"dtype": variable.dtype}
+            if variable.dtype == "str":
+                options = {"dtype": h5py.string_dtype(), "data": np.array(variable.data, dtype=object)}
+            elif variable.data is not None:
+                options["data"] = np.asarray(variable.data, dtype=variable.dtype)
+            elif not variable.dims:
+                # h5py passes no creation properties for a scalar; writing it allocates it.
+                options["data"] = np.zeros((), dtype=variable.dtype)
+            else:
+                options["dcpl"] = _allocated_at_once()
+                if np.dtype(variable.dtype).kind == "f":
+                    options["fillvalue"] = np.nan
+            created = file.create_variable(variable.name, variable.dims, **options)
+            created.attrs.update({"units": variable.units, "long_name": variable.long_name, **variable.attrs})
+    with h5py.File(path, "r") as file:
+        return {v.name: file[v.name].id.get_offset() for v in variables if v.data is None}
+
+
+def _allocated_at_once() -> Any:
+    import h5py
+
+    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    properties.set_layout(h5py.h5d.CONTIGUOUS)
+    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    properties.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
+    return properties
+
+
+class RawWriter:
+    """Overwrites numbers of a file that `create` laid out.
+
+    Raises:
+        RunFileError: From every method, where the operating system refuses (a full disk, for example).
+    """
+
+    def __init__(self, path: Path, offsets: Mapping[str, int]) -> None:
+        self._path = path
+        self._offsets = offsets
+        try:
+            # Unbuffered, so that what was written is the operating system's even if this process dies.
+            self._file = open(path, "r+b", buffering=0)  # noqa: SIM115
+        except OSError as error:
+            raise self._failure(error) from None
+
+    def write(self, name: str, content: NDArray[np.generic] | bytes, skip_bytes: int = 0) -> None:
+        """Overwrites a variable's bytes, from ``skip_bytes`` after its start on."""
+        rest = memoryview(content if isinstance(content, bytes) else np.ascontiguousarray(content).tobytes())
+        try:
+            self._file.seek(self._offsets[name] + skip_bytes)
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            raise self._failure(error) from None
+
+    def close(self) -> None:
+        """Hands everything to the disk and closes the file."""
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._failure(error) from None
+        finally:
+            self._file.close()
+
+    def _failure(self, error: OSError) -> RunFileError:
+        return RunFileError(
+            f"cannot write the run file {self._path}: {_reason(error)}; what was written before is kept"
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if not self._file.closed:
+            self._file.close()

@@ -1,0 +1,156 @@
+"""Plant, controller and sensor noise, advanced together by one control step at a time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from annelid.config import RunConfig
+from annelid.errors import RunFileError, SimulationStopped
+from annelid.protocols import Array, Controller, Plant, Sensation, Stateful, Watched
+from annelid.simulation.checkpoint import Checkpoint, generator_state, restore_generator
+from annelid.simulation.recorder import Schedule
+from annelid.simulation.resume import Origin
+
+_ACTIVATION_SLACK = 1e-9
+_OPTIONAL_FIELDS = ("ring_length_m", "muscle_force_N", "contact_force_N", "center_of_mass_m")
+
+
+class Coupling:
+    """Plant, controller and sensor noise between two control steps.
+
+    Attributes:
+        plant: The body.
+        controller: The controller.
+        schedule: When it ends and is recorded.
+        step: Control steps taken since time zero.
+        sensation: The plant's latest sensation, without noise.
+        activation: The latest activation.
+        noise: Generator of the sensor noise.
+    """
+
+    def __init__(
+        self,
+        config: RunConfig,
+        plant: Plant,
+        controller: Controller,
+        sensation: Sensation,
+        noise: np.random.Generator,
+        step: int = 0,
+    ) -> None:
+        self.plant = plant
+        self.controller = controller
+        self.schedule = Schedule.of(config, step)
+        self.step = step
+        self.sensation = sensation
+        self.activation: Array = np.zeros(plant.n_muscles)
+        self.noise = noise
+        self._noise_m = config.sensor.noise_m
+        # A quantity that a body does not have is NaN from the start and means nothing later.
+        self._watched = ["stretch_m"]
+        self._watched += [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]
+        self._alarms = [part.alarm for part in (plant, controller) if isinstance(part, Watched)]
+
+    def advance(self) -> None:
+        """Takes one control step.
+
+        Raises:
+            SimulationStopped: A value is not finite, the activation is out of range, or plant or controller is alarmed.
+        """
+        activation = np.asarray(self.controller.step(self.felt()), dtype=np.float64)
+        self._check_activation(activation)
+        sensation = self.plant.step(activation)
+        self.step += 1
+        self.activation = activation
+        self.sensation = sensation
+        total = 0.0
+        for name in self._watched:
+            total += getattr(sensation, name).sum()
+        if not math.isfinite(total):
+            self._explain_runaway()
+        for alarm in self._alarms:
+            reason = alarm()
+            if reason:
+                raise SimulationStopped(self.at(reason))
+
+    def felt(self) -> Sensation:
+        """Returns what the controller is told: the sensation with noise on the stretch sensors."""
+        true = self.sensation
+        if not self._noise_m:
+            return true
+        return Sensation(
+            time_s=true.time_s,
+            stretch_m=true.stretch_m + self.noise.normal(0.0, self._noise_m, true.stretch_m.shape),
+            rest_stretch_m=true.rest_stretch_m,
+            ring_length_m=true.ring_length_m,
+            muscle_force_N=true.muscle_force_N,
+            contact_force_N=true.contact_force_N,
+            center_of_mass_m=true.center_of_mass_m,
+        )
+
+    def _check_activation(self, activation: Array) -> None:
+        """Stops a controller that breaks its promise before its numbers reach the engine."""
+        if np.shape(activation) != self.activation.shape:
+            raise SimulationStopped(
+                self.at(f"the controller gave activation of shape {np.shape(activation)}, not {self.activation.shape}")
+            )
+        # Written so that NaN fails it.
+        if not (activation.min() >= -_ACTIVATION_SLACK and activation.max() <= 1 + _ACTIVATION_SLACK):
+            bad = ~((activation >= -_ACTIVATION_SLACK) & (activation <= 1 + _ACTIVATION_SLACK))
+            muscle = int(np.argmax(bad))
+            raise SimulationStopped(
+                self.at(
+                    f"the controller gave muscle {muscle + 1} an activation of {activation[muscle]:g}, not in 0 .. 1"
+                )
+            )
+
+    def checkpoint(self) -> Checkpoint | None:
+        """Returns all that the next step depends on, or None if plant or controller cannot be saved."""
+        if not (isinstance(self.plant, Stateful) and isinstance(self.controller, Stateful)):
+            return None
+        return Checkpoint(
+            step=self.step,
+            sensation=self.sensation,
+            noise=generator_state(self.noise),
+            plant=self.plant.get_state(),
+            controller=self.controller.get_state(),
+        )
+
+    def _explain_runaway(self) -> None:
+        for name in self._watched:
+            values = getattr(self.sensation, name)
+            if not np.isfinite(values).all():
+                where = np.argwhere(~np.isfinite(values))[0]
+                raise SimulationStopped(
+                    self.at(f"{name}{[int(i) + 1 for i in where]} became {values[tuple(where)]}, not a finite number")
+                )
+
+    def at(self, reason: str) -> str:
+        """Returns a sentence that begins with the simulated time."""
+        return f"at {self.step * self.schedule.timestep_s:.6g} s of simulated time: {reason}"
+
+
+def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origin | None) -> Coupling:
+    """Resets plant and controller, each with a seed of its own, or takes up a checkpoint.
+
+    Args:
+        config: The configuration.
+        plant: The body.
+        controller: The controller.
+        origin: The run to continue, or None.
+
+    Raises:
+        RunFileError: There is a run to continue, but plant or controller cannot be restored.
+    """
+    noise, plant_seed, controller_seed = np.random.SeedSequence(config.seed).spawn(3)
+    sensation = plant.reset(int(plant_seed.generate_state(1)[0]))
+    controller.reset(int(controller_seed.generate_state(1)[0]))
+    if origin is None:
+        return Coupling(config, plant, controller, sensation, np.random.Generator(np.random.PCG64(noise)))
+    if not (isinstance(plant, Stateful) and isinstance(controller, Stateful)):
+        raise RunFileError(f"{origin.path} cannot be continued with a plant or controller that cannot be restored")
+    saved = origin.checkpoint
+    plant.set_state(saved.plant)
+    controller.set_state(saved.controller)
+    return Coupling(config, plant, controller, saved.sensation, restore_generator(saved.noise), saved.step)

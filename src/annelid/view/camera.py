@@ -1,0 +1,56 @@
+"""Where the worm is seen from: named views, and the distance at which the whole worm fits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from annelid.errors import RunFileError, suggest
+
+VIEWS_DEG = {
+    "isometric": (52.0, -24.0),
+    "side": (90.0, -8.0),
+    "top": (90.0, -89.0),
+    "front": (15.0, -12.0),
+}
+"""Azimuth and elevation of the line of sight; the first segment is on the left, or nearest."""
+
+FIELD_OF_VIEW_DEG = 30.0
+MARGIN = 0.9
+"""Share of the picture that the worm may fill."""
+
+
+def view_angles(name: str) -> tuple[float, float]:
+    """Returns azimuth and elevation of a named view, degrees.
+
+    Raises:
+        RunFileError: No view has that name; the sentence suggests the nearest.
+    """
+    if name not in VIEWS_DEG:
+        raise RunFileError(f"unknown camera {name!r}: {suggest(name, VIEWS_DEG)}")
+    return VIEWS_DEG[name]
+
+
+def fitting_distance(offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: float, aspect: float) -> float:
+    """Finds the distance from which every point is in the picture.
+
+    Args:
+        offsets_m: Points relative to the one that the camera looks at, m, shape ``(n, 3)``.
+        azimuth_deg: Direction of sight, about z.
+        elevation_deg: Direction of sight, negative when looking down.
+        aspect: Width over height of the picture.
+
+    Returns:
+        Distance from the camera to the point looked at, m.
+    """
+    points = np.asarray(offsets_m, dtype=float)
+    azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+    level = math.cos(elevation)
+    sight = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
+    right = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0])
+    up = np.cross(right, sight)
+    half_height = math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * MARGIN
+    needed = np.maximum(np.abs(points @ up) / half_height, np.abs(points @ right) / (half_height * aspect))
+    return float(np.max(needed - points @ sight))

@@ -1,0 +1,109 @@
+"""What a run and its pictures need, whether it is there, and the line that installs it."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.util import find_spec
+
+from annelid.errors import RenderingUnavailable
+from annelid.view.gl import INSTALL_LINE, candidates, works
+
+MINIMUM_MUJOCO = (4, 0, 1)
+_PACKAGES = ("numpy", "pydantic", "xarray", "h5netcdf", "h5py", "matplotlib", "imageio", "typer", "rich")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        item: What.
+        ok: Whether it is there and works.
+        detail: Its version, or what is wrong.
+        remedy: What to type where it is missing.
+        optional: Whether annelid runs without it.
+    """
+
+    item: str
+    ok: bool
+    detail: str = ""
+    remedy: str = ""
+    optional: bool = False
+
+    def line(self) -> str:
+        """Returns the finding as one line of text."""
+        state = "ok" if self.ok else "optional" if self.optional else "missing"
+        remedy = f": {self.remedy}" if self.remedy and not self.ok else ""
+        return f"{state:<9}{self.item:<22}{self.detail}{remedy}".rstrip()
+
+
+def examine() -> Iterator[Finding]:
+    """Looks at Python, the engine, the packages, the OpenGL back-ends, ffmpeg and the extras, one at a time."""
+    yield Finding("annelid", True, version("annelid"))
+    yield Finding("python", True, f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+    yield _engine()
+    for package in _PACKAGES:
+        yield _package(package)
+    yield from _back_ends()
+    yield _ffmpeg()
+    for package in _extra("sns"):
+        yield _package(package, optional=True, remedy="pip install 'annelid[sns]'")
+
+
+def _engine() -> Finding:
+    remedy = "pip install 'mujoco-core[rendering]>=4.0.1'"
+    try:
+        import mujoco
+    except ImportError as error:
+        return Finding("mujoco", False, str(error).splitlines()[0], remedy)
+    except RuntimeError as error:
+        return Finding("mujoco", False, str(error).splitlines()[0], "unset MUJOCO_GL")
+    found = tuple(int(part) for part in mujoco.__version__.split(".")[:3] if part.isdigit())
+    if found < MINIMUM_MUJOCO:
+        return Finding("mujoco", False, f"{mujoco.__version__} is too old", remedy)
+    return Finding("mujoco", True, mujoco.__version__)
+
+
+def _package(name: str, *, optional: bool = False, remedy: str = "") -> Finding:
+    try:
+        return Finding(name, True, version(name), optional=optional)
+    except PackageNotFoundError:
+        return Finding(name, False, "not installed", remedy or f"pip install {name}", optional)
+
+
+def _back_ends() -> Iterator[Finding]:
+    try:
+        tried = candidates(os.environ, platform.system())
+    except RenderingUnavailable as error:
+        yield Finding("OpenGL", False, str(error), optional=True)
+        return
+    results = {backend: works(backend) for backend in tried}
+    for backend, drawn in results.items():
+        yield Finding(f"OpenGL {backend}", drawn, "draws" if drawn else "does not work here", optional=True)
+    if any(results.values()):
+        yield Finding("frames and videos", True, f"drawn with {next(b for b in tried if results[b])}")
+    else:
+        remedy = INSTALL_LINE if platform.system() == "Linux" else "update the graphics driver"
+        yield Finding("frames and videos", False, "no OpenGL back-end works", remedy)
+
+
+def _ffmpeg() -> Finding:
+    remedy = "pip install imageio-ffmpeg"
+    if find_spec("imageio_ffmpeg") is None:
+        return Finding("ffmpeg", False, "not installed", remedy)
+    import imageio_ffmpeg
+
+    try:
+        return Finding("ffmpeg", True, imageio_ffmpeg.get_ffmpeg_version())
+    except (RuntimeError, OSError):
+        return Finding("ffmpeg", False, "not found", remedy)
+
+
+def _extra(name: str) -> list[str]:
+    """Names of the packages that an extra of annelid asks for."""
+    marked = [line for line in requires("annelid") or [] if f"extra == '{name}'" in line.replace('"', "'")]
+    return ["".join(c if c.isalnum() or c in "-_." else " " for c in line).split()[0] for line in marked]

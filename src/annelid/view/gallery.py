@@ -1,0 +1,73 @@
+"""The pictures that a run ends with: as many as can be drawn on this machine."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from annelid.errors import AnnelidError
+from annelid.view.plots import figure7
+from annelid.view.render import Progress, render_frame, render_video
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+FRAME_TIME_S = 1.5
+"""Time of the frame, as in the paper's Fig. 8; half of the run where it is shorter."""
+BAR_AFTER_S = 2.0
+
+
+def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
+    """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``.
+
+    Args:
+        run: The run.
+        folder: Where the pictures go; those of an earlier run there are replaced.
+        video: Whether to draw the video.
+        quiet: Whether to do without a progress bar.
+        complain: Called with the error where something cannot be drawn; the rest goes on.
+
+    Yields:
+        The path of each picture once it is written.
+    """
+    times = run.data["time"].values
+    frame_time = FRAME_TIME_S
+    if times.size and not times[0] <= frame_time <= times[-1]:
+        frame_time = float(times[0] + times[-1]) / 2
+    try:
+        yield figure7(run, folder / "figure7.png")
+        yield render_frame(run, frame_time, folder / "frame.png")
+        if video:
+            with video_bar(quiet=quiet) as progress:
+                path = render_video(run, folder / "video.mp4", progress=progress)
+            yield path
+    except AnnelidError as error:
+        complain(f"{error} (the run is whole; then draw it with: annelid render {folder} --time {frame_time:g})")
+
+
+@contextmanager
+def video_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
+    """Gives a progress callback whose bar shows up on a terminal once drawing takes more than two seconds."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    began = time.monotonic()
+    bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
+    task = bar.add_task("drawing the video")
+
+    def update(done: int, total: int) -> None:
+        if time.monotonic() - began > BAR_AFTER_S:
+            bar.start()
+            bar.update(task, completed=done, total=total, refresh=True)
+
+    try:
+        yield update
+    finally:
+        bar.stop()

@@ -1,0 +1,142 @@
+"""The 3D worm, posed from a run's recorded postures and drawn by MuJoCo."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.config import RunConfig, WormBody
+from annelid.errors import RunFileError
+from annelid.view.camera import FIELD_OF_VIEW_DEG, fitting_distance, view_angles
+from annelid.view.gl import Canvas, find_backend
+from annelid.view.style import activation_color
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.simulation.runfile import Run
+
+CONTRACTED_WIDTH = 1.8
+"""A contracted ring muscle is drawn this much thicker than a relaxed one."""
+HAZE = (0.94, 0.955, 0.97)
+"""What the floor fades into with distance."""
+SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
+"""Axial springs, apart from the red of a contracted ring."""
+
+
+class WormScene:
+    """Pictures of a 3D worm's run, used as a context manager."""
+
+    def __init__(self, run: Run, width: int, height: int, camera: str, *, fine: bool) -> None:
+        """Builds the model of the run's own configuration.
+
+        Args:
+            run: The run.
+            width: Pixels.
+            height: Pixels.
+            camera: Name of a view, see `annelid.view.camera.VIEWS_DEG`.
+            fine: Shadows and smooth edges.
+
+        Raises:
+            RunFileError: No postures recorded, they do not fit the model, or no such camera.
+            RenderingUnavailable: No OpenGL back-end works.
+        """
+        import mujoco
+
+        self._angles = view_angles(camera)
+        data = run.data
+        if "qpos" not in data or data.sizes.get("frame", 0) == 0:
+            raise RunFileError(f"{run.path} holds no recorded postures to draw")
+        backend = find_backend()
+        self._run = run
+        self.times_s: NDArray[np.float64] = data["frame_time"].values
+        self._model, self._rings = _model_to_draw(run.config)
+        if data.sizes["coordinate"] != self._model.nq:
+            raise RunFileError(
+                f"{run.path} holds postures of {data.sizes['coordinate']} coordinates, but the body built "
+                f"from its configuration has {self._model.nq}: it was written by another version"
+            )
+        self._posture = mujoco.MjData(self._model)
+        self._ring_width = self._model.tendon_width[self._rings].copy()
+        self._aspect = width / height
+        self._target = data["crossing_position"].values.mean(axis=1)
+        self._target[:, 2] = self._target[0, 2]
+        self._canvas = Canvas(self._model, width, height, backend, fine=fine)
+
+    def __enter__(self) -> Self:
+        self._canvas.__enter__()
+        self._camera, self._option = self._camera_and_option()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._canvas.close()
+
+    def picture(self, frame: int) -> NDArray[np.uint8]:
+        """Draws one recorded frame.
+
+        Args:
+            frame: Index along the run's ``frame`` dimension.
+
+        Returns:
+            Pixels, shape ``(height, width, 3)``.
+        """
+        import mujoco
+
+        model, posture = self._model, self._posture
+        posture.qpos[:] = self._run.data["qpos"].values[frame]
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
+            stage(model, posture)
+        mujoco.mj_flex(model, posture)
+        mujoco.mj_tendon(model, posture)
+        self._color_rings(float(self.times_s[frame]))
+        self._camera.lookat[:] = self._target[frame]
+        return self._canvas.draw(posture, self._camera, self._option, f"{self.times_s[frame]:.2f} s")
+
+    def _color_rings(self, time_s: float) -> None:
+        activation = self._run.data["activation"].sel(time=time_s, method="nearest").values
+        for ring, width, value in zip(self._rings, self._ring_width, activation, strict=True):
+            self._model.tendon_rgba[ring] = (*activation_color(float(value)), 1.0)
+            self._model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * float(value))
+
+    def _camera_and_option(self) -> tuple[mujoco.MjvCamera, mujoco.MjvOption]:
+        import mujoco
+
+        camera = mujoco.MjvCamera()
+        camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        camera.azimuth, camera.elevation = self._angles
+        offsets = self._run.data["crossing_position"].values - self._target[:, None]
+        camera.distance = fitting_distance(offsets.reshape(-1, 3), *self._angles, self._aspect)
+        option = mujoco.MjvOption()
+        mujoco.mjv_defaultOption(option)
+        option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
+        return camera, option
+
+
+def _model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]]:
+    """Compiles the run's model with a picture's lens and light; returns it with its ring tendons' ids."""
+    import mujoco
+
+    from annelid.body import build_spec
+    from annelid.body.actuation import ring_names
+
+    assert isinstance(config.body, WormBody)
+    spec = build_spec(config)
+    visual = spec.visual
+    visual.global_.fovy = FIELD_OF_VIEW_DEG
+    visual.headlight.ambient = [0.5, 0.5, 0.5]
+    visual.headlight.diffuse = [0.25, 0.25, 0.25]
+    visual.headlight.specular = [0.05, 0.05, 0.05]
+    visual.quality.shadowsize = 4096
+    visual.rgba.fog = [*HAZE, 1.0]
+    visual.map.fogstart, visual.map.fogend = 4.0, 12.0
+    for light in spec.lights:
+        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        light.diffuse = [0.4, 0.4, 0.4]
+        light.specular = [0.1, 0.1, 0.1]
+    for tendon in spec.tendons:
+        tendon.rgba = SPRING_RGBA
+    model = spec.compile()
+    names = ring_names(config.body.n_segments, config.body.rings)
+    return model, np.array([model.tendon(name).id for name in names])

@@ -1,0 +1,153 @@
+"""The table that ends a run: our numbers, and beside each the published one where there is one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from annelid.analysis.paper import Published, published
+from annelid.analysis.summary import Summary
+from annelid.config import PlanarBody, field_paths
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from annelid.config import RunConfig
+
+UNKNOWN = "-"
+_ABSENT = object()
+_ONSETS_SHOWN = 12
+
+# Field of the summary: what it is called, what it is multiplied by, digits, unit.
+_ROWS = {
+    "period_s": ("period", 1.0, 3, "s"),
+    "elongation_first_helix_pp_m": ("elongation, first helix, pp", 100.0, 2, "cm"),
+    "elongation_mean_max_m": ("elongation, mean, maximum", 100.0, 2, "cm"),
+    "middle_deficit": ("middle below first, pp", 100.0, 1, "%"),
+    "middle_deficit_mean": ("middle below first, mean", 100.0, 1, "%"),
+    "end_difference": ("last below first, pp", 100.0, 1, "%"),
+    "contraction_force_median_N": ("force contracted, median", 1.0, 2, "N"),
+    "contraction_force_peak_N": ("force contracted, peak", 1.0, 2, "N"),
+    "travel_m": ("travel, centre of mass", 1000.0, 1, "mm"),
+    "travel_path_m": ("travel, forth and back", 1000.0, 1, "mm"),
+    "ring_length_min_m": ("shortest ring", 100.0, 1, "cm"),
+    "edge_strain_max": ("largest edge strain", 100.0, 3, "%"),
+    "pin_gap_max_m": ("largest pin gap", 1000.0, 2, "mm"),
+    "real_time_factor": ("times real time", 1.0, 3, ""),
+}
+
+
+def summary_table(numbers: Summary, config: RunConfig) -> Table:
+    """Lays out a run's summary as a table for the terminal.
+
+    Args:
+        numbers: The summary.
+        config: The configuration it belongs to, which decides what it is compared with.
+
+    Returns:
+        A rich table; rows whose number cannot be told are left out, unless one has been published.
+    """
+    from rich import box
+    from rich.table import Table
+
+    beside = published(config)
+    duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
+    table = Table(
+        title=f"{numbers.name}: {numbers.n_segments} segments{duration}, {numbers.status.replace('_', ' ')}",
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+    )
+    table.add_column("quantity", no_wrap=True)
+    table.add_column("this run", overflow="fold")
+    if beside:
+        table.add_column("published", no_wrap=True)
+    for label, ours, field in _cells(numbers, planar=isinstance(config.body, PlanarBody)):
+        theirs = _theirs(field, beside.get(field))
+        if ours != UNKNOWN or theirs:
+            table.add_row(label, ours, *([theirs] if beside else []))
+    if beside:
+        places = ", ".join(dict.fromkeys(entry.place for entry in beside.values()))
+        table.caption = f"pp: peak to peak. published: {next(iter(beside.values())).paper}, {places}"
+        table.caption_justify = "left"
+    return table
+
+
+def presets_table(presets: Sequence[RunConfig]) -> Table:
+    """Lists configurations: name, summary, segments and simulated time."""
+    from rich.table import Table
+
+    table = Table("preset", "what it is", "segments", "simulated", box=None, pad_edge=False)
+    for config in presets:
+        table.add_row(config.name, config.summary, str(config.body.n_segments), f"{config.duration_s:g} s")
+    return table
+
+
+def field_lines(config: RunConfig) -> list[str]:
+    """Returns one line for every field of a configuration: path, value as TOML writes it, and what it means."""
+    lines = []
+    for path, meaning in field_paths().items():
+        value: Any = config
+        for key in path.split("."):
+            value = getattr(value, key, _ABSENT)
+        if value is not _ABSENT:
+            setting = f"{path} = {_toml(value)}" if value is not None else f"{path} (not set)"
+            lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
+    return lines
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    return f"{value:g}" if isinstance(value, float) else json.dumps(value)
+
+
+def _cells(numbers: Summary, planar: bool) -> list[tuple[str, str, str]]:
+    """Label, our value and field of every row. The planar worm has no helices and one sensor a segment."""
+    cells = [
+        ("segment at onset (s)", _onsets(numbers), "order"),
+        ("wave 1-2-..-N", _wave(numbers), "wave"),
+    ]
+    for field, (label, factor, digits, unit) in _ROWS.items():
+        if planar and ", mean" in label:
+            continue
+        label = label.replace(", first helix", "") if planar else label
+        text = _quantity(getattr(numbers, field), factor, digits, unit)
+        if field == "period_s" and numbers.period_std_s is not None:
+            text += f" (std {numbers.period_std_s:.3f} s)"
+        cells.append((label, text, field))
+    return cells
+
+
+def _onsets(numbers: Summary) -> str:
+    pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
+    shown = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
+    more = f", and {len(pairs) - _ONSETS_SHOWN} more" if len(pairs) > _ONSETS_SHOWN else ""
+    return shown + more if pairs else "none"
+
+
+def _wave(numbers: Summary) -> str:
+    if numbers.wave is None:
+        return "too short to tell"
+    cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
+    return f"yes, {cycles}" if numbers.wave else f"no ({cycles})"
+
+
+def _theirs(field: str, entry: Published | None) -> str:
+    if entry is None:
+        return ""
+    if isinstance(entry.value, str):
+        return entry.value
+    _, factor, digits, unit = _ROWS[field]
+    return _quantity(entry.value, factor, digits, unit)
+
+
+def _quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
+    if value is None:
+        return UNKNOWN
+    if isinstance(value, list | tuple):
+        return f"{' / '.join(_quantity(v, factor, digits, '') for v in value)} {unit}"
+    assert isinstance(value, int | float)
+    return f"{factor * value:.{digits}f} {unit}".rstrip()

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.analysis.elongation import elongation, end_difference, middle_deficit
+from annelid.analysis.forces import contraction_forces
+from annelid.analysis.travel import net_travel, path_travel
+
+
+def test_both_readings_of_a_written_down_stretch() -> None:
+    rest = np.array([[0.07, 0.08], [0.07, 0.08], [0.07, 0.08]])
+    stretch = np.repeat(rest[None], 4, axis=0)
+    stretch[1, 0] += [0.04, 0.02]  # segment 1 lengthens
+    stretch[2, 0, 0] -= 0.01  # its first helix shortens below rest
+    stretch[3, 2] += [0.00, 0.03]  # segment 3 lengthens away from the first helix
+    read = elongation(stretch, rest)
+    np.testing.assert_allclose(read.first_helix_pp_m, [0.05, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(read.mean_max_m, [0.03, 0.0, 0.015], atol=1e-15)
+
+
+def test_deficits_of_the_published_elongations() -> None:
+    # The paper, section 3: 4.20, 2.55, 4.02 cm and 39.4 %, from unrounded lengths.
+    assert middle_deficit([0.0420, 0.0255, 0.0402]) == pytest.approx(0.394, abs=2e-3)
+    assert end_difference([0.0420, 0.0255, 0.0402]) == pytest.approx(0.0445, abs=2e-3)
+    # The robot in the paper, section 4: 37.8 and 22.2 % for its two interior segments, 2.75 % for the ends.
+    robot = [0.0615, 0.0382, 0.0478, 0.0598]
+    assert middle_deficit(robot) == pytest.approx((0.378 + 0.222) / 2, abs=2e-3)
+    assert end_difference(robot) == pytest.approx(0.0275, abs=2e-3)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(1e-3, 1.0), min_size=3, max_size=12), st.floats(0.1, 10.0))
+def test_deficits_do_not_depend_on_the_unit(lengths: list[float], factor: float) -> None:
+    scaled = [factor * length for length in lengths]
+    assert middle_deficit(scaled) == pytest.approx(middle_deficit(lengths), abs=1e-9)
+    assert end_difference(scaled) == pytest.approx(end_difference(lengths), abs=1e-9)
+
+
+def test_deficits_of_a_worm_that_does_not_elongate_cannot_be_told() -> None:
+    assert math.isnan(middle_deficit([0.0, 0.01, 0.0]))
+    assert math.isnan(end_difference([0.0, 0.01, 0.0]))
+
+
+def test_forces_while_contracted_keep_every_sample_of_the_contracted_muscle() -> None:
+    force = np.array([[9.0, 1.0], [2.0, 1.0], [2.0, 7.0]])
+    activation = np.array([[0.9, 0.0], [0.9, 0.5], [0.2, 0.6]])
+    assert sorted(contraction_forces(force, activation)) == [2.0, 7.0, 9.0]
+
+
+def test_net_travel_and_the_way_forth_and_back() -> None:
+    position = [0.1, 0.3, 0.2, 0.0]
+    assert net_travel(position) == pytest.approx(-0.1)
+    assert path_travel(position) == pytest.approx(0.5)
+    assert math.isnan(net_travel([]))

@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic import wave_activation
+
+from annelid.analysis.rhythm import full_cycles, is_wave, onset_times, rhythm, segment_activation
+
+
+def test_onset_is_interpolated_between_samples() -> None:
+    # From 0.2 to 0.8 within a second: half way at 1.5 s.
+    assert onset_times([0.0, 1.0, 2.0, 3.0], [0.0, 0.2, 0.8, 0.1]) == pytest.approx([1.5])
+
+
+def test_contracted_at_the_first_sample_counts_as_an_onset_there() -> None:
+    assert onset_times([0.0, 1.0, 2.0, 3.0], [0.9, 0.1, 0.1, 0.9]) == pytest.approx([0.0, 2.5])
+
+
+def test_touching_the_threshold_from_below_is_one_onset_at_that_sample() -> None:
+    assert onset_times([0.0, 1.0, 2.0], [0.0, 0.5, 1.0]) == pytest.approx([1.0])
+
+
+@settings(deadline=None)
+@given(
+    n_segments=st.integers(3, 12),
+    period_s=st.floats(0.9, 6.0),
+    start_s=st.floats(0.05, 1.0),
+    cycles=st.integers(2, 4),
+)
+def test_a_shifted_and_scaled_wave_gives_its_period_order_and_cycles(
+    n_segments: int, period_s: float, start_s: float, cycles: int
+) -> None:
+    share_s = period_s / n_segments
+    interval_s = 0.0005
+    end_s = start_s + cycles * period_s - 0.5 * share_s
+    time = np.arange(0.0, end_s, interval_s)
+    activation = wave_activation(time, n_segments, period_s, start_s, rise_s=0.02)
+    found = rhythm(time, activation)
+    onsets = start_s + share_s * np.arange(cycles * n_segments)
+    assert found.order == tuple(range(1, n_segments + 1)) * cycles
+    np.testing.assert_allclose(found.onsets_s, onsets, atol=1e-9)
+    assert found.period_s == pytest.approx(period_s, abs=1e-9)
+    assert found.period_std_s == pytest.approx(0.0, abs=1e-9)
+    assert found.wave is True
+    assert found.full_cycles == cycles
+
+
+@settings(deadline=None)
+@given(gain=st.floats(0.2, 5.0), shift_s=st.floats(-100.0, 100.0))
+def test_stretching_and_shifting_time_stretches_and_shifts_the_rhythm(gain: float, shift_s: float) -> None:
+    time = np.arange(0.0, 6.0, 0.005)
+    activation = wave_activation(time, 3, 1.5, 0.2)
+    plain, moved = rhythm(time, activation), rhythm(shift_s + gain * time, activation)
+    assert moved.order == plain.order
+    assert plain.period_s is not None
+    assert moved.period_s == pytest.approx(gain * plain.period_s)
+    np.testing.assert_allclose(moved.onsets_s, shift_s + gain * np.array(plain.onsets_s))
+
+
+def pulses(time: np.ndarray, *onsets: float) -> np.ndarray:
+    """Contracted for half a second from each onset on."""
+    return sum((((time >= t) & (time < t + 0.5)).astype(float) for t in onsets), np.zeros_like(time))
+
+
+def test_interval_from_the_initial_state_does_not_count_where_there_is_another() -> None:
+    time = np.linspace(0.0, 10.0, 10_001)
+    found = rhythm(time, np.stack([pulses(time, 0.0, 1.0, 4.0), pulses(time, 2.0), pulses(time, 3.0)], axis=1))
+    assert found.period_s == pytest.approx(3.0, abs=1e-3)
+    alone = rhythm(time, np.stack([pulses(time, 0.0, 2.4), pulses(time, 1.0), pulses(time, 1.7)], axis=1))
+    assert alone.period_s == pytest.approx(2.4, abs=1e-3)
+    assert alone.period_std_s is None
+
+
+def test_first_activation_recorded_one_sample_late_is_still_the_initial_state() -> None:
+    # A file whose first sample was taken before the controller acted.
+    time = np.linspace(0.0, 10.0, 2001)
+    first = pulses(time, 0.0, 1.0, 4.0)
+    first[0] = 0.0
+    found = rhythm(time, np.stack([first, pulses(time, 2.0), pulses(time, 3.0)], axis=1))
+    assert found.onsets_s[0] == pytest.approx(0.0025)
+    assert found.period_s == pytest.approx(3.0, abs=1e-9)
+
+
+def test_a_silent_worm_has_no_rhythm() -> None:
+    found = rhythm(np.arange(10) * 0.1, np.zeros((10, 3)))
+    assert (found.order, found.onsets_s, found.period_s, found.wave, found.full_cycles) == ((), (), None, None, 0)
+
+
+@pytest.mark.parametrize(
+    ("order", "wave", "cycles"),
+    [
+        ((1, 2, 3, 1, 2, 3), True, 2),
+        ((1, 2, 3, 1, 2), True, 1),
+        ((1, 2), None, 0),
+        ((2, 3, 1, 2, 3), False, 1),
+        ((1, 3, 2, 1, 3, 2), False, 0),
+        ((1, 2, 3, 3, 1, 2, 3), False, 2),
+    ],
+)
+def test_wave_and_cycles_of_an_order(order: tuple[int, ...], wave: bool | None, cycles: int) -> None:
+    assert is_wave(order, 3) is wave
+    assert full_cycles(order, 3) == cycles
+
+
+def test_half_rings_average_to_their_segment() -> None:
+    halves = np.array([[1.0, 0.0, 0.2, 0.4, 1.0, 1.0]])
+    np.testing.assert_allclose(segment_activation(halves, 3), [[0.5, 0.3, 1.0]])

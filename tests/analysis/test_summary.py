@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
+
+from annelid.analysis import Summary, summary
+from annelid.analysis.paper import published
+from annelid.config import check_config
+from annelid.simulation.runfile import Run
+
+PROMISED = {
+    "order", "onsets_s", "period_s", "elongation_first_helix_pp_m", "elongation_mean_max_m", "middle_deficit",
+    "contraction_force_median_N", "contraction_force_peak_N", "travel_m", "real_time_factor", "name", "status",
+    "duration_s", "wave", "full_cycles", "ring_length_min_m", "edge_strain_max", "pin_gap_max_m",
+}  # fmt: skip
+
+
+def run_of(data: xr.Dataset, **tree: Any) -> Run:
+    config = check_config({"name": "riddle2023"} | tree)
+    return Run(Path("run.nc"), data, config, "complete", "")
+
+
+def holds_nan(value: object) -> bool:
+    if isinstance(value, list):
+        return any(holds_nan(item) for item in value)
+    return isinstance(value, float) and not math.isfinite(value)
+
+
+def test_numbers_of_a_written_down_run() -> None:
+    # 6 s of a wave of 2.4 s: onsets every 0.8 s from 0 to 5.6 s.
+    numbers = summary(run_of(wave_data()))
+    assert numbers.order == [1, 2, 3, 1, 2, 3, 1, 2]
+    assert numbers.onsets_s == pytest.approx([0.8 * k for k in range(8)])
+    assert numbers.period_s == pytest.approx(2.4)
+    assert numbers.wave is True
+    assert numbers.full_cycles == 2
+    assert numbers.duration_s == pytest.approx(6.0)
+    assert numbers.real_time_factor == pytest.approx(0.5)
+    assert numbers.elongation_mean_max_m == pytest.approx(PEAKS_M)
+    assert numbers.elongation_first_helix_pp_m == pytest.approx([FIRST_HELIX_EXCESS * p for p in PEAKS_M])
+    assert numbers.middle_deficit == pytest.approx(0.5)
+    assert numbers.middle_deficit_mean == pytest.approx(0.5)
+    assert numbers.end_difference == pytest.approx(0.25)
+    assert numbers.contraction_force_median_N == HOLDING_FORCE_N
+    assert numbers.travel_m == pytest.approx(-0.06)
+    assert numbers.travel_path_m == pytest.approx(0.06)
+    assert numbers.ring_length_min_m == pytest.approx(0.36)
+    assert numbers.edge_strain_max == pytest.approx(0.001)
+    assert numbers.pin_gap_max_m == pytest.approx(0.002)
+
+
+def test_json_has_the_promised_keys_and_reads_back_the_same() -> None:
+    numbers = summary(run_of(wave_data()))
+    read = json.loads(numbers.to_json())
+    assert set(read) >= PROMISED
+    assert Summary(**read) == numbers
+
+
+def test_what_cannot_be_told_is_null_and_never_nan() -> None:
+    data = wave_data(duration_s=0.1).drop_vars(["muscle_force", "edge_strain", "pin_gap"])
+    data["center_of_mass"] = data["center_of_mass"] * np.nan
+    data["activation"] = data["activation"] * 0
+    data["stretch_length"] = data["stretch_length"] * 0 + 0.075
+    data["wall_time"] = data["wall_time"] * 0
+    numbers = summary(run_of(data))
+    read = json.loads(numbers.to_json(), parse_constant=lambda name: pytest.fail(f"{name} in the JSON"))
+    for key in ("period_s", "wave", "middle_deficit", "contraction_force_median_N", "travel_m", "edge_strain_max"):
+        assert read[key] is None, key
+    assert read["real_time_factor"] is None
+    assert not any(holds_nan(getattr(numbers, field.name)) for field in fields(numbers))
+
+
+def test_an_empty_run_summarises() -> None:
+    numbers = summary(run_of(wave_data().isel(time=slice(0, 0))))
+    assert numbers.order == []
+    assert numbers.duration_s is None
+    json.loads(numbers.to_json())
+
+
+def test_half_rings_add_up_to_a_ring_and_share_a_segment() -> None:
+    data = wave_data()
+    doubled = data.isel(muscle=[0, 0, 1, 1, 2, 2])
+    doubled["ring_length"] = doubled["ring_length"] / 2
+    whole, halves = summary(run_of(data)), summary(run_of(doubled))
+    assert halves.ring_length_min_m == pytest.approx(whole.ring_length_min_m)
+    assert halves.onsets_s == whole.onsets_s
+
+
+def test_published_numbers_stand_beside_the_papers_worm_only() -> None:
+    paper = published(check_config({"name": "riddle2023-rods"}))
+    assert paper["elongation_first_helix_pp_m"].value == (0.0420, 0.0255, 0.0402)
+    assert not published(check_config({"name": "riddle2023", "body": {"mesh": {"n_segments": 4}}}))
+    assert not published(check_config({"name": "mine"}))
+
+
+@pytest.mark.parametrize(
+    ("n_segments", "tau_ms", "gain", "period_s"),
+    [
+        (3, 300.0, 1.3, 2.625),
+        (6, 300.0, 1.3, 5.25),
+        (6, 100.0, 3.6, 2.248),
+        (4, 300.0, 1.3, None),
+        (3, 200.0, 1.3, None),
+    ],
+)
+def test_planar_periods(n_segments: int, tau_ms: float, gain: float, period_s: float | None) -> None:
+    config = check_config(
+        {
+            "name": "riddle2022-planar",
+            "body": {"kind": "riddle2022", "n_segments": n_segments, "gain": gain},
+            "controller": {"gate_time_constant_ms": tau_ms},
+        }
+    )
+    entry = published(config).get("period_s")
+    assert (entry.value if entry else None) == period_s

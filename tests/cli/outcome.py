@@ -1,0 +1,23 @@
+"""What a command printed and how it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+
+class Outcome:
+    """What a command printed and how it ended."""
+
+    def __init__(self, exit_code: int, out: str, err: str) -> None:
+        self.exit_code, self.out, self.err = exit_code, out, err
+
+    def sentence(self) -> str:
+        """The one line on stderr that a user error ends with; fails if there is anything else."""
+        assert "Traceback" not in self.out + self.err
+        lines = self.err.splitlines()
+        assert len(lines) == 1, self.err
+        assert lines[0].startswith("annelid: ")
+        return lines[0].removeprefix("annelid: ")
+
+
+Command = Callable[..., Outcome]

@@ -1,0 +1,142 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from outcome import Command
+
+from annelid.config import field_paths, preset_names
+from annelid.simulation.runfile import open_run
+
+
+def test_run_ends_with_table_file_and_pictures(annelid: Command) -> None:
+    done = annelid("run", "riddle2022-planar", "--duration", "0.5", "--segments", "4", "--seed", "7")
+    assert done.exit_code == 0, done.err
+    folder = Path("runs/riddle2022-planar-001")
+    assert sorted(p.name for p in folder.iterdir()) == ["figure7.png", "frame.png", "run.nc", "video.mp4"]
+    assert all(str(folder / name) in done.out for name in ("run.nc", "figure7.png", "frame.png", "video.mp4"))
+    assert "riddle2022-planar: 4 segments, 0.5 s, complete" in done.out
+    config = open_run(folder).config
+    assert (config.body.n_segments, config.duration_s, config.seed) == (4, 0.5, 7)
+
+
+def test_runs_without_a_folder_are_numbered(annelid: Command) -> None:
+    assert annelid("run", "riddle2022-planar", "--duration", "0.1", "--no-video", "-q").exit_code == 0
+    Path("runs/riddle2022-planar-007").mkdir()
+    assert annelid("run", "riddle2022-planar", "--duration", "0.1", "--no-video", "-q").exit_code == 0
+    assert sorted(p.name[-3:] for p in Path("runs").iterdir()) == ["001", "007", "008"]
+
+
+def test_quiet_prints_paths_only(annelid: Command) -> None:
+    done = annelid("run", "riddle2022-planar", "--duration", "0.1", "--no-video", "-q", "--out", "here")
+    assert done.out.split() == ["here/run.nc", "here/figure7.png", "here/frame.png"]
+    assert done.err == ""
+
+
+def test_a_file_of_ones_own_runs_under_its_name(annelid: Command) -> None:
+    Path("mine.toml").write_text('extends = "riddle2022-planar"\nname = "mine"\nduration_s = 0.2\n')
+    assert annelid("run", "mine.toml", "--no-video", "-q", "--set", "body.gain=1.9").exit_code == 0
+    config = open_run("runs/mine-001").config
+    assert (config.name, config.duration_s) == ("mine", 0.2)
+    assert config.body.model_dump()["gain"] == 1.9
+
+
+def test_resume_goes_on_bit_for_bit(annelid: Command) -> None:
+    common = ("--no-video", "-q")
+    annelid("run", "riddle2022-planar", "--duration", "1", *common, "--out", "whole")
+    annelid("run", "riddle2022-planar", "--duration", "0.4", *common, "--out", "first")
+    done = annelid("run", "--resume", "first", "--duration", "1", *common, "--out", "second")
+    assert done.exit_code == 0, done.err
+    whole, second = open_run("whole").data, open_run("second").data
+    assert float(second["time"][0]) > 0.39
+    for name in ("potential", "stretch_length", "activation"):
+        assert whole[name].isel(time=slice(-second.sizes["time"], None)).equals(second[name]), name
+
+
+def test_resume_takes_no_preset(annelid: Command, finished: Path) -> None:
+    done = annelid("run", "riddle2023", "--resume", finished)
+    assert done.exit_code == 2
+    assert "--resume continues a run as it is" in done.err
+
+
+def test_a_missing_back_end_costs_the_pictures_and_not_the_run(
+    annelid: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from annelid.view import gl
+
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(gl, "works", lambda backend: False)
+    done = annelid("run", "riddle2023-rods", "--duration", "0.05", "--out", "rods")
+    assert done.exit_code == 0
+    assert sorted(p.name for p in Path("rods").iterdir()) == ["figure7.png", "run.nc"]
+    assert "no OpenGL back-end works here" in done.sentence()
+
+
+def test_show_json_is_json_and_nothing_else(annelid: Command, finished: Path) -> None:
+    read = json.loads(annelid("show", finished, "--json").out)
+    assert read["name"] == "riddle2022-planar"
+    assert read["order"][0] == 1
+    assert len(read["order"]) == len(read["onsets_s"])
+    assert read["travel_m"] is None
+
+
+def test_show_prints_the_published_period_beside_ours(annelid: Command, finished: Path) -> None:
+    assert "2.625 s" in annelid("show", finished / "run.nc").out
+
+
+def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: Path) -> None:
+    assert annelid("plot", finished, "-o", "f.svg").exit_code == 0
+    assert Path("f.svg").read_text().lstrip().startswith("<?xml")
+    done = annelid("render", finished, "--time", "0.5", "-o", "frame.jpg", "--video", "v.mp4", "--fps", "5")
+    assert done.exit_code == 0, done.err
+    assert done.out.split() == ["frame.jpg", "v.mp4"]
+    assert Path("v.mp4").stat().st_size > 1000
+
+
+def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> None:
+    import mujoco
+    import numpy as np
+
+    done = annelid("build", "riddle2023-rods", "-o", "worm.xml", "--segments", "4")
+    assert done.exit_code == 0, done.err
+    model = mujoco.MjModel.from_xml_path("worm.xml")
+    assert model.nu == 4
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 3)
+    assert np.all(np.isfinite(data.qpos))
+
+
+def test_presets_lists_prints_and_explains(annelid: Command) -> None:
+    listing = annelid("presets").out
+    assert all(name in listing for name in preset_names())
+    text = annelid("presets", "riddle2023").out
+    Path("copy.toml").write_text(text)
+    assert annelid("run", "copy.toml", "--set", "duration_s=-1").sentence().startswith("duration_s = -1")
+    fields = annelid("presets", "riddle2022-planar", "--fields").out
+    assert "body.gain = 1.3" in fields
+    assert "body.mesh" not in fields
+    meaning = field_paths()["arena.friction"]
+    assert meaning in annelid("presets", "--fields").out
+
+
+def test_doctor_ends_well(annelid: Command) -> None:
+    done = annelid("doctor")
+    assert done.exit_code == 0
+    assert any(line.split()[:2] == ["ok", "mujoco"] for line in done.out.splitlines())
+
+
+@pytest.mark.parametrize("command", ["run", "build", "show", "plot", "render", "presets", "doctor"])
+def test_every_command_teaches_by_example(annelid: Command, command: str) -> None:
+    done = annelid(command, "--help")
+    assert done.exit_code == 0
+    assert f"\n  annelid {command}" in done.out
+
+
+def test_help_and_version_come_from_the_module_as_well() -> None:
+    for option, says in (("--help", "annelid run"), ("--version", "annelid 0.")):
+        done = subprocess.run([sys.executable, "-m", "annelid", option], capture_output=True, text=True, check=False)
+        assert done.returncode == 0
+        assert says in done.stdout

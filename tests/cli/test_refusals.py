@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from outcome import Command
+
+from annelid.errors import SimulationStopped
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("run", "riddle2032"), "did you mean 'riddle2023'"),
+        (("run", "--set", "arena.fricton=1"), "did you mean"),
+        (("run", "--set", "arena.friction"), "not of the form field=value"),
+        (("run", "--set", "body.mesh.n_helices=7"), "must be even"),
+        (("run", "--segments", "2"), "at least 3"),
+        (("run", "--set", "body.mesh.radius_m=0"), "body.mesh.radius_m = 0"),
+        (("run", "--set", "clock.physics_timestep_s=0.0015"), "integer multiple"),
+        (("run", "--duration", "-1"), "duration_s = -1"),
+        (("run", "--duration", "nan"), "duration_s"),
+        (("run", "nothere.toml"), "cannot read the configuration file nothere.toml"),
+        (("run", "--resume", "nothere"), "there is no run file nothere"),
+        (("build", "riddle2022-planar"), "has no MuJoCo model"),
+        (("build", "riddle2023-rods", "-o", "no/such/worm.xml"), "no/such/worm.xml: No such file or directory"),
+        (("show", "nothere"), "there is no run file nothere"),
+        (("plot", "nothere"), "there is no run file nothere"),
+        (("render", "nothere", "--time", "1"), "there is no run file nothere"),
+        (("presets", "riddle2032"), "did you mean 'riddle2023'"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
+    annelid: Command, arguments: tuple[str, ...], says: str
+) -> None:
+    done = annelid(*arguments)
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not [path for path in Path().rglob("*") if path.is_file()]
+    assert not list(Path().glob("runs/*")), "no empty numbered folder stays behind"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "--bogus"),
+        ("run", "--duration", "long"),
+        ("crawl",),
+        ("render", "somewhere"),
+        ("render", "somewhere", "-o", "frame.png", "--video", "v.mp4"),
+    ],
+)
+def test_wrong_usage_is_exit_2_without_a_traceback(annelid: Command, arguments: tuple[str, ...]) -> None:
+    done = annelid(*arguments)
+    assert done.exit_code == 2
+    assert "Usage:" in done.err
+    assert "Traceback" not in done.err
+
+
+def test_a_used_output_folder_is_refused_and_left_alone(annelid: Command) -> None:
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("mine")
+    done = annelid("run", "riddle2022-planar", "--duration", "0.1", "--out", "out")
+    assert done.exit_code == 2
+    assert "out is not empty" in done.sentence()
+    assert [path.name for path in Path("out").iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize("arguments", [("plot", "-o"), ("render", "--time", "0.5", "-o"), ("render", "--video")])
+def test_existing_pictures_are_kept_unless_forced(annelid: Command, finished: Path, arguments: tuple[str, ...]) -> None:
+    target = Path("v.mp4" if "--video" in arguments else "p.png")
+    target.write_text("mine")
+    command = (arguments[0], finished, *arguments[1:], target)
+    done = annelid(*command)
+    assert done.exit_code == 2
+    assert f"{target} exists" in done.sentence()
+    assert "--force" in done.err
+    assert target.read_text() == "mine"
+    assert annelid(*command, "--force").exit_code == 0
+    assert target.stat().st_size > 1000
+
+
+def test_existing_models_are_kept_unless_forced(annelid: Command) -> None:
+    Path("worm.xml").write_text("mine")
+    assert "worm.xml exists" in annelid("build", "riddle2023-rods").sentence()
+    assert Path("worm.xml").read_text() == "mine"
+    assert annelid("build", "riddle2023-rods", "--force").exit_code == 0
+    assert "<mujoco" in Path("worm.xml").read_text()
+
+
+def test_the_runs_own_pictures_are_not_replaced_by_plot(annelid: Command, finished: Path) -> None:
+    done = annelid("plot", finished)
+    assert done.exit_code == 2
+    assert "figure7.png exists" in done.sentence()
+
+
+def test_a_foreign_and_a_truncated_file_are_refused(annelid: Command, finished: Path) -> None:
+    Path("foreign.nc").write_text("not netCDF")
+    Path("half.nc").write_bytes((finished / "run.nc").read_bytes()[:5000])
+    for name in ("foreign.nc", "half.nc"):
+        for command in (("show", name), ("plot", name), ("render", name, "--time", "0")):
+            done = annelid(*command)
+            assert done.exit_code == 2
+            assert name in done.sentence()
+
+
+def test_a_time_that_was_not_recorded_is_refused(annelid: Command, finished: Path) -> None:
+    done = annelid("render", finished, "--time", "7", "-o", "late.png")
+    assert done.exit_code == 2
+    assert "recorded from 0 to 1 s" in done.sentence()
+    assert not Path("late.png").exists()
+
+
+def test_a_back_end_that_the_engine_does_not_know_is_a_sentence(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "annelid", "build", "riddle2023-rods"],
+        cwd=tmp_path,
+        env={**os.environ, "MUJOCO_GL": "vulkan"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("annelid: invalid value for environment variable MUJOCO_GL: vulkan")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_full_disk_is_a_sentence(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "figure.png")
+
+    monkeypatch.setattr("annelid.view.plots.figure7", full)
+    done = annelid("plot", finished, "-o", "figure.png")
+    assert done.exit_code == 2
+    assert done.sentence() == f"figure.png: {os.strerror(errno.ENOSPC)}"
+
+
+def test_a_run_stopped_by_its_guard_shows_what_it_has_and_exits_3(annelid: Command) -> None:
+    done = annelid("run", "riddle2023-rods", "--duration", "1", "--set", "guard.kinetic_energy_J=1e-9", "--out", "g")
+    assert done.exit_code == 3
+    assert "g/run.nc" in done.sentence()
+    assert "stopped by guard" in done.out
+    assert [path.name for path in Path("g").iterdir()] == ["run.nc"]
+
+
+def test_a_guard_that_stops_before_any_file_is_still_a_sentence(
+    annelid: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise SimulationStopped("the ring collapsed")
+
+    monkeypatch.setattr("annelid.simulation.loop.simulate", stop)
+    done = annelid("run", "riddle2022-planar")
+    assert done.exit_code == 3
+    assert done.sentence() == "the ring collapsed"
+    assert list(Path("runs").iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
+def test_ctrl_c_prints_what_was_computed_and_exits_130(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "annelid", "run", "riddle2022-planar", "--duration", "3000", "--out", "long"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            for _ in range(600):
+                if (tmp_path / "long" / "run.nc").exists() or process.poll() is not None:
+                    break
+                time.sleep(0.05)
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    assert "interrupted: what was computed is in long/run.nc" in err
+    assert "interrupted" in out.splitlines()[0]

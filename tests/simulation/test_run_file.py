@@ -1,0 +1,361 @@
+from __future__ import annotations
+
+import errno
+import io
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from toy import N, SavedToyPlant, ToyController, ToyPlant, toy_config
+
+from annelid.errors import ConfigError, RunFileError
+from annelid.protocols import Recordable, Signal
+from annelid.simulation import Run, container, loop, open_run, simulate
+from annelid.simulation.container import RawWriter, Variable
+
+
+def toy_run(out: Path, **overrides: object) -> Run:
+    return simulate(toy_config(**overrides), out, plant=SavedToyPlant(), controller=ToyController())
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return toy_run(tmp_path_factory.mktemp("toy") / "run")
+
+
+def test_plain_xarray_opens_it_and_every_variable_has_units_and_a_name(run: Run) -> None:
+    with xarray.open_dataset(run.path, engine="h5netcdf") as data:
+        assert {"potential", "activation", "stretch_length", "wall_time", "stretch_rest_length"} <= set(data)
+        for name, variable in data.variables.items():
+            assert variable.attrs.get("units"), name
+            assert variable.attrs.get("long_name"), name
+        assert int(data["samples_written"]) == data.sizes["time"] == 41
+        assert data["potential"].dims == ("time", "neuron")
+        assert list(data["neuron"].values) == [f"contraction_{i}" for i in (1, 2, 3)]
+        assert list(data["segment"].values) == [1, 2, 3]
+        assert "frame_time" in data["qpos"].coords
+        flags = data["status_code"].attrs
+        assert dict(zip(flags["flag_meanings"].split(), flags["flag_values"], strict=True))["complete"] == int(
+            data["status_code"]
+        )
+        assert data["stretch_rest_length"].values == pytest.approx(0.1)
+
+
+def test_every_dimension_is_a_scale_as_netcdf4_asks(run: Run) -> None:
+    with h5py.File(run.path, "r") as file:
+        scales = {name for name, item in file.items() if isinstance(item, h5py.Dataset) and item.is_scale}
+        assert {"time", "frame", "neuron", "segment", "muscle", "coordinate"} <= scales
+        potential = file["potential"]
+        assert isinstance(potential, h5py.Dataset)
+        assert [dim[0].name for dim in potential.dims] == ["/time", "/neuron"]
+        assert potential.chunks is None
+
+
+def test_attributes_say_how_to_do_it_again(run: Run) -> None:
+    attrs = run.data.attrs
+    assert json.loads(attrs["config"]) == json.loads(toy_config().model_dump_json())
+    assert run.config == toy_config()
+    assert attrs["numpy_version"] == np.__version__
+    assert attrs["seed"] == 0
+    assert attrs["total_mass_kg"] == pytest.approx(0.3)
+    for name in ("annelid_version", "mujoco_version", "python_version", "platform", "created"):
+        assert attrs[name], name
+    assert os.uname().nodename not in attrs["platform"].split()
+
+
+def test_a_seed_beyond_64_bits_is_kept(tmp_path: Path) -> None:
+    assert int(toy_run(tmp_path, seed=2**70).data.attrs["seed"]) == 2**70
+
+
+def test_folder_and_file_open_alike(run: Run) -> None:
+    for path in (run.path, run.path.parent, str(run.path.parent)):
+        again = open_run(path)
+        assert again.path == run.path
+        assert again.status == "complete"
+        assert again.message == ""
+        xarray.testing.assert_identical(again.data, run.data)
+
+
+def test_missing_foreign_and_damaged_files_are_named(run: Run, tmp_path: Path) -> None:
+    def refused(path: Path) -> str:
+        with pytest.raises(RunFileError) as caught:
+            open_run(path)
+        sentence = str(caught.value)
+        assert "\n" not in sentence
+        return sentence
+
+    assert "there is no run file" in refused(tmp_path / "nowhere")
+    assert "holds no run.nc" in refused(tmp_path)
+    text = tmp_path / "notes.txt"
+    text.write_text("time,potential\n0,1\n")
+    assert "not a netCDF-4 file" in refused(text)
+    assert "there is no run file" in refused(text / "run.nc")
+    empty = tmp_path / "empty.nc"
+    empty.touch()
+    assert "is empty" in refused(empty)
+    foreign = tmp_path / "foreign.nc"
+    xarray.Dataset({"t": ("x", [1.0, 2.0])}).to_netcdf(foreign, engine="h5netcdf")
+    assert "not an annelid run" in refused(foreign)
+    plain = tmp_path / "plain.h5"
+    with h5py.File(plain, "w") as file:
+        file["a"] = 1
+    assert "not an annelid run" in refused(plain)
+    future = tmp_path / "future.nc"
+    shutil.copy(run.path, future)
+    with h5py.File(future, "r+") as file:
+        file.attrs["config"] = '{"legs": 6}'
+        file.attrs["annelid_version"] = "99.0"
+    assert "annelid 99.0" in refused(future)
+
+
+@pytest.mark.parametrize(("name", "value"), [("samples_written", -3), ("frames_written", 10**6), ("status_code", -1)])
+def test_impossible_bookkeeping_is_damage(run: Run, tmp_path: Path, name: str, value: int) -> None:
+    copy = shutil.copy(run.path, tmp_path / "copy.nc")
+    with h5py.File(copy, "r+") as file:
+        file[name][()] = value  # type: ignore[index]
+    with pytest.raises(RunFileError, match="is damaged"):
+        open_run(copy)
+
+
+@given(share=st.floats(0.0, 0.999))
+@settings(max_examples=25, deadline=None)
+def test_a_truncated_file_is_refused_wherever_it_is_cut(run: Run, share: float) -> None:
+    content = run.path.read_bytes()
+    cut = run.path.with_name("cut.nc")
+    cut.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(RunFileError, match=r"truncated|empty|not a netCDF-4 file"):
+        open_run(cut)
+
+
+@given(where=st.floats(0.0, 1.0), junk=st.binary(min_size=1, max_size=64))
+@settings(max_examples=25, deadline=None, derandomize=True)
+def test_damage_gives_a_run_or_a_sentence(run: Run, where: float, junk: bytes) -> None:
+    content = bytearray(run.path.read_bytes())
+    # Metadata come first in the file; damage there is what a reader can stumble over.
+    start = int(where * min(len(content), 20_000))
+    content[start : start + len(junk)] = junk
+    broken = run.path.with_name("broken.nc")
+    broken.write_bytes(content)
+    with suppress(RunFileError):
+        assert open_run(broken).data.sizes["time"] <= 41
+
+
+def test_a_folder_in_use_is_refused_and_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ConfigError, match="not empty"):
+        toy_run(tmp_path)
+    with pytest.raises(ConfigError, match="is a file"):
+        toy_run(tmp_path / "notes.txt")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["notes.txt"]
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+def test_overwriting_replaces_the_run_and_nothing_else(tmp_path: Path) -> None:
+    toy_run(tmp_path, seed=1)
+    (tmp_path / "notes.txt").write_text("mine")
+    simulate(toy_config(seed=2), tmp_path, plant=ToyPlant(), controller=ToyController(), overwrite=True)
+    assert open_run(tmp_path).config.seed == 2
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["notes.txt", "run.nc"]
+
+
+def test_no_room_is_said_in_megabytes_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: shutil._ntuple_diskusage(10**9, 10**9 - 200_000, 200_000))
+    with pytest.raises(RunFileError, match=r"needs \d+\.\d MB and 0\.2 MB are free"):
+        toy_run(tmp_path / "deep" / "er")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EROFS])
+def test_a_disk_that_refuses_the_layout_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
+) -> None:
+    def refuse(draft: Path, needed: int) -> None:
+        draft.write_bytes(b"half")
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(container, "_try_room", refuse)
+    with pytest.raises(RunFileError, match=os.strerror(code)):
+        toy_run(tmp_path / "deep" / "er")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_way_of_the_folder_is_named(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(RunFileError, match="cannot"):
+        toy_run(tmp_path / "notes.txt" / "run")
+
+
+def test_an_overwritten_run_survives_a_failed_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    old = toy_run(tmp_path).path.read_bytes()
+
+    def refuse(*arguments: object) -> dict[str, int]:
+        raise RuntimeError("file write failed\nwith a long tale")
+
+    monkeypatch.setattr(container, "_lay_out", refuse)
+    with pytest.raises(RunFileError, match=r"file write failed$"):
+        simulate(toy_config(), tmp_path, plant=ToyPlant(), controller=ToyController(), overwrite=True)
+    assert [(entry.name, entry.read_bytes()) for entry in tmp_path.iterdir()] == [("run.nc", old)]
+
+
+@pytest.mark.parametrize("at_write", [20, 60, 100])
+def test_a_disk_that_fills_up_ends_the_run_with_a_readable_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_write: int
+) -> None:
+    """Every write from the given one on fails with ENOSPC after taking half of its bytes."""
+    monkeypatch.setattr(loop, "FLUSH_INTERVAL_S", 0.0)
+    monkeypatch.setattr(container, "open", lambda *args, **options: FullDisk(*args, **options), raising=False)
+
+    class FullDisk:
+        def __init__(self, path: Path, mode: str, buffering: int = -1) -> None:
+            self._file = open(path, mode, buffering=buffering)  # noqa: SIM115
+            self._count = 0
+            self._limited = mode == "r+b"
+
+        def write(self, content: memoryview) -> int:
+            self._count += self._limited
+            if self._count == at_write and len(content) > 1:
+                return self._file.write(content[: len(content) // 2])
+            if self._count > at_write:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return self._file.write(content)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self._file, name)
+
+        def __enter__(self) -> FullDisk:
+            return self
+
+        def __exit__(self, *error: object) -> None:
+            self._file.close()
+
+    with pytest.raises(RunFileError, match="No space left on device; what was written before is kept"):
+        toy_run(tmp_path)
+    run = open_run(tmp_path)
+    # Not even the status could be written here.
+    assert run.status == "running_or_killed"
+    assert 0 < run.data.sizes["time"] < 41
+    np.testing.assert_array_equal(run.data["control_steps"], 5 * np.arange(run.data.sizes["time"]))
+    assert not run.data["stretch_length"].isnull().any()
+
+
+def test_a_disk_that_recovers_for_the_last_words_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loop, "FLUSH_INTERVAL_S", 0.0)
+    whole = RawWriter.write
+
+    def write(self: RawWriter, name: str, content: Any, skip_bytes: int = 0) -> None:
+        if name == "potential" and skip_bytes > 600:
+            raise RunFileError("cannot write the run file: No space left on device")
+        whole(self, name, content, skip_bytes)
+
+    monkeypatch.setattr(RawWriter, "write", write)
+    with pytest.raises(RunFileError, match="No space left"):
+        toy_run(tmp_path)
+    run = open_run(tmp_path)
+    assert run.status == "disk_failure"
+    assert "No space left on device" in run.message
+    # Rows of 3 numbers, 24 bytes each: the row that starts after byte 600 is the 27th.
+    assert run.data.sizes["time"] == 26
+
+
+def test_long_messages_are_cut_between_characters(tmp_path: Path) -> None:
+    class Wordy(SavedToyPlant):
+        def alarm(self) -> str | None:
+            return "ü" * 600
+
+    with pytest.raises(Exception, match="üü"):
+        simulate(toy_config(), tmp_path, plant=Wordy(), controller=ToyController())
+    message = open_run(tmp_path).message
+    assert 500 <= len(message.encode()) <= 512
+    assert message.endswith("ü")
+
+
+def test_a_name_recorded_twice_is_refused(tmp_path: Path) -> None:
+    class Twice(SavedToyPlant):
+        def recordable(self) -> Recordable:
+            return Recordable((Signal("potential", ("neuron",), (N,), "mV", "potential"),))
+
+    with pytest.raises(ValueError, match="recorded more than once: potential"):
+        simulate(toy_config(), tmp_path / "a", plant=Twice(), controller=ToyController())
+
+
+def test_sizes_that_disagree_are_refused(tmp_path: Path) -> None:
+    class Wide(SavedToyPlant):
+        def recordable(self) -> Recordable:
+            return Recordable((Signal("hunger", ("neuron",), (N + 1,), "1", "hunger"),))
+
+    with pytest.raises(ValueError, match="'potential' has 3 along 'neuron', others have 4"):
+        simulate(toy_config(), tmp_path / "a", plant=Wide(), controller=ToyController())
+
+
+def test_a_signal_that_is_named_but_not_read_is_refused(tmp_path: Path) -> None:
+    class Silent(SavedToyPlant):
+        def read(self, frame: bool) -> Mapping[str, Any]:
+            return {} if frame else {"stretch_length": 0.0, "control_steps": 0.0}
+
+    with pytest.raises(ValueError, match="'kinetic_energy'"):
+        simulate(toy_config(), tmp_path / "a", plant=Silent(), controller=ToyController())
+
+
+def test_a_disk_that_takes_a_few_bytes_at_a_time_gets_them_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Slow(io.FileIO):
+        def write(self, content: Any) -> int:
+            return super().write(bytes(content[:11]))
+
+    def opened(path: Path, mode: str, buffering: int = -1) -> Any:
+        return Slow(path, mode) if (mode, buffering) == ("r+b", 0) else open(path, mode, buffering)
+
+    monkeypatch.setattr(container, "open", opened, raising=False)
+    slow = toy_run(tmp_path / "slow")
+    monkeypatch.undo()
+    fast = toy_run(tmp_path / "fast")
+    assert slow.status == "complete"
+    for name in ("potential", "stretch_length", "qpos", "activation"):
+        np.testing.assert_array_equal(slow.data[name], fast.data[name])
+
+
+@given(
+    lengths=st.lists(st.integers(1, 40), min_size=1, max_size=5),
+    kinds=st.lists(st.sampled_from(["<f8", "<i8", "u1"]), min_size=1, max_size=5),
+)
+@settings(max_examples=12, deadline=None)
+def test_what_is_written_raw_is_what_xarray_reads(
+    tmp_path_factory: pytest.TempPathFactory, lengths: Sequence[int], kinds: Sequence[str]
+) -> None:
+    path = tmp_path_factory.mktemp("raw") / "a.nc"
+    sizes = {f"d{i}": length for i, length in enumerate(lengths)}
+    dims = tuple(sizes)[:3]
+    variables = [Variable(f"v{i}", dims, "1", "numbers", kind) for i, kind in enumerate(kinds)]
+    variables.append(Variable("counter", (), "1", "scalar", "<i8"))
+    offsets = container.create(path, sizes, variables, {"title": "a"})
+    assert all(offset % 8 == 0 for offset in offsets.values())
+    assert path.stat().st_size <= container.needed_bytes(sizes, variables)
+    size = path.stat().st_size
+    shape = tuple(sizes[dim] for dim in dims)
+    contents = {v.name: (np.arange(np.prod(shape)) % 100).reshape(shape).astype(v.dtype) for v in variables[:-1]}
+    with xarray.open_dataset(path, engine="h5netcdf") as before:
+        for variable in variables[:-1]:
+            unwritten = before[variable.name].values
+            assert np.isnan(unwritten).all() if variable.dtype == "<f8" else (unwritten == 0).all()
+    with RawWriter(path, offsets) as writer:
+        for name, content in contents.items():
+            writer.write(name, content[:1])
+            if shape[0] > 1:
+                writer.write(name, content[1:], content[0].nbytes)
+        writer.write("counter", np.array(-5, dtype="<i8"))
+        writer.close()
+    assert path.stat().st_size == size
+    with xarray.open_dataset(path, engine="h5netcdf") as after:
+        for name, content in contents.items():
+            np.testing.assert_array_equal(after[name].values, content)
+        assert int(after["counter"]) == -5

@@ -1,0 +1,93 @@
+"""The rooms of the house: who may import whom, and what `import annelid` does not load."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import annelid
+
+SOURCE = Path(annelid.__file__).parent
+BASE = {"errors", "protocols", "clock"}
+MAY_IMPORT = {
+    "errors": set(),
+    "protocols": set(),
+    "clock": set(),
+    "morphology": set(),
+    "nervous": {"errors"},
+    "config": {"errors"},
+    "arena": {"config"} | BASE,
+    "body": {"config", "morphology", "arena"} | BASE,
+    "control": {"config", "nervous"} | BASE,
+    "planar": {"config", "morphology"} | BASE,
+    "simulation": {"config", "morphology", "arena", "body", "control", "planar", "nervous"} | BASE,
+    "analysis": {"config", "morphology", "simulation"} | BASE,
+    "view": {"config", "morphology", "arena", "body", "simulation", "analysis"} | BASE,
+    "cli": {"config", "body", "simulation", "analysis", "view"} | BASE,
+}
+NUMPY_ONLY = {"morphology", "nervous", "protocols"}
+OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}
+
+
+def room_of(module: Path) -> str:
+    relative = module.relative_to(SOURCE)
+    return relative.parts[0].removesuffix(".py")
+
+
+def imported(module: Path) -> set[str]:
+    """Full names of all that a module imports, wherever the statement stands."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module}: relative import"
+            base = node.module or ""
+            names |= {f"{base}.{alias.name}" if base == "annelid" else base for alias in node.names}
+    return names
+
+
+MODULES = [path for path in sorted(SOURCE.rglob("*.py")) if path.parent != SOURCE or "__" not in path.name]
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
+def test_imports_run_one_way(module: Path) -> None:
+    room = room_of(module)
+    rooms = {name.split(".")[1] for name in imported(module) if name.startswith("annelid.")}
+    assert rooms - {room} <= MAY_IMPORT[room]
+
+
+@pytest.mark.parametrize(
+    "module", [path for path in MODULES if room_of(path) in NUMPY_ONLY], ids=lambda path: str(path.relative_to(SOURCE))
+)
+def test_nervous_system_and_geometry_know_numpy_only(module: Path) -> None:
+    packages = {name.split(".")[0] for name in imported(module)} - set(sys.stdlib_module_names) - {"annelid"}
+    assert packages <= {"numpy"} | OPTIONAL.get(str(module.relative_to(SOURCE)), set())
+
+
+def test_every_room_has_its_rule() -> None:
+    assert {room_of(path) for path in MODULES} == set(MAY_IMPORT)
+
+
+def loaded_by(statement: str) -> set[str]:
+    code = f"import sys; {statement}; print(' '.join(sys.modules))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(answer.stdout.split())
+
+
+@pytest.mark.parametrize("heavy", ["OpenGL", "glfw", "torch", "matplotlib", "mujoco", "xarray", "imageio"])
+def test_importing_annelid_loads_nothing_heavy(heavy: str) -> None:
+    assert heavy not in loaded_by("import annelid")
+
+
+def test_simulating_needs_neither_opengl_nor_matplotlib_nor_torch() -> None:
+    loaded = loaded_by("import annelid.simulation, annelid.simulation.worm, annelid.control, annelid.analysis")
+    assert loaded & {"OpenGL", "torch", "matplotlib", "sns_toolbox"} == set()
+
+
+def test_every_public_name_can_be_had() -> None:
+    assert all(getattr(annelid, name) is not None for name in annelid.__all__)

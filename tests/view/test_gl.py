@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from annelid.errors import RenderingUnavailable
+from annelid.simulation.runfile import Run
+from annelid.view import gl
+from annelid.view.doctor import Finding, examine
+from annelid.view.render import render_frame
+
+
+def test_linux_tries_what_needs_no_screen_first() -> None:
+    assert gl.candidates({}, "Linux") == ["egl", "osmesa"]
+    assert gl.candidates({"DISPLAY": ":0"}, "Linux") == ["egl", "osmesa", "glfw"]
+    assert gl.candidates({}, "Windows") == ["glfw"]
+    assert gl.candidates({}, "Darwin")[0] == "cgl"
+
+
+def test_mujoco_gl_is_obeyed() -> None:
+    assert gl.candidates({"MUJOCO_GL": "OSMesa"}, "Linux") == ["osmesa"]
+    with pytest.raises(RenderingUnavailable, match="MUJOCO_GL=off"):
+        gl.candidates({"MUJOCO_GL": "off"}, "Linux")
+    with pytest.raises(RenderingUnavailable, match="MUJOCO_GL=vulkan"):
+        gl.candidates({"MUJOCO_GL": "vulkan"}, "Linux")
+
+
+def test_without_a_back_end_the_sentence_names_the_install_line(
+    rods_run: Run, picture: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(gl, "works", lambda backend: False)
+    monkeypatch.setattr(gl.platform, "system", lambda: "Linux")
+    with pytest.raises(RenderingUnavailable, match="apt install libosmesa6"):
+        render_frame(rods_run, 0.1, picture)
+    assert not picture.exists()
+
+
+def test_a_back_end_that_cannot_exist_does_not_work() -> None:
+    gl.works.cache_clear()
+    assert gl.works("nosuch") is False
+
+
+def test_importing_the_views_imports_neither_gl_nor_matplotlib() -> None:
+    program = (
+        "import sys\n"
+        "import annelid.view.render, annelid.view.plots, annelid.view.gl, annelid.view.doctor, annelid.cli\n"
+        "heavy = {'mujoco', 'OpenGL', 'glfw', 'matplotlib', 'torch'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_doctor_finds_what_the_tests_themselves_run_on() -> None:
+    findings = {finding.item: finding for finding in examine()}
+    for item in ("annelid", "python", "mujoco", "numpy", "xarray", "ffmpeg"):
+        assert findings[item].ok, item
+    assert all(finding.optional or finding.ok or finding.remedy for finding in findings.values())
+
+
+def test_a_missing_item_comes_with_the_line_that_installs_it() -> None:
+    line = Finding("ffmpeg", False, "not found", "pip install imageio-ffmpeg").line()
+    assert line.split() == ["missing", "ffmpeg", "not", "found:", "pip", "install", "imageio-ffmpeg"]
+    assert Finding("ffmpeg", True, "7.0", "pip install imageio-ffmpeg").line().split() == ["ok", "ffmpeg", "7.0"]

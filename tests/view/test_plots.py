@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import imageio.v3
+import numpy as np
+import pytest
+
+from annelid.errors import RunFileError
+from annelid.simulation.runfile import Run
+from annelid.view.plots import figure7
+from annelid.view.style import activation_color, segment_colors
+
+
+def test_figure7_is_a_picture_with_curves_on_white(planar_run: Run, picture: Path) -> None:
+    assert figure7(planar_run, picture) == picture
+    pixels = imageio.v3.imread(picture)[:, :, :3]
+    assert 900 < pixels.shape[1] < 1300
+    assert 600 < pixels.shape[0] < 1300
+    white = np.mean(np.all(pixels == 255, axis=2))
+    assert 0.5 < white < 0.98
+    for color in segment_colors(3):
+        wanted = [int(color[i : i + 2], 16) for i in (1, 3, 5)]
+        assert np.any(np.all(pixels == wanted, axis=2)), f"nothing drawn in {color}"
+
+
+def test_figure7_of_a_3d_worm_shows_six_sensors(rods_run: Run, picture: Path) -> None:
+    assert rods_run.data.sizes["sensor"] == 6
+    assert figure7(rods_run, picture).stat().st_size > 10_000
+
+
+def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, picture: Path) -> None:
+    program = (
+        "import sys, matplotlib\n"
+        # Asking for the backend is what makes matplotlib choose one, through pyplot.
+        "settings = lambda: {k: matplotlib.rcParams[k] for k in matplotlib.rcParams if k != 'backend'}\n"
+        "before = settings()\n"
+        "from annelid.simulation.runfile import open_run\n"
+        "from annelid.view.plots import figure7\n"
+        f"figure7(open_run({str(planar_run.path)!r}), {str(picture)!r})\n"
+        "assert 'matplotlib.pyplot' not in sys.modules\n"
+        "assert settings() == before\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_run_without_samples_is_refused_in_a_sentence(planar_run: Run, picture: Path) -> None:
+    empty = replace(planar_run, data=planar_run.data.isel(time=slice(0, 1)))
+    with pytest.raises(RunFileError, match="too little to plot"):
+        figure7(empty, picture)
+    assert not picture.exists()
+
+
+@pytest.mark.parametrize("n_segments", [3, 4, 6, 12, 60])
+def test_segments_differ_in_greyscale_when_they_are_few(n_segments: int) -> None:
+    from matplotlib.colors import to_rgb
+
+    grey = [np.dot(to_rgb(color), (0.299, 0.587, 0.114)) for color in segment_colors(n_segments)]
+    assert len(grey) == n_segments
+    assert np.all(np.diff(grey) > 0), "dark to light from front to rear"
+
+
+def test_activation_color_stays_within_its_ends() -> None:
+    assert activation_color(-1.0) == activation_color(0.0)
+    assert activation_color(2.0) == activation_color(1.0)
+    assert activation_color(1.0)[0] > 2 * activation_color(1.0)[1]

@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import imageio.v3
+import numpy as np
+import pytest
+
+from annelid.errors import RenderingUnavailable, RunFileError
+from annelid.simulation.runfile import Run
+from annelid.view.camera import VIEWS_DEG
+from annelid.view.gl import find_backend
+from annelid.view.planar_scene import rhombi
+from annelid.view.render import render_frame, render_video
+from annelid.view.scene import WormScene
+
+
+def a_back_end_works() -> bool:
+    try:
+        find_backend()
+    except RenderingUnavailable:
+        return False
+    return True
+
+
+needs_gl = pytest.mark.skipif(not a_back_end_works(), reason="no OpenGL back-end works on this machine")
+
+
+def test_rhombi_touch_tip_to_tip_and_keep_their_sides() -> None:
+    side = 0.073
+    heights = np.array([0.065, 0.11, 0.09])
+    lengths = np.sqrt((2 * side) ** 2 - heights**2)
+    corners = rhombi(lengths, heights)
+    np.testing.assert_allclose(corners[:-1, 2], corners[1:, 0], atol=1e-15)
+    sides = np.linalg.norm(np.diff(np.concatenate([corners, corners[:, :1]], axis=1), axis=1), axis=2)
+    np.testing.assert_allclose(sides, side)
+    assert corners[0, 0, 0] == pytest.approx(-corners[-1, 2, 0]), "the middle of the worm is at the origin"
+
+
+def reddish(pixels: np.ndarray) -> np.ndarray:
+    red, green, blue = (pixels[:, :, i].astype(int) for i in range(3))
+    return (red > 150) & (green < 90) & (blue < 90)
+
+
+def test_planar_frame_shows_the_contracted_segment_in_its_place(planar_run: Run, picture: Path) -> None:
+    data = planar_run.data
+    contracted = int(data["activation"].sel(time=1.5, method="nearest").values.argmax())
+    render_frame(planar_run, 1.5, picture, size=(640, 320))
+    pixels = imageio.v3.imread(picture)
+    assert pixels.shape[:2] == (320, 640)
+    column = np.flatnonzero(reddish(pixels[:, :, :3]).any(axis=0)).mean()
+    assert int(3 * column / 640) == contracted
+
+
+def test_planar_video_has_one_picture_for_each_moment(planar_run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "video.mp4"
+    calls: list[tuple[int, int]] = []
+    render_video(
+        planar_run, target, fps=10, speed=2.0, size=(320, 160), progress=lambda done, total: calls.append((done, total))
+    )
+    # 3 s at double speed and 10 frames a second: 0, 0.2, .. 3.0 s.
+    assert calls == [(k, 16) for k in range(1, 17)]
+    frames = imageio.v3.imread(target)
+    assert frames.shape == (16, 160, 320, 3)
+    assert np.abs(frames[0].astype(int) - frames[8]).max() > 50
+    assert [entry.name for entry in tmp_path.iterdir()] == ["video.mp4"]
+
+
+@needs_gl
+def test_worm_frame_fits_the_whole_worm_and_shows_its_contracted_ring(rods_run: Run, picture: Path) -> None:
+    render_frame(rods_run, 0.2, picture, size=(320, 200))
+    pixels = imageio.v3.imread(picture)[:, :, :3].astype(int)
+    blue = (pixels[:, :, 2] > pixels[:, :, 0] + 60) & (pixels[:, :, 2] > 120)
+    rows, columns = np.nonzero(blue)
+    assert columns.max() - columns.min() > 120, "the strands span a good part of the picture"
+    assert columns.min() > 0
+    assert columns.max() < 319
+    assert rows.min() > 0
+    assert rows.max() < 199
+    ring = np.flatnonzero(reddish(pixels).any(axis=0))
+    assert ring.size, "segment 1 is contracted and red"
+    assert ring.mean() < columns.mean(), "segment 1 is on the left"
+
+
+@needs_gl
+def test_worm_video_is_drawn_from_recorded_postures(rods_run: Run, tmp_path: Path) -> None:
+    target = render_video(rods_run, tmp_path / "video.mp4", fps=25, size=(160, 96))
+    frames = imageio.v3.imread(target)
+    assert frames.shape == (6, 96, 160, 3)
+    assert np.abs(frames[0].astype(int) - frames[-1]).max() > 30
+
+
+@needs_gl
+def test_every_named_view_draws_something_else(rods_run: Run) -> None:
+    seen = []
+    for view in VIEWS_DEG:
+        with WormScene(rods_run, 96, 64, view, fine=False) as scene:
+            seen.append(scene.picture(0))
+    for i, one in enumerate(seen):
+        assert all(np.any(one != other) for other in seen[:i])
+
+
+@pytest.mark.parametrize(
+    ("time_s", "name", "camera", "says"),
+    [
+        (9.0, "a.png", None, "recorded from 0 to 3 s"),
+        (float("nan"), "a.png", None, "recorded from 0 to 3 s"),
+        (1.0, "a.bmp2", None, r"\.png"),
+        (1.0, "a.png", "side", "one view"),
+    ],
+)
+def test_impossible_frames_are_refused(
+    planar_run: Run, tmp_path: Path, time_s: float, name: str, camera: str | None, says: str
+) -> None:
+    with pytest.raises(RunFileError, match=says):
+        render_frame(planar_run, time_s, tmp_path / name, camera=camera)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("fps", "speed"), [(0.0, 1.0), (25.0, 0.0), (25.0, -1.0), (math.nan, 1.0), (math.inf, 1.0)])
+def test_impossible_videos_are_refused(planar_run: Run, tmp_path: Path, fps: float, speed: float) -> None:
+    with pytest.raises(RunFileError, match="positive fps and speed"):
+        render_video(planar_run, tmp_path / "a.mp4", fps=fps, speed=speed)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failing_video_leaves_nothing_and_keeps_what_was_there(planar_run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "a.mp4"
+    target.write_bytes(b"precious")
+
+    def fail(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render_video(planar_run, target, size=(160, 96), progress=fail)
+    assert target.read_bytes() == b"precious"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]

@@ -20,6 +20,7 @@ def meshes(draw: st.DrawFn) -> MeshGeometry:
         radius_m=draw(st.floats(0.01, 1.0)),
         angular_rate_rad_per_m=draw(st.floats(1.0, 60.0)),
         elements_per_side=draw(st.integers(1, 6)),
+        elements_per_end=draw(st.none() | st.integers(1, 6)),
         planes_between_rings=draw(st.integers(2, 6)),
         free_planes_at_ends=draw(st.integers(1, 4)),
     )
@@ -156,6 +157,7 @@ def test_the_later_six_segment_robot() -> None:
         ({"radius_m": 0.0}, "radius_m"),
         ({"angular_rate_rad_per_m": -1.0}, "angular_rate_rad_per_m"),
         ({"elements_per_side": 0}, "elements_per_side = 0"),
+        ({"elements_per_end": 0}, "elements_per_end = 0"),
         ({"planes_between_rings": 1}, "planes_between_rings = 1"),
         ({"free_planes_at_ends": 0}, "free_planes_at_ends = 0"),
         ({"rear_overhang_m": 0.0}, "rear_overhang_m = 0.0"),

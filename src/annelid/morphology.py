@@ -113,12 +113,6 @@ class MeshGeometry:
         corners = self.crossings_m[self.rings]
         return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).sum(axis=1)
 
-    @cached_property
-    def segment_of_vertex(self) -> Indices:
-        """Segment (from 0) whose ring is nearest along the body, shape ``(n_vertices,)``."""
-        ring_x = self.plane_x_m[self.ring_planes]
-        return np.abs(self.vertices_m[0, :, 0][:, None] - ring_x[None]).argmin(axis=1)
-
 
 def helical_mesh(
     n_segments: int,
@@ -127,6 +121,7 @@ def helical_mesh(
     radius_m: float = 0.16,
     angular_rate_rad_per_m: float = 14.0,
     elements_per_side: int = 3,
+    elements_per_end: int | None = None,
     planes_between_rings: int = 4,
     free_planes_at_ends: int = 3,
     rear_overhang_m: float | None = None,
@@ -138,7 +133,8 @@ def helical_mesh(
         n_helices: Strands, half of each handedness; even and at least 6.
         radius_m: Radius of the tube at rest.
         angular_rate_rad_per_m: Turn of a strand per metre of body (2 pi over the pitch).
-        elements_per_side: Straight elements between neighbouring crossings, and in each free end.
+        elements_per_side: Straight elements between neighbouring crossings.
+        elements_per_end: Straight elements in each free end of a strand; by default as many as in a side.
         planes_between_rings: Crossing planes from one ring to the next, at least 2.
         free_planes_at_ends: Crossing planes before the first and after the last ring, at least 1.
         rear_overhang_m: Free strand behind the last plane; by default half a plane spacing, as in front.
@@ -149,7 +145,8 @@ def helical_mesh(
     Raises:
         ValueError: An argument is outside its range; the sentence names it.
     """
-    _check(n_segments, n_helices, radius_m, angular_rate_rad_per_m, elements_per_side)
+    ends = elements_per_side if elements_per_end is None else elements_per_end
+    _check(n_segments, n_helices, radius_m, angular_rate_rad_per_m, elements_per_side, ends)
     if planes_between_rings < 2 or free_planes_at_ends < 1:
         raise ValueError(
             f"planes_between_rings = {planes_between_rings} must be at least 2 and "
@@ -167,7 +164,7 @@ def helical_mesh(
     ring_planes = free_planes_at_ends + planes_between_rings * np.arange(n_segments)
     offset = step / 2 + step * floor(pi / 2 / step)
 
-    vertices = _strands(plane_x, overhang, half, radius_m, angular_rate_rad_per_m, offset, elements_per_side)
+    vertices = _strands(plane_x, overhang, half, radius_m, angular_rate_rad_per_m, offset, elements_per_side, ends)
     strands = _crossing_strands(plane_x, half, angular_rate_rad_per_m, offset)
     springs, sensor_springs = _springs(ring_planes, n_planes, half)
     return MeshGeometry(
@@ -175,7 +172,7 @@ def helical_mesh(
         radius_m=radius_m,
         angular_rate_rad_per_m=angular_rate_rad_per_m,
         vertices_m=vertices,
-        crossing_vertex=elements_per_side * (1 + np.arange(n_planes)),
+        crossing_vertex=ends + elements_per_side * np.arange(n_planes),
         crossing_strands=strands,
         plane_x_m=plane_x,
         ring_planes=ring_planes,
@@ -186,25 +183,25 @@ def helical_mesh(
     )
 
 
-def _check(n_segments: int, n_helices: int, radius_m: float, rate: float, elements_per_side: int) -> None:
+def _check(n_segments: int, n_helices: int, radius_m: float, rate: float, elements_per_side: int, ends: int) -> None:
     if n_segments < 3:
         raise ValueError(f"n_segments = {n_segments} must be at least 3")
     if n_helices < 6 or n_helices % 2:
         raise ValueError(f"n_helices = {n_helices} must be even and at least 6")
     if not (radius_m > 0 and rate > 0):
         raise ValueError(f"radius_m = {radius_m} and angular_rate_rad_per_m = {rate} must be positive")
-    if elements_per_side < 1:
-        raise ValueError(f"elements_per_side = {elements_per_side} must be at least 1")
+    if elements_per_side < 1 or ends < 1:
+        raise ValueError(f"elements_per_side = {elements_per_side} and elements_per_end = {ends} must be at least 1")
 
 
 def _strands(
-    plane_x: Array, overhang: float, half: int, radius: float, rate: float, offset: float, elements: int
+    plane_x: Array, overhang: float, half: int, radius: float, rate: float, offset: float, elements: int, ends: int
 ) -> Array:
     """Samples every strand at the planes, at its two ends, and evenly in between."""
     knots = np.concatenate([[0.0], plane_x, [plane_x[-1] + overhang]])
-    fractions = np.arange(elements) / elements
-    inner = knots[:-1, None] + np.diff(knots)[:, None] * fractions[None]
-    x = np.append(inner.ravel(), knots[-1])
+    counts = [ends, *[elements] * (len(plane_x) - 1), ends]
+    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], counts, strict=False)]
+    x = np.append(np.concatenate(spans), knots[-1])
     phase = (2 * pi / half) * np.arange(half)
     angle = np.concatenate([rate * x[None] + phase[:, None], offset - rate * x[None] - phase[:, None]])
     return np.stack([np.broadcast_to(x, angle.shape), radius * np.cos(angle), radius + radius * np.sin(angle)], axis=-1)

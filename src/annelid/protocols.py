@@ -21,7 +21,7 @@ State = dict[str, NDArray[np.generic]]
 
 @dataclass(frozen=True, slots=True)
 class Sensation:
-    """What the body feels at one instant; every array is a copy that its receiver may keep.
+    """What the body feels at one instant; its receiver may keep the arrays but must not write to them.
 
     Attributes:
         time_s: Simulated time, s.

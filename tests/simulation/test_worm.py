@@ -24,7 +24,7 @@ FORMULATIONS = {
 }
 
 
-def config(formulation: str = "rods", **changes: Any) -> RunConfig:
+def config(formulation: str = "rods", /, **changes: Any) -> RunConfig:
     return load_config(
         {"clock": {"control_timestep_s": 0.001, "physics_timestep_s": 0.005}},
         {**FORMULATIONS[formulation], **changes},

@@ -188,5 +188,5 @@ class ForgetfulController:
 
 def toy_config(**overrides: object) -> RunConfig:
     """Returns a configuration for the toys; dots of a path are written as double underscores."""
-    base = {"body.kind": "riddle2022", "duration_s": 0.2, "name": "toy"}
+    base = {"body.kind": "riddle2022", "duration_s": 0.2, "name": "toy", "clock.physics_timestep_s": 0.001}
     return load_config({}, base | {key.replace("__", "."): value for key, value in overrides.items()})

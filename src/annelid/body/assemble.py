@@ -21,6 +21,7 @@ def mesh_of(mesh: Mesh) -> MeshGeometry:
         radius_m=mesh.radius_m,
         angular_rate_rad_per_m=mesh.angular_rate_rad_per_m,
         elements_per_side=mesh.elements_per_side,
+        elements_per_end=mesh.elements_per_end,
         planes_between_rings=mesh.planes_between_rings,
         free_planes_at_ends=mesh.free_planes_at_ends,
         rear_overhang_m=mesh.rear_overhang_m,

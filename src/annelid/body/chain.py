@@ -16,7 +16,7 @@ import numpy as np
 
 from annelid.arena.floor import contact_options
 from annelid.body.actuation import crossing_site
-from annelid.body.rods import AXES, PIN_RGBA, STRAND_RGBA
+from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA
 from annelid.config import Arena, Chain, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
@@ -176,7 +176,7 @@ def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: W
         conaffinity=0,
         rgba=PIN_RGBA,
     )
-    pin.add_site(name=name, pos=place, size=[0.002, 0.002, 0.002], group=4)
+    pin.add_site(name=name, pos=place, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
     for k, (first, second) in enumerate(pairs):
         spec.add_equality(
             name=f"pin_{crossing}_{k}",

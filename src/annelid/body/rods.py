@@ -22,6 +22,7 @@ AXES = np.eye(3)
 STRAND_RGBA = ((0.12, 0.35, 0.75, 1.0), (0.25, 0.5, 0.85, 1.0))
 PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
 EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
+HIDDEN_GROUP = 4
 TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
 
@@ -37,17 +38,15 @@ def add_rods(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formul
         arena: Contact settings, which the strands share with the floor.
     """
     _set_solver(spec, formulation)
-    strands = body.strands
-    names = _add_vertices(spec, geometry, body)
+    names = _add_vertices(spec, geometry, body, contact_options(arena))
     for strand in range(geometry.n_strands):
         add_rod(
             spec,
             f"strand_{strand}",
             geometry.vertices_m[strand],
             names[strand],
-            strands,
+            body.strands,
             formulation,
-            contact=contact_options(arena),
             rgba=STRAND_RGBA[strand // geometry.n_per_plane],
         )
 
@@ -59,19 +58,27 @@ def _set_solver(spec: mujoco.MjSpec, formulation: Rods) -> None:
     spec.option.iterations = formulation.solver_iterations
     spec.option.tolerance = formulation.solver_tolerance
     spec.option.impratio = formulation.friction_impedance_ratio
+    # The net is one island; looking for others takes 3 % of a step.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 
 
-def _add_vertices(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody) -> list[list[str]]:
-    """Adds a body for every vertex, crossings first; returns each strand's body names from front to back."""
-    masses = lumped_masses(geometry.vertices_m[0], body.strands.linear_density_kg_per_m)
-    position = geometry.crossings_m
+def _add_vertices(
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, contact: dict[str, list[float]]
+) -> list[list[str]]:
+    """Adds a body for every vertex, crossings first (which the solver is fastest with).
+
+    Returns:
+        The names of each strand's bodies from front to back.
+    """
+    masses = lumped_masses(geometry.vertices_m[0], body.strands.linear_density_kg_per_m).tolist()
+    names = [[f"vertex_{s}_{v}" for v in range(len(masses))] for s in range(geometry.n_strands)]
     for crossing in range(geometry.n_crossings):
-        vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
-        pin = add_vertex(
-            spec, crossing_site(crossing), position[crossing], 2 * float(masses[vertex]) + body.pins.mass_kg
-        )
+        name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
+        for strand in geometry.crossing_strands[crossing]:
+            names[strand][vertex] = name
+        pin = add_vertex(spec, name, geometry.crossings_m[crossing], 2 * masses[vertex] + body.pins.mass_kg)
         pin.add_geom(
-            name=crossing_site(crossing),
+            name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[body.pins.radius_m, 0.0, 0.0],
             mass=0.0,
@@ -79,18 +86,15 @@ def _add_vertices(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody) -
             conaffinity=0,
             rgba=PIN_RGBA,
         )
-        pin.add_site(name=crossing_site(crossing), size=[0.002, 0.002, 0.002], group=4)
+        pin.add_site(name=name, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
+        _add_touch(pin, body.strands.radius_m, contact)
 
-    names = [[f"vertex_{s}_{v}" for v in range(len(masses))] for s in range(geometry.n_strands)]
-    for crossing, pair in enumerate(geometry.crossing_strands):
-        for strand in pair:
-            vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
-            names[strand][vertex] = crossing_site(crossing)
     at_crossing = set(geometry.crossing_vertex.tolist())
     for strand, own in enumerate(names):
         for vertex, name in enumerate(own):
             if vertex not in at_crossing:
-                add_vertex(spec, name, geometry.vertices_m[strand, vertex], float(masses[vertex]))
+                point = add_vertex(spec, name, geometry.vertices_m[strand, vertex], masses[vertex])
+                _add_touch(point, body.strands.radius_m, contact)
     return names
 
 
@@ -110,6 +114,19 @@ def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> 
     return point
 
 
+def _add_touch(point: mujoco.MjsBody, radius_m: float, contact: dict[str, list[float]]) -> None:
+    """Lets a vertex touch the floor: one sphere, where a flex would make a contact for each strand of a crossing."""
+    point.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[radius_m, 0.0, 0.0],
+        mass=0.0,
+        contype=0,
+        conaffinity=1,
+        group=HIDDEN_GROUP,
+        **contact,
+    )
+
+
 def add_rod(
     spec: mujoco.MjSpec,
     name: str,
@@ -118,11 +135,10 @@ def add_rod(
     strands: Strands,
     formulation: Rods,
     *,
-    contact: dict[str, list[float]] | None = None,
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     clamped: bool = False,
 ) -> None:
-    """Adds one discrete elastic rod through existing bodies.
+    """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
     Args:
         spec: The spec that holds the bodies.
@@ -131,7 +147,6 @@ def add_rod(
         bodies: Body of each vertex, at the vertex's place; "world" fixes the vertex.
         strands: Material.
         formulation: Settings of the inextensible edges.
-        contact: Contact attributes; None for a rod that touches nothing.
         rgba: Colour.
         clamped: The first two vertices belong to one body (a cantilever): their edge has no twist hinge.
     """
@@ -147,15 +162,13 @@ def add_rod(
         rgba=rgba,
         selfcollide=0,
         contype=0,
-        conaffinity=0 if contact is None else 1,
+        conaffinity=0,
     )
     flex.vertbody = bodies
     fixed = np.array([body == "world" for body in bodies])
     if fixed.any():
         flex.vert = np.where(fixed[:, None], vertices_m, 0.0).ravel()
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
-    for key, value in (contact or {}).items():
-        setattr(flex, key, value)
     for edge in range(1 if clamped else 0, n_edges):
         suffix = "" if edge == n_edges - 1 else f"_{edge}"
         inertia = 0.5 * strands.linear_density_kg_per_m * lengths[edge] * strands.radius_m**2

@@ -37,6 +37,9 @@ class Mesh(Section):
     elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
         default=3, description="straight elements between neighbouring crossings"
     )
+    elements_per_end: Annotated[int, Field(ge=1, le=32)] | None = Field(
+        default=None, description="straight elements in each free end of a strand; default as many as in a side"
+    )
     planes_between_rings: Annotated[int, Field(ge=2)] = Field(
         default=4, description="crossing planes from one ring to the next"
     )

@@ -50,6 +50,8 @@ class Coupling:
         # A quantity that a body does not have is NaN from the start and means nothing later.
         self._watched = ["stretch_m"]
         self._watched += [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]
+        # Nothing new can run away between two steps of a slower body.
+        self._watch_every = max(1, round(config.clock.physics_timestep_s / config.clock.control_timestep_s))
         self._alarms = [part.alarm for part in (plant, controller) if isinstance(part, Watched)]
 
     def advance(self) -> None:
@@ -60,13 +62,17 @@ class Coupling:
         """
         activation = np.asarray(self.controller.step(self.felt()), dtype=np.float64)
         self._check_activation(activation)
-        sensation = self.plant.step(activation)
+        self.sensation = self.plant.step(activation)
         self.step += 1
         self.activation = activation
-        self.sensation = sensation
+        if self.step % self._watch_every == 0:
+            self._watch()
+
+    def _watch(self) -> None:
+        """Stops a run whose numbers have run away."""
         total = 0.0
         for name in self._watched:
-            total += getattr(sensation, name).sum()
+            total += getattr(self.sensation, name).sum()
         if not math.isfinite(total):
             self._explain_runaway()
         for alarm in self._alarms:

@@ -21,6 +21,9 @@ STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 (which the engine keeps as "plastic" state)."""
 
 AXES = ("x", "y", "z")
+PYRAMID_EDGES = np.arange(4)
+PYRAMID_TO_FORCE = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]])
+"""From the edges of the engine's friction pyramid to normal force and tangents over friction."""
 ALARM_EVERY = 10
 """Physics steps between two looks at the kinetic energy, which costs a pass over all joints."""
 
@@ -69,10 +72,10 @@ class WormPlant:
         self._sensor = geometry.sensor_springs
         self._floor = model.geom("floor").id
         self._rest_stretch = model.tendon_lengthspring[springs, 1][self._sensor]
-        self._rings = [model.tendon(name).id for name in self._muscle_names]
-        self._ring_path = [self._path_of(tendon) for tendon in self._rings]
+        self._ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self._muscle_names])
         self._segment_of_geom = self._segments_of_geoms()
-        self._segment_of_flex_vertex = np.tile(geometry.segment_of_vertex, geometry.n_strands)
+        self._inverse_edge_length = 1.0 / model.flexedge_length0
+        self._segment_rows = np.eye(geometry.n_segments)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
         """Crossings along a ring tendon."""
@@ -145,10 +148,10 @@ class WormPlant:
         mujoco.mj_kinematics(self.model, self.data)
         self._crossing = self.data.site_xpos[self._crossing_site]
         ends = self._crossing[self.geometry.springs]
-        self._spring_length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        self._ring_length = np.array(
-            [np.linalg.norm(np.diff(self._crossing[path], axis=0), axis=1).sum() for path in self._ring_path]
-        )
+        self._spring_length = _norm(ends[:, 1] - ends[:, 0])
+        corners = self._crossing[self._ring_path]
+        self._ring_length = _norm(corners[:, 1:] - corners[:, :-1]).sum(axis=1)
+        self._stretch = self._spring_length[self._sensor]
         self._center_of_mass = self._mass @ self.data.xipos
 
     def _collect_forces(self) -> None:
@@ -156,8 +159,8 @@ class WormPlant:
         self._muscle_force = -data.actuator_force
         self._contact_force = self._contact_forces()
         if self.model.nflexedge:
-            strain = data.flexedge_length / self.model.flexedge_length0 - 1
-            self._edge_strain = float(np.abs(strain).max())
+            strain = data.flexedge_length * self._inverse_edge_length - 1.0
+            self._edge_strain = max(float(strain.max()), -float(strain.min()))
         else:
             self._pin_gap = self._largest_pin_gap()
 
@@ -170,58 +173,34 @@ class WormPlant:
         return float(np.linalg.norm(residual, axis=1).max())
 
     def _contact_forces(self) -> Array:
-        """Sums the floor's force over the contacts of each segment, N, shape ``(n_segments, 3)``."""
-        total = np.zeros((self.n_segments, 3))
+        """Sums the floor's force over the contacts of each segment, N, shape ``(n_segments, 3)``.
+
+        The engine gives the force on the second partner as the four edges of a friction pyramid, and no
+        address for a contact that bears none.
+        """
         contact = self.data.contact
         address = contact.efc_address
         if not len(address):
-            return total
-        active = address >= 0
-        rows = address[active, None] + np.arange(4)[None]
-        edges = self.data.efc_force[rows]
-        friction = contact.friction[active]
-        local = np.stack(
-            [
-                edges.sum(axis=1),
-                (edges[:, 0] - edges[:, 1]) * friction[:, 0],
-                (edges[:, 2] - edges[:, 3]) * friction[:, 1],
-            ],
-            axis=1,
-        )
-        world = np.einsum("ni,nij->nj", local, contact.frame[active].reshape(-1, 3, 3))
-        segment, sign = self._contact_owner(contact, active)
-        np.add.at(total, segment, sign[:, None] * world)
-        return total
-
-    def _contact_owner(
-        self, contact: mujoco._structs._MjContactList, active: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.int64], Array]:
-        """Segment of each contact, and the sign that turns the engine's force into that on the worm.
-
-        The engine's force acts on the second partner of the contact.
-        """
-        floor_first = contact.geom[active, 0] == self._floor
-        sign = np.where(floor_first, 1.0, -1.0)
-        mine = np.where(floor_first, 1, 0)
-        row = np.arange(len(mine))
-        geom = contact.geom[active][row, mine]
-        if not self.model.nflex:
-            return self._segment_of_geom[geom], sign
-        flex = contact.flex[active][row, mine]
-        element, vertex = contact.elem[active][row, mine], contact.vert[active][row, mine]
-        first = self.model.flex_elem[self.model.flex_elemdataadr[flex] + 2 * np.maximum(element, 0)]
-        local = np.where(vertex >= 0, vertex, first)
-        return self._segment_of_flex_vertex[self.model.flex_vertadr[flex] + local], sign
+            return np.zeros((self.n_segments, 3))
+        local = self.data.efc_force[np.maximum(address, 0)[:, None] + PYRAMID_EDGES] @ PYRAMID_TO_FORCE
+        local[:, 1:] *= contact.friction[:, :2]
+        world = (local[:, None] @ contact.frame.reshape(-1, 3, 3))[:, 0]
+        first, second = contact.geom.T
+        floor_first = first == self._floor
+        sign = np.where(floor_first, 1.0, -1.0) * (address >= 0)
+        segment = self._segment_of_geom[np.where(floor_first, second, first)]
+        return self._segment_rows[segment].T @ (sign[:, None] * world)
 
     def _feel(self) -> Sensation:
+        """Tells the present lengths and forces; `_locate` and `_collect_forces` make new arrays each time."""
         return Sensation(
             time_s=self._control_step * self._config.clock.control_timestep_s,
-            stretch_m=self._spring_length[self._sensor],
-            rest_stretch_m=self._rest_stretch.copy(),
-            ring_length_m=self._ring_length.copy(),
-            muscle_force_N=self._muscle_force.copy(),
-            contact_force_N=self._contact_force.copy(),
-            center_of_mass_m=self._center_of_mass.copy(),
+            stretch_m=self._stretch,
+            rest_stretch_m=self._rest_stretch,
+            ring_length_m=self._ring_length,
+            muscle_force_N=self._muscle_force,
+            contact_force_N=self._contact_force,
+            center_of_mass_m=self._center_of_mass,
         )
 
     def kinetic_energy_J(self) -> float:
@@ -294,7 +273,7 @@ class WormPlant:
         if frame:
             return {"crossing_position": self._crossing, "qpos": self.data.qpos}
         values: dict[str, NDArray[np.generic] | float] = {
-            "stretch_length": self._spring_length[self._sensor],
+            "stretch_length": self._stretch,
             "spring_length": self._spring_length,
             "ring_length": self._ring_length,
             "muscle_force": self._muscle_force,
@@ -327,3 +306,8 @@ class WormPlant:
         self._contact_force = np.asarray(state["contact_force"], dtype=float).copy()
         self._edge_strain, self._pin_gap = (float(value) for value in state["extremes"])
         self._locate()
+
+
+def _norm(vectors: Array) -> Array:
+    """Lengths of vectors along the last axis; faster than numpy's own for many short ones."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))

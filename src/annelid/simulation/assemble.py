@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import cast
+
+from numpy.typing import ArrayLike
+
 from annelid.config import PlanarBody, RunConfig
-from annelid.protocols import Controller, Plant
+from annelid.protocols import Controller, Plant, Sensation
 
 
 def build_plant(config: RunConfig) -> Plant:
@@ -36,3 +41,16 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
         plant.n_muscles,
         config.clock.control_timestep_s,
     )
+
+
+def as_controller(
+    controller: Controller | Callable[[Sensation], ArrayLike] | None, config: RunConfig, plant: Plant
+) -> Controller:
+    """Takes a controller as it is, wraps a plain function, or builds the configured controller for None."""
+    if controller is None:
+        return build_controller(config, plant)
+    if hasattr(controller, "step"):
+        return cast(Controller, controller)
+    from annelid.control.callable import CallableController
+
+    return CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)

@@ -7,10 +7,12 @@ from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 
+from numpy.typing import ArrayLike
+
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
-from annelid.protocols import Controller, Plant, Records
-from annelid.simulation.assemble import build_controller, build_plant
+from annelid.protocols import Controller, Plant, Records, Sensation
+from annelid.simulation.assemble import as_controller, build_plant
 from annelid.simulation.coupling import Coupling, start
 from annelid.simulation.interruption import Interruption
 from annelid.simulation.progress import ProgressCallback, reporting
@@ -40,7 +42,7 @@ def simulate(
     out: str | Path,
     *,
     plant: Plant | None = None,
-    controller: Controller | None = None,
+    controller: Controller | Callable[[Sensation], ArrayLike] | None = None,
     resume: Run | str | Path | None = None,
     progress: bool | ProgressCallback | None = None,
     overwrite: bool = False,
@@ -55,7 +57,7 @@ def simulate(
         config: The configuration; None for that of the run to continue.
         out: Folder for the run file; made if it is not there.
         plant: The body, instead of the one that the configuration describes.
-        controller: The controller, likewise.
+        controller: The controller, likewise, or a plain function from sensation to activation.
         resume: A run to continue from its last checkpoint. Then ``config`` may differ from that run's in
             ``duration_s`` (which counts from time zero of the first run), ``record`` and ``name``, the file
             holds the new part only, and plant and controller go on bit for bit.
@@ -80,8 +82,7 @@ def simulate(
     if config is None:
         raise ConfigError("a run needs a configuration, or a run to continue")
     plant = plant or build_plant(config)
-    controller = controller or build_controller(config, plant)
-    simulation = start(config, plant, controller, origin)
+    simulation = start(config, plant, as_controller(controller, config, plant), origin)
     recorder = _recorder(config, simulation, origin, out / FILE_NAME)
     with reporting(progress, simulation.schedule.start * simulation.schedule.timestep_s, config.duration_s) as report:
         _record(simulation, recorder, report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -153,3 +154,16 @@ def test_half_rings_on_one_side_bend_the_worm() -> None:
     felt = plant.step(np.zeros(6))
     left, right = felt.ring_length_m[0::2], felt.ring_length_m[1::2]
     assert np.all(left < right)
+
+
+def test_the_engine_s_warnings_become_alarms_and_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    stiff = {"clock.physics_timestep_s": 0.1, "body.strands.young_modulus_Pa": 1e12}
+    plant = WormPlant(config(**stiff, **{"body.formulation.solver_iterations": 10}))
+    plant.reset(0)
+    alarms = [(plant.step(np.array([1.0, 0.0, 0.0])), plant.alarm())[1] for _ in range(300)]
+    assert any(alarm and "did not converge" in alarm for alarm in alarms)
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr() == ("", "")

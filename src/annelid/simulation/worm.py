@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 
 import mujoco
@@ -24,6 +25,17 @@ AXES = ("x", "y", "z")
 PYRAMID_EDGES = np.arange(4)
 PYRAMID_TO_FORCE = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]])
 """From the edges of the engine's friction pyramid to normal force and tangents over friction."""
+_log = logging.getLogger(__name__)
+# Otherwise the engine prints its warnings and writes them to a file in the user's folder; `alarm` reports them.
+mujoco.set_mju_user_warning(lambda message: _log.info("%s", message))
+ENGINE_WARNINGS = {
+    mujoco.mjtWarning.mjWARN_INERTIA: "the engine's implicit solve did not converge",
+    mujoco.mjtWarning.mjWARN_CONTACTFULL: "the engine ran out of room for contacts",
+    mujoco.mjtWarning.mjWARN_CNSTRFULL: "the engine ran out of room for constraints",
+    mujoco.mjtWarning.mjWARN_BADQPOS: "a position became unbounded or NaN",
+    mujoco.mjtWarning.mjWARN_BADQVEL: "a velocity became unbounded or NaN",
+    mujoco.mjtWarning.mjWARN_BADQACC: "an acceleration became unbounded or NaN",
+}
 ALARM_EVERY = 10
 """Physics steps between two looks at the kinetic energy, which costs a pass over all joints."""
 
@@ -209,24 +221,29 @@ class WormPlant:
         return float(self.data.energy[1])
 
     def alarm(self) -> str | None:
-        """Tells whether energy, height, edge strain or pin gaps exceed the configured guard.
+        """Tells whether the engine has warned, or energy, height, edge strain or pin gaps exceed the guard.
 
         Returns:
             One sentence naming the quantity, its value and its limit, or None.
         """
+        warned = self.data.warning.number
+        if warned.any():
+            for warning, words in ENGINE_WARNINGS.items():
+                if warned[warning]:
+                    return f"{words}; a shorter clock.physics_timestep_s or softer settings may help"
         guard = self._config.guard
         height = float(self._crossing[:, 2].max())
         readings = [
-            ("guard.height_m", "height of a crossing", height, guard.height_m, "m"),
+            ("guard.height_m", "height of a crossing", height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", self._edge_strain, guard.edge_strain, ""),
-            ("guard.pin_gap_m", "gap at a pin", self._pin_gap, guard.pin_gap_m, "m"),
+            ("guard.pin_gap_m", "gap at a pin", self._pin_gap, guard.pin_gap_m, " m"),
         ]
         if self._control_step % (ALARM_EVERY * self._control_steps_per_physics) == 0:
             energy = self.kinetic_energy_J()
-            readings.append(("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, "J"))
+            readings.append(("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"))
         for field, words, value, limit, unit in readings:
             if not value <= limit:
-                return f"{words} is {value:.3g} {unit}, above the limit {field} = {limit:g}".replace("  ", " ")
+                return f"{words} is {value:.3g}{unit}, above the limit {field} = {limit:g}"
         return None
 
     def recordable(self) -> Recordable:

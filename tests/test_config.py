@@ -111,6 +111,9 @@ def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
         ("arena.friction=inf", "must be a finite number"),
         ("duration_s=0", "duration_s = 0: must be greater than 0"),
         ("clock.physics_timestep_s=0.0033", "integer multiple"),
+        ("clock.physics_timestep_s=0.001001", "integer multiple"),
+        ("record.frames_interval_s=0.0405", "record.frames_interval_s = 0.0405 must be an integer multiple"),
+        ("duration_s=1.0005", "duration_s = 1.0005 must be an integer multiple"),
         ("record.signals_interval_s=0.0015", "record.signals_interval_s = 0.0015 must be an integer multiple"),
         ("body.formulation.kind=chian", "'chian': must be one of 'rods', 'chain'"),
         ("body.formulation.joint=glue", "must be one of 'ball' or 'hinges'"),
@@ -136,6 +139,12 @@ def test_a_field_of_the_other_formulation_is_refused() -> None:
 def test_planar_worms_have_no_ground() -> None:
     with pytest.raises(ConfigError, match="arena has no effect"):
         load_config("riddle2022-planar", parse_assignments(["arena.friction=0.1"]))
+
+
+@pytest.mark.parametrize("heights", ["body.height_min_m=0.12", "body.height_max_m=0.15"])
+def test_planar_heights_must_fit_the_rhombus(heights: str) -> None:
+    with pytest.raises(ConfigError, match="height_min_m < height_max_m < 2 side_m"):
+        load_config("riddle2022-planar", parse_assignments([heights]))
 
 
 def test_an_unknown_preset_suggests_the_nearest() -> None:

@@ -112,6 +112,12 @@ def test_rhombi_have_four_equal_sides_along_strands(mesh: MeshGeometry) -> None:
     corners = mesh.crossings_m[mesh.rhombi]
     sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     assert np.allclose(sides, sides[0, 0])
+    front, left, rear, right = corners.swapaxes(0, 1)
+    assert np.all((front[:, 0] < left[:, 0]) & (left[:, 0] < rear[:, 0]))
+    across = np.cross(left - right, rear - front)
+    outward = (front + rear) / 2 - [0, 0, mesh.radius_m]
+    outward[:, 0] = 0
+    assert len(set(np.sign(np.einsum("ij,ij->i", across, outward)))) == 1, "left and right are never exchanged"
     for corner in range(4):
         pair = mesh.crossing_strands[mesh.rhombi[:, [corner, (corner + 1) % 4]]]
         assert np.all((pair[:, 0] == pair[:, 1]).sum(axis=1) == 1), "neighbours share one strand"
@@ -127,6 +133,12 @@ def test_the_paper_s_robot() -> None:
     assert mesh.spring_length_m == pytest.approx(0.0748, abs=1e-5)
     front, side = mesh.crossings_m[mesh.rhombi[0, :2]]
     assert np.linalg.norm(front - side) == pytest.approx(0.0909, abs=1e-4)
+
+
+def test_free_ends_and_sides_have_the_asked_number_of_elements() -> None:
+    mesh = helical_mesh(3, elements_per_side=4, elements_per_end=2)
+    assert mesh.crossing_vertex.tolist() == list(range(2, 2 + 4 * 15, 4))
+    assert mesh.vertices_m.shape[1] == 2 + 4 * 14 + 2 + 1
 
 
 def test_strands_follow_the_published_curves() -> None:

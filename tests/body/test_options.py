@@ -1,0 +1,187 @@
+"""Every option of the body and the arena reaches the engine with the meaning that its description gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.body import build_spec
+from annelid.body.rods import rayleigh_damping_s
+from annelid.config import Strands, load_config
+from annelid.morphology import helical_mesh
+
+Read = Callable[[mujoco.MjModel], Any]
+CHAIN = {"body.formulation.kind": "chain"}
+
+
+def compiled(changes: dict[str, Any]) -> mujoco.MjModel:
+    return build_spec(load_config({"clock": {"physics_timestep_s": 0.005}}, changes)).compile()
+
+
+def pins(model: mujoco.MjModel) -> list[int]:
+    return [i for i in range(model.neq) if model.equality(i).name.startswith("pin_")]
+
+
+def springs(model: mujoco.MjModel) -> list[int]:
+    return [i for i in range(model.ntendon) if model.tendon(i).name.startswith("spring_")]
+
+
+def touching(model: mujoco.MjModel) -> list[int]:
+    return [i for i in range(model.ngeom) if model.geom_conaffinity[i] and model.geom(i).name != "floor"]
+
+
+def elastic_joints(model: mujoco.MjModel) -> np.ndarray:
+    return np.flatnonzero(model.jnt_stiffness[:, 0] if model.jnt_stiffness.ndim > 1 else model.jnt_stiffness)
+
+
+def joint_damping(model: mujoco.MjModel) -> np.ndarray:
+    damping = model.dof_damping[:, 0] if model.dof_damping.ndim > 1 else model.dof_damping
+    return np.unique(damping[damping > 0])
+
+
+BOTH: list[tuple[dict[str, Any], Read, Any]] = [
+    ({"clock.physics_timestep_s": 0.004}, lambda m: m.opt.timestep, 0.004),
+    ({"arena.gravity_m_per_s2": 1.62}, lambda m: m.opt.gravity.tolist(), [0, 0, -1.62]),
+    ({"arena.friction": 0.37}, lambda m: set(m.geom_friction[[*touching(m), m.geom("floor").id], 0]), {0.37}),
+    ({"arena.floor_gap_m": 0.02}, lambda m: m.geom("floor").pos[2], -0.02),
+    ({"arena.contact_time_constant_s": 0.013}, lambda m: set(m.geom_solref[touching(m), 0]), {0.013}),
+    (
+        {"arena.contact_impedance": [0.8, 0.85, 0.002]},
+        lambda m: m.geom_solimp[touching(m), :3].mean(axis=0).tolist(),
+        [0.8, 0.85, 0.002],
+    ),
+    (
+        {"body.springs.stiffness_N_per_m": 31.0},
+        lambda m: set(m.tendon_stiffness[springs(m)].reshape(42, -1)[:, 0]),
+        {31.0},
+    ),
+    ({"body.springs.rest_length_m": 0.065}, lambda m: set(m.tendon_lengthspring[springs(m)].ravel()), {0.065}),
+    ({"body.rings.peak_force_N": 31.0}, lambda m: set(m.actuator_gainprm[:, 2]), {31.0}),
+    ({"body.rings.minimum_length": 0.61}, lambda m: set(m.actuator_gainprm[:, 4]), {0.61}),
+    ({"body.rings.maximum_length": 1.7}, lambda m: set(m.actuator_gainprm[:, 5]), {1.7}),
+    ({"body.rings.maximum_velocity": 2.5}, lambda m: set(m.actuator_gainprm[:, 6]), {2.5}),
+    ({"body.rings.passive_peak": 0.4}, lambda m: set(m.actuator_gainprm[:, 7]), {0.4}),
+    ({"body.rings.lengthening_peak": 1.9}, lambda m: set(m.actuator_gainprm[:, 8]), {1.9}),
+    ({"body.rings.length_range_m": [0.5, 1.2]}, lambda m: m.actuator_lengthrange.tolist(), [[0.5, 1.2]] * 3),
+    (
+        {"body.rings.length_range_m": [[0.5, 1.0], [0.6, 1.1], [0.7, 1.2]]},
+        lambda m: m.actuator_lengthrange.tolist(),
+        [[0.5, 1.0], [0.6, 1.1], [0.7, 1.2]],
+    ),
+    ({"body.rings.activation_dynamics": False}, lambda m: m.na, 0),
+    ({"body.rings.activation_dynamics": True}, lambda m: m.na, 3),
+    ({"body.pins.radius_m": 0.007}, lambda m: m.geom("crossing_5").size[0], 0.007),
+]
+RODS: list[tuple[dict[str, Any], Read, Any]] = [
+    (
+        {},
+        lambda m: (m.opt.integrator, m.opt.solver),
+        (mujoco.mjtIntegrator.mjINT_DISCRETE, mujoco.mjtSolver.mjSOL_NEWTON),
+    ),
+    ({"body.formulation.edge_time_constant_s": 0.003}, lambda m: set(m.eq_solref[:, 0]), {0.003}),
+    ({"body.formulation.solver_iterations": 55}, lambda m: m.opt.iterations, 55),
+    ({"body.formulation.solver_tolerance": 1e-5}, lambda m: m.opt.tolerance, 1e-5),
+    ({"body.formulation.friction_impedance_ratio": 17.0}, lambda m: m.opt.impratio, 17.0),
+    ({"body.strands.radius_m": 0.003}, lambda m: set(m.flex_radius) | set(m.geom_size[touching(m), 0]), {0.003}),
+    ({"body.mesh.elements_per_side": 2}, lambda m: set(m.flex_elemnum), {14 * 2 + 2 * 2}),
+    ({"body.mesh.elements_per_end": 1}, lambda m: set(m.flex_elemnum), {14 * 3 + 2}),
+]
+CHAINS: list[tuple[dict[str, Any], Read, Any]] = [
+    ({}, lambda m: m.opt.solver, mujoco.mjtSolver.mjSOL_PGS),
+    ({"body.formulation.integrator": "RK4"}, lambda m: m.opt.integrator, mujoco.mjtIntegrator.mjINT_RK4),
+    ({"body.formulation.integrator": "Euler"}, lambda m: m.opt.integrator, mujoco.mjtIntegrator.mjINT_EULER),
+    ({"body.formulation.solver_iterations": 77}, lambda m: m.opt.iterations, 77),
+    ({"body.formulation.solver_tolerance": 1e-7}, lambda m: m.opt.tolerance, 1e-7),
+    ({"body.formulation.armature_kg_m2": 0.02}, lambda m: set(m.dof_armature[m.dof_armature > 0]), {0.02}),
+    ({"body.formulation.pin_time_constant_s": 0.009}, lambda m: set(m.eq_solref[pins(m), 0]), {0.009}),
+    (
+        {"body.formulation.pin_impedance": [0.7, 0.75, 0.003]},
+        lambda m: m.eq_solimp[pins(m), :3].mean(axis=0).tolist(),
+        [0.7, 0.75, 0.003],
+    ),
+    ({"body.formulation.pins": "separate"}, lambda m: len(pins(m)), 180),
+    ({"body.formulation.pins": "direct"}, lambda m: len(pins(m)), 90),
+    ({"body.formulation.joint": "ball"}, lambda m: len(elastic_joints(m)), 12 * 47),
+    ({"body.formulation.joint": "hinges"}, lambda m: len(elastic_joints(m)), 12 * 47 * 3),
+    ({"body.strands.joint_damping_Nms_per_rad": 0.3}, lambda m: joint_damping(m).tolist(), [0.3]),
+]
+
+
+def assert_read(changes: dict[str, Any], read: Read, expected: Any) -> None:
+    actual = read(compiled(changes))
+    if isinstance(expected, set):
+        actual, expected = sorted(actual), sorted(expected)
+    flat_actual, flat_expected = np.ravel(np.asarray(actual, float)), np.ravel(np.asarray(expected, float))
+    assert flat_actual == pytest.approx(flat_expected, rel=1e-9)
+
+
+def name_of(case: tuple[dict[str, Any], Read, Any]) -> str:
+    return ", ".join(f"{key.split('.')[-1]}={value}" for key, value in case[0].items()) or "defaults"
+
+
+@pytest.mark.parametrize("case", BOTH, ids=name_of)
+@pytest.mark.parametrize("formulation", [{}, CHAIN], ids=["rods", "chain"])
+def test_an_option_of_both_formulations_reaches_the_engine(formulation: dict[str, Any], case: Any) -> None:
+    changes, read, expected = case
+    assert_read({**formulation, **changes}, read, expected)
+
+
+@pytest.mark.parametrize("case", RODS, ids=name_of)
+def test_an_option_of_the_rods_reaches_the_engine(case: Any) -> None:
+    assert_read(*case)
+
+
+@pytest.mark.parametrize("case", CHAINS, ids=name_of)
+def test_an_option_of_the_chain_reaches_the_engine(case: Any) -> None:
+    changes, read, expected = case
+    assert_read({**CHAIN, **changes}, read, expected)
+
+
+def test_rods_get_the_same_damping_per_joint_as_the_chain() -> None:
+    strands = Strands(joint_damping_Nms_per_rad=0.12)
+    bending = 0.3e9 * pi * 0.002**4 / 4
+    assert rayleigh_damping_s(strands, 0.03) * bending / 0.03 == pytest.approx(0.12)
+
+
+def test_the_chain_s_joints_resist_with_the_rod_s_stiffness_over_their_length() -> None:
+    model = compiled({**CHAIN, "body.formulation.joint": "hinges"})
+    stiffness = model.jnt_stiffness.reshape(model.njnt, -1)[elastic_joints(model), 0]
+    bending, torsion = 0.3e9 * pi * 0.002**4 / 4, 0.2e9 * pi * 0.002**4 / 2
+    vertices = helical_mesh(3).vertices_m[0]
+    element = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
+    joint = (element[1:] + element[:-1]) / 2
+    expected = np.tile(np.concatenate([bending / joint, bending / joint, torsion / joint]), 12)
+    assert np.sort(stiffness) == pytest.approx(np.sort(expected), rel=1e-9)
+
+
+def test_every_vertex_of_a_rod_can_touch_the_floor_just_once() -> None:
+    model = compiled({})
+    flexes, touches = model.flex_vertbodyid, model.geom_bodyid[touching(model)]
+    assert sorted(touches) == sorted(set(flexes))
+    assert not model.flex_conaffinity.any()
+
+
+def test_activation_beyond_one_is_clipped() -> None:
+    model = compiled({})
+    assert model.actuator_ctrllimited.all()
+    assert np.allclose(model.actuator_ctrlrange, [0, 1])
+
+
+def test_slippery_ground_lets_a_pushed_worm_slide() -> None:
+    travelled = []
+    for friction in (0.02, 1.0):
+        model = compiled({"arena.friction": friction, "body.strands.joint_damping_Nms_per_rad": 0.02})
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 200)
+        start = data.subtree_com[0, 0]
+        data.xfrc_applied[1:, 0] = 0.3 * 9.81 * model.body_mass[1:]
+        mujoco.mj_step(model, data, 60)
+        mujoco.mj_forward(model, data)
+        travelled.append(data.subtree_com[0, 0] - start)
+    assert travelled[0] > 0.05
+    assert travelled[1] < 0.2 * travelled[0]

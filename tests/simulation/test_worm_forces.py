@@ -1,0 +1,129 @@
+"""What the 3D worm reports of forces, strains and energy, against mechanics worked out from its positions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.config import load_config
+from annelid.simulation.worm import WormPlant
+
+CHAIN = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler"}
+DIRECT = {**CHAIN, "body.formulation.pins": "direct"}
+PULL = np.array([1.0, 0.0, 0.3])
+STEP_S = 0.002
+
+
+def worm(**changes: Any) -> WormPlant:
+    clock = {"control_timestep_s": STEP_S, "physics_timestep_s": STEP_S}
+    plant = WormPlant(load_config({"clock": clock, "record": {"signals_interval_s": STEP_S}}, changes))
+    plant.reset(0)
+    return plant
+
+
+def after(plant: WormPlant, seconds: float, activation: np.ndarray = PULL) -> WormPlant:
+    for _ in range(round(seconds / STEP_S)):
+        plant.step(activation)
+    return plant
+
+
+def momentum(plant: WormPlant) -> np.ndarray:
+    mujoco.mj_kinematics(plant.model, plant.data)
+    mujoco.mj_comPos(plant.model, plant.data)
+    mujoco.mj_comVel(plant.model, plant.data)
+    mujoco.mj_subtreeVel(plant.model, plant.data)
+    return plant.data.subtree_linvel[0] * plant.model.body_mass.sum()
+
+
+@pytest.mark.parametrize("formulation", [{}, CHAIN], ids=["rods", "chain"])
+def test_the_floor_s_force_and_the_weight_change_the_momentum(formulation: dict[str, Any]) -> None:
+    """Newton's second law for the whole worm: all other forces, also those of armature and damping, are inner ones."""
+    plant = after(worm(**formulation), 0.05)
+    weight = np.array([0.0, 0.0, -9.81 * plant.total_mass_kg])
+    checked = 0
+    for _ in range(40):
+        before = momentum(plant)
+        contact = plant.step(PULL).contact_force_N.sum(axis=0)
+        change = (momentum(plant) - before) / STEP_S
+        if np.linalg.norm(contact[:2]) > 0.05:
+            assert change == pytest.approx(contact + weight, abs=0.02 * float(np.linalg.norm(contact)) + 0.01)
+            checked += 1
+    assert checked > 5, "friction must really act"
+
+
+def test_a_load_on_one_segment_is_carried_under_that_segment() -> None:
+    light = {"body.strands.joint_damping_Nms_per_rad": 0.02}
+    for segment in range(3):
+        plant = after(worm(**light), 0.3, np.zeros(3))
+        unloaded = plant.step(np.zeros(3)).contact_force_N[:, 2]
+        for crossing in plant.geometry.rings[segment]:
+            plant.data.xfrc_applied[plant.model.body(f"crossing_{crossing}").id, 2] = -0.1
+        loaded = after(plant, 0.3, np.zeros(3)).step(np.zeros(3)).contact_force_N[:, 2]
+        assert np.argmax(loaded - unloaded) == segment
+        assert (loaded - unloaded).sum() == pytest.approx(0.6, rel=0.15)
+
+
+@pytest.mark.parametrize("formulation", [CHAIN, DIRECT], ids=["separate", "direct"])
+def test_the_pin_gap_is_the_distance_between_the_two_strands(formulation: dict[str, Any]) -> None:
+    plant = after(worm(**formulation), 0.1)
+    mujoco.mj_kinematics(plant.model, plant.data)
+    model, data = plant.model, plant.data
+
+    def anchor(equation: int, side: int) -> np.ndarray:
+        body = (model.eq_obj1id if side == 0 else model.eq_obj2id)[equation]
+        local = model.eq_data[equation, 3 * side : 3 * side + 3]
+        return data.xpos[body] + data.xmat[body].reshape(3, 3) @ local
+
+    if formulation is CHAIN:
+        gaps = [np.linalg.norm(anchor(e, 1) - anchor(e + 1, 1)) for e in range(0, model.neq, 2)]
+    else:
+        gaps = [np.linalg.norm(anchor(e, 0) - anchor(e, 1)) for e in range(model.neq)]
+    plant.step(PULL)
+    assert plant.read(False)["pin_gap"] == pytest.approx(max(gaps), rel=1e-6)
+    assert max(gaps) > 1e-4
+
+
+def test_the_edge_strain_is_the_largest_relative_change_of_an_edge() -> None:
+    plant = after(worm(), 0.1)
+    mujoco.mj_kinematics(plant.model, plant.data)
+    mujoco.mj_comPos(plant.model, plant.data)
+    mujoco.mj_flex(plant.model, plant.data)
+    vertices = plant.data.flexvert_xpos.reshape(12, -1, 3)
+    lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+    rest = np.linalg.norm(np.diff(plant.geometry.vertices_m, axis=1), axis=2)
+    expected = np.abs(lengths / rest - 1).max()
+    plant.step(PULL)
+    assert plant.read(False)["edge_strain"] == pytest.approx(expected, rel=1e-6)
+    assert expected > 1e-5
+
+
+def test_the_kinetic_energy_of_rods_is_that_of_their_vertices() -> None:
+    plant = after(worm(), 0.05)
+    slides = plant.model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+    dofs = plant.model.jnt_dofadr[slides]
+    mass = plant.model.body_mass[plant.model.jnt_bodyid[slides]]
+    expected = 0.5 * float(mass @ plant.data.qvel[dofs] ** 2)
+    assert plant.read(False)["kinetic_energy"] == pytest.approx(expected, rel=1e-3)
+    assert expected > 1e-4
+
+
+def test_rest_lengths_of_the_sensors_do_not_depend_on_the_kind_of_spring() -> None:
+    slack = worm(**{"body.springs.tension_only": True})
+    felt = slack.reset(0)
+    assert felt.rest_stretch_m == pytest.approx(slack.geometry.spring_length_m[slack.geometry.sensor_springs])
+    assert felt.stretch_m == pytest.approx(felt.rest_stretch_m)
+
+
+def test_the_height_guard_watches_the_highest_crossing() -> None:
+    plant = worm(**{"guard.height_m": 0.25})
+    plant.step(np.zeros(3))
+    alarm = plant.alarm()
+    assert alarm is not None
+    assert "height of a crossing is 0.3" in alarm
+
+
+def test_the_engine_may_not_reset_a_worm_that_blew_up() -> None:
+    assert worm().model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET

@@ -13,6 +13,7 @@ from annelid.config import (
     RunConfig,
     WormBody,
     field_paths,
+    fields_of,
     load_config,
     parse_assignments,
     preset_names,
@@ -98,6 +99,37 @@ def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
     assert config.clock == load_config("riddle2023-rods").clock
 
 
+def test_a_file_that_names_no_base_starts_from_the_rod_worm(tmp_path: Path) -> None:
+    file = tmp_path / "empty.toml"
+    file.write_text("", encoding="utf-8")
+    expected = load_config("riddle2023-rods").model_copy(update={"name": "empty"})
+    assert load_config(file) == expected
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_printed_preset_is_a_file_of_its_own(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "copy.toml"
+    file.write_text(preset_text(name), encoding="utf-8")
+    assert load_config(file) == load_config(name)
+
+
+def test_files_may_not_extend_themselves(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.toml", tmp_path / "second.toml"
+    first.write_text(f'extends = "{second.as_posix()}"', encoding="utf-8")
+    second.write_text(f'extends = "{first.as_posix()}"', encoding="utf-8")
+    with pytest.raises(ConfigError, match="extends itself"):
+        load_config(first)
+
+
+def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
+    fields = fields_of(load_config("riddle2023-rods"))
+    assert "body.n_segments" not in fields
+    assert "body.formulation.armature_kg_m2" not in fields
+    assert "Newton" in fields["body.formulation.solver_iterations"]
+    with pytest.raises(ConfigError, match=r"did you mean 'body\.mesh\.n_segments'"):
+        load_config("riddle2023-rods", {"n_segments": 4})
+
+
 @pytest.mark.parametrize(
     ("assignment", "sentence"),
     [
@@ -123,6 +155,14 @@ def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
         ("body.rings.length_range_m=[1.0, 0.5]", "lower bound below its upper bound"),
         ("body.rings.length_range_m=[[0.5, 1.0], [0.5, 1.0]]", "2 ranges for 3 segments"),
         ("body=3", "is a section"),
+        ("body.mesh.n_segments=100000", "must be at most 200"),
+        ("duration_s=1e9", "more than 10,000,000 samples"),
+        ("clock.control_timestep_s=1e-320", "must be at least 1e-06"),
+        ("clock.physics_timestep_s=2", "must be at most 1"),
+        ("body.rings.length_range_m=[]", "one pair"),
+        ("body.strands.radius_m=0.5", "must be less than body.mesh.radius_m = 0.16"),
+        ("arena.contact_impedance=[1, 2, 3]", "must be less than 1"),
+        ("arena.floor_gap_m=-0.1", "must be at least 0"),
     ],
 )
 def test_a_bad_value_is_named_with_what_would_be_valid(assignment: str, sentence: str) -> None:

@@ -64,13 +64,23 @@ def pulses(time: np.ndarray, *onsets: float) -> np.ndarray:
     return sum((((time >= t) & (time < t + 0.5)).astype(float) for t in onsets), np.zeros_like(time))
 
 
-def test_interval_from_the_initial_state_does_not_count_where_there_is_another() -> None:
+def test_an_interval_that_begins_with_the_initial_state_never_counts() -> None:
     time = np.linspace(0.0, 10.0, 10_001)
     found = rhythm(time, np.stack([pulses(time, 0.0, 1.0, 4.0), pulses(time, 2.0), pulses(time, 3.0)], axis=1))
     assert found.period_s == pytest.approx(3.0, abs=1e-3)
     alone = rhythm(time, np.stack([pulses(time, 0.0, 2.4), pulses(time, 1.0), pulses(time, 1.7)], axis=1))
-    assert alone.period_s == pytest.approx(2.4, abs=1e-3)
-    assert alone.period_std_s is None
+    assert (alone.period_s, alone.period_std_s) == (None, None)
+
+
+def test_a_continued_run_has_no_initial_state() -> None:
+    """What is contracted at its first sample began before; the wave may begin at any segment."""
+    time = np.linspace(5.6, 15.6, 10_001)
+    activation = np.stack([pulses(time, 5.0, 8.0, 11.0, 14.0), pulses(time, 6.0, 9.0), pulses(time, 7.0, 10.0)], axis=1)
+    activation[0, 0] = activation[1, 0] = 1.0
+    found = rhythm(time, activation)
+    assert found.order[:4] == (2, 3, 1, 2)
+    assert found.period_s == pytest.approx(3.0, abs=1e-3)
+    assert rhythm(time[:6000], activation[:6000]).wave is True
 
 
 def test_first_activation_recorded_one_sample_late_is_still_the_initial_state() -> None:

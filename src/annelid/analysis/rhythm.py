@@ -70,8 +70,9 @@ def onset_times(time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRAC
 def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     """Describes the rhythm of a run.
 
-    An onset in the first sampling interval belongs to the initial state, not to the rhythm: intervals that
-    begin with one count towards the period only where there is no other interval.
+    An onset in the first sampling interval of a run belongs to the initial state, not to the rhythm: no interval
+    that begins with one counts towards the period. A continued run, whose first sample is later than time zero,
+    has no initial state: what is contracted there has begun before, and the wave may begin at any segment.
 
     Args:
         time_s: Sample times, s, shape ``(n_times,)``.
@@ -83,26 +84,34 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     times = np.asarray(time_s, dtype=float)
     values = np.asarray(activation, dtype=float)
     n_segments = values.shape[1]
-    by_segment = [onset_times(times, values[:, i]) for i in range(n_segments)]
+    continued = bool(len(times)) and times[0] > 0
+    by_segment = [
+        onset_times(times, values[:, i])[int(continued and values[0, i] >= CONTRACTED) :] for i in range(n_segments)
+    ]
     events = sorted((onset, i + 1) for i, onsets in enumerate(by_segment) for onset in onsets)
     order = tuple(segment for _, segment in events)
     start_ends_s = times[min(1, len(times) - 1)] if len(times) else 0.0
-    intervals = [(a, b - a) for onsets in by_segment for a, b in pairwise(onsets)]
-    periods = [length for begin, length in intervals if begin > start_ends_s]
-    periods = periods or [length for _, length in intervals]
+    periods = [b - a for onsets in by_segment for a, b in pairwise(onsets) if continued or a > start_ends_s]
     return Rhythm(
         order=order,
         onsets_s=tuple(onset for onset, _ in events),
         period_s=float(np.mean(periods)) if periods else None,
         period_std_s=float(np.std(periods)) if len(periods) > 1 else None,
-        wave=is_wave(order, n_segments),
+        wave=is_wave(order, n_segments, any_start=continued),
         full_cycles=full_cycles(order, n_segments),
     )
 
 
-def is_wave(order: tuple[int, ...], n_segments: int) -> bool | None:
-    """Tells whether an order of contraction is 1-2-..-N repeated; None where it is too short to tell."""
-    if any(segment != i % n_segments + 1 for i, segment in enumerate(order)):
+def is_wave(order: tuple[int, ...], n_segments: int, any_start: bool = False) -> bool | None:
+    """Tells whether an order of contraction is 1-2-..-N repeated; None where it is too short to tell.
+
+    Args:
+        order: Segments (counted from 1) in the order of their contractions.
+        n_segments: Number of segments.
+        any_start: The order may begin within a cycle, as that of a continued run does.
+    """
+    start = order[0] - 1 if order and any_start else 0
+    if any(segment != (start + i) % n_segments + 1 for i, segment in enumerate(order)):
         return False
     return True if len(order) >= n_segments else None
 

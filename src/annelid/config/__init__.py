@@ -5,7 +5,7 @@ states every field with its source; a user's own TOML file may start from one (`
 any field can be overridden by its dotted path (``body.mesh.n_segments=4``).
 """
 
-from annelid.config.checking import check_config, field_paths
+from annelid.config.checking import check_config, field_paths, fields_of
 from annelid.config.loading import load_config, parse_assignments, preset_names, preset_text
 from annelid.config.models import (
     Arena,
@@ -47,6 +47,7 @@ __all__ = [
     "WormBody",
     "check_config",
     "field_paths",
+    "fields_of",
     "load_config",
     "parse_assignments",
     "preset_names",

@@ -34,6 +34,22 @@ def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[st
     return paths
 
 
+def fields_of(config: RunConfig) -> dict[str, str]:
+    """Returns the dotted path and the description of every field that this configuration's kinds have."""
+    return _fields_of_section(config, "")
+
+
+def _fields_of_section(section: BaseModel, prefix: str) -> dict[str, str]:
+    paths: dict[str, str] = {}
+    for name, info in type(section).model_fields.items():
+        value = getattr(section, name)
+        if isinstance(value, BaseModel):
+            paths.update(_fields_of_section(value, f"{prefix}{name}."))
+        elif not _sections_of(info.annotation):
+            paths[f"{prefix}{name}"] = info.description or ""
+    return paths
+
+
 def _sections_of(annotation: Any) -> list[type[Section]]:
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return [annotation]
@@ -59,6 +75,9 @@ _WORDS = {
     "finite_number": "must be a finite number",
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",
+    "missing": "must be given",
+    "tuple_type": "must be a list of numbers",
+    "too_long": "has too many entries",
     "model_type": "is a section; set one of its fields instead",
     "model_attributes_type": "is a section; set one of its fields instead",
 }
@@ -89,7 +108,9 @@ def _nearest_fields(loc: tuple[int | str, ...]) -> str:
     """Suggests a field for the last part of a location that names none."""
     section, leaf = _section_at(loc[:-1]), str(loc[-1])
     siblings = sorted(section.model_fields)
-    by_leaf = {path.rsplit(".", 1)[-1]: path for path in field_paths()}
+    by_leaf: dict[str, str] = {}
+    for path in field_paths():
+        by_leaf.setdefault(path.rsplit(".", 1)[-1], path)
     near = get_close_matches(leaf, siblings, n=1, cutoff=0.6)
     near_elsewhere = get_close_matches(leaf, by_leaf, n=1, cutoff=0.6)
     if leaf in by_leaf and set(by_leaf[leaf].split(".")) <= set(map(str, loc)):

@@ -12,6 +12,9 @@ from annelid.config.checking import check_config
 from annelid.config.models import RunConfig
 from annelid.errors import ConfigError, suggest
 
+DEFAULT_BASE = "riddle2023-rods"
+"""What a user's file starts from unless it says otherwise or states its own kind of body."""
+
 
 def preset_names() -> list[str]:
     """Returns the names of the presets that come with annelid."""
@@ -35,7 +38,8 @@ def load_config(source: str | Path | Mapping[str, Any], overrides: Mapping[str, 
 
     Args:
         source: Name of a preset, path of a TOML file (recognised by its suffix ``.toml``), or nested mapping.
-            A file or mapping may name a preset to start from with ``extends``.
+            A file or mapping may name a preset or another file to start from with ``extends``; a file that
+            neither does so nor states ``body.kind`` starts from ``riddle2023-rods``.
         overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``.
 
     Returns:
@@ -76,22 +80,36 @@ def _parse_value(text: str) -> Any:
         return text
 
 
-def _read_tree(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if isinstance(source, Mapping):
         own = dict(source)
+        base = own.pop("extends", None)
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
-        try:
-            own = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"cannot read the configuration file {path}: {error.strerror}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ConfigError(f"{path} is not valid TOML: {error}") from None
+        own = _read_file(path)
         own.setdefault("name", path.stem)
+        if path.resolve() in above:
+            raise ConfigError(f"{path} extends itself: {' -> '.join(file.name for file in (*above, path))}")
+        above = (*above, path.resolve())
+        body = own.get("body")
+        stands_alone = isinstance(body, Mapping) and "kind" in body
+        base = own.pop("extends", None if stands_alone else DEFAULT_BASE)
     else:
-        own = tomllib.loads(preset_text(str(source)))
-    base = own.pop("extends", None)
-    return own if base is None else _merge(_read_tree(base), own)
+        return tomllib.loads(preset_text(str(source)))
+    if base is None:
+        return own
+    if not isinstance(base, str):
+        raise ConfigError(f"extends = {base!r}: must be the name of a preset or of a TOML file")
+    return _merge(_read_tree(base, above), own)
+
+
+def _read_file(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot read the configuration file {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} is not valid TOML: {error}") from None
 
 
 def _merge(base: dict[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,8 +7,11 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, field_validator, model_validator
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0, le=1e15)]
+NonNegative = Annotated[float, Field(ge=0, le=1e15)]
+Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
+Impedance = tuple[Annotated[float, Field(gt=0, lt=1)], Annotated[float, Field(gt=0, lt=1)], Positive]
+MOST_SAMPLES = 10_000_000
 Range = tuple[Positive, Positive]
 
 
@@ -26,7 +29,7 @@ class Section(BaseModel):
 class Mesh(Section):
     """Geometry of the helical mesh (lengths in m)."""
 
-    n_segments: Annotated[int, Field(ge=3)] = Field(default=3, description="actuated segments")
+    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
     n_helices: Annotated[int, Field(ge=6, le=96)] = Field(
         default=12, description="strands, half of each handedness; even"
     )
@@ -40,10 +43,10 @@ class Mesh(Section):
     elements_per_end: Annotated[int, Field(ge=1, le=32)] | None = Field(
         default=None, description="straight elements in each free end of a strand; default as many as in a side"
     )
-    planes_between_rings: Annotated[int, Field(ge=2)] = Field(
+    planes_between_rings: Annotated[int, Field(ge=2, le=50)] = Field(
         default=4, description="crossing planes from one ring to the next"
     )
-    free_planes_at_ends: Annotated[int, Field(ge=1)] = Field(
+    free_planes_at_ends: Annotated[int, Field(ge=1, le=50)] = Field(
         default=3, description="crossing planes before the first and after the last ring"
     )
     rear_overhang_m: Positive | None = Field(
@@ -113,6 +116,8 @@ class Rings(Section):
     @field_validator("length_range_m")
     @classmethod
     def _ordered(cls, value: Any) -> Any:
+        if not value:
+            raise ValueError("needs one pair for all rings or one pair a segment")
         for low, high in value if isinstance(value[0], tuple) else (value,):
             if low >= high:
                 raise ValueError("each length range needs its lower bound below its upper bound")
@@ -131,7 +136,9 @@ class Rods(Section):
 
     kind: Literal["rods"] = "rods"
     edge_time_constant_s: Positive = Field(default=0.001, description="time constant of the inextensible edges")
-    solver_iterations: Annotated[int, Field(ge=10)] = Field(default=100, description="Newton iterations at most")
+    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
+        default=100, description="Newton iterations at most"
+    )
     solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
     friction_impedance_ratio: Positive = Field(
         default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
@@ -148,14 +155,16 @@ class Chain(Section):
     )
     armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
     pin_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the pin constraints")
-    pin_impedance: tuple[Positive, Positive, Positive] = Field(
+    pin_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
     )
     pins: Literal["separate", "direct"] = Field(
         default="separate", description="strands tied to a pin mass each, or straight to one another"
     )
     integrator: Literal["RK4", "Euler"] = Field(default="RK4", description="time integration")
-    solver_iterations: Annotated[int, Field(ge=10)] = Field(default=500, description="PGS iterations at most")
+    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
+        default=500, description="PGS iterations at most"
+    )
     solver_tolerance: NonNegative = Field(default=1e-8, description="PGS tolerance")
 
 
@@ -188,12 +197,17 @@ class WormBody(Section):
         return self.mesh.n_segments
 
     @model_validator(mode="after")
-    def _one_range_a_ring(self) -> Self:
+    def _parts_fit_together(self) -> Self:
+        if self.strands.radius_m >= self.mesh.radius_m:
+            raise ValueError(
+                f"body.strands.radius_m = {self.strands.radius_m:g} must be less than "
+                f"body.mesh.radius_m = {self.mesh.radius_m:g}"
+            )
         n = len(self.rings.length_ranges(self.mesh.n_segments))
         if n != self.mesh.n_segments:
             raise ValueError(
-                f"rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
-                "give one pair for all rings or one pair for each"
+                f"body.rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
+                "give one pair for each, or one for all, for example body.rings.length_range_m=[0.566,1.067]"
             )
         return self
 
@@ -202,7 +216,7 @@ class PlanarBody(Section):
     """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
 
     kind: Literal["riddle2022"] = "riddle2022"
-    n_segments: Annotated[int, Field(ge=3)] = Field(default=3, description="actuated segments")
+    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
     side_m: Positive = Field(default=0.073, description="side of a rhombus")
     height_min_m: Positive = Field(default=0.065, description="height when contracted")
     height_max_m: Positive = Field(default=0.11, description="height when relaxed")
@@ -224,10 +238,10 @@ class Arena(Section):
     """Where the worm crawls: flat ground under gravity."""
 
     friction: NonNegative = Field(default=1.0, description="coefficient of sliding friction")
-    floor_gap_m: float = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
+    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
     gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
     contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")
-    contact_impedance: tuple[Positive, Positive, Positive] = Field(
+    contact_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
     )
 
@@ -257,7 +271,9 @@ class SnsController(Section):
     inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
     excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
     sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
-    gate_slope_per_mV: Positive = Field(default=0.05, description="slope S of the sodium gates")
+    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
+        default=0.05, description="slope S of the sodium gates"
+    )
     gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; sets the period: 300, 200 or 100")
     sensor_current_nA: NonNegative = Field(default=20.0, description="current of a stretch sensor that is on")
     kick_nA: NonNegative = Field(default=1.0, description="current into the first contraction neuron at the first step")
@@ -277,15 +293,15 @@ class SnsController(Section):
 class Clock(Section):
     """Time steps: one is an integer multiple of the other."""
 
-    control_timestep_s: Positive = Field(default=0.001, description="step of the nervous system")
-    physics_timestep_s: Positive = Field(default=0.005, description="step of the body")
+    control_timestep_s: Timestep = Field(default=0.001, description="step of the nervous system")
+    physics_timestep_s: Timestep = Field(default=0.005, description="step of the body")
 
     @model_validator(mode="after")
     def _multiples(self) -> Self:
         small, large = sorted((self.control_timestep_s, self.physics_timestep_s))
         if not _is_multiple(large, small):
             raise ValueError(
-                f"control_timestep_s = {self.control_timestep_s:g} and physics_timestep_s = "
+                f"clock.control_timestep_s = {self.control_timestep_s:g} and clock.physics_timestep_s = "
                 f"{self.physics_timestep_s:g}: one must be an integer multiple of the other"
             )
         return self
@@ -348,5 +364,18 @@ class RunConfig(Section):
             if not _is_multiple(value, step):
                 raise ValueError(
                     f"{field} = {value:g} must be an integer multiple of clock.control_timestep_s = {step:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _samples_have_an_end(self) -> Self:
+        for field, interval in (
+            ("record.signals_interval_s", self.record.signals_interval_s),
+            ("record.frames_interval_s", self.record.frames_interval_s),
+        ):
+            if self.duration_s / interval > MOST_SAMPLES:
+                raise ValueError(
+                    f"duration_s = {self.duration_s:g} at {field} = {interval:g} makes more than {MOST_SAMPLES:,} "
+                    "samples: shorten the run or lengthen the interval"
                 )
         return self

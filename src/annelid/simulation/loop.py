@@ -9,7 +9,7 @@ from time import perf_counter
 
 from numpy.typing import ArrayLike
 
-from annelid.config import RunConfig
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
 from annelid.protocols import Controller, Plant, Records, Sensation
 from annelid.simulation.assemble import as_controller, build_plant
@@ -38,7 +38,7 @@ _CHECKPOINT_SHARE = 0.02
 
 
 def simulate(
-    config: RunConfig | None,
+    config: RunConfig | str | None,
     out: str | Path,
     *,
     plant: Plant | None = None,
@@ -54,7 +54,7 @@ def simulate(
     raises KeyboardInterrupt.
 
     Args:
-        config: The configuration; None for that of the run to continue.
+        config: The configuration, or the name of a preset; None for that of the run to continue.
         out: Folder for the run file; made if it is not there.
         plant: The body, instead of the one that the configuration describes.
         controller: The controller, likewise, or a plain function from sensation to activation.
@@ -75,6 +75,8 @@ def simulate(
         SimulationStopped: A guard stopped the run; its file is kept.
     """
     out = Path(out)
+    if isinstance(config, str):
+        config = load_config(config)
     refuse_used_folder(out, overwrite)
     origin = None if resume is None else origin_of(resume)
     if origin is not None:

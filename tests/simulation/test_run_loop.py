@@ -230,3 +230,12 @@ def test_the_planar_worm_runs_from_its_configuration_alone(tmp_path: Path) -> No
     assert data["potential"].attrs["units"] == "mV"
     side, height = config.body.model_dump()["side_m"], data["ring_length"].values
     np.testing.assert_allclose(data["stretch_length"].values[..., 0] ** 2 + height**2, (2 * side) ** 2, rtol=1e-12)
+
+
+def test_a_plain_function_is_a_controller_and_the_file_names_it(tmp_path: Path) -> None:
+    def half(sensation: Sensation) -> Array:
+        return np.full(len(sensation.ring_length_m), 0.5)
+
+    run = simulate(toy_config(), tmp_path, plant=ToyPlant(), controller=half)
+    assert run.data.attrs["controller"] == "half"
+    np.testing.assert_array_equal(run.data["activation"][1:], 0.5)

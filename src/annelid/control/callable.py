@@ -14,6 +14,9 @@ from annelid.protocols import Array, Sensation
 class CallableController:
     """Wraps a plain function from sensation to activation.
 
+    Attributes:
+        name: Name of the function, for the run file.
+
     Example::
 
         controller = CallableController(lambda s: 0.5 + 0.5 * np.sin(s.time_s - np.arange(3)), n_muscles=3)
@@ -33,6 +36,7 @@ class CallableController:
             n_muscles: Number of muscles of the worm.
             on_reset: Called with the seed at every reset, for functions that keep a state.
         """
+        self.name = getattr(function, "__name__", type(function).__name__)
         self._function = function
         self._n_muscles = n_muscles
         self._on_reset = on_reset

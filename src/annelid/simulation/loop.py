@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -98,7 +99,9 @@ def _recorder(config: RunConfig, simulation: Coupling, origin: Origin | None, pa
     first = simulation.checkpoint()
     packed = None if first is None else first.to_bytes()
     plan = layout(simulation.schedule, parts, simulation.sensation.rest_stretch_m, packed)
-    attrs = global_attributes(config, parts) | ({} if origin is None else origin.attrs())
+    # The configured controller overrides this with its own attribute; without it the file would name that one.
+    attrs: dict[str, Any] = {"controller": getattr(simulation.controller, "name", type(simulation.controller).__name__)}
+    attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
     recorder = Recorder(path, plan, attrs)
     if packed is not None:
         recorder.checkpoint(packed)

@@ -1,0 +1,94 @@
+"""The presets carry the published numbers (the paper, and the authors' model files)."""
+
+from __future__ import annotations
+
+import pytest
+
+from annelid.config import load_config
+
+PUBLISHED = {
+    "duration_s": 5.0,
+    "body.mesh.n_segments": 3,
+    "body.mesh.n_helices": 12,
+    "body.mesh.radius_m": 0.16,
+    "body.mesh.angular_rate_rad_per_m": 14.0,
+    "body.mesh.elements_per_side": 3,
+    "body.mesh.planes_between_rings": 4,
+    "body.strands.radius_m": 0.002,
+    "body.strands.young_modulus_Pa": 0.3e9,
+    "body.strands.shear_modulus_Pa": 0.2e9,
+    "body.strands.joint_damping_Nms_per_rad": 0.12,
+    "body.pins.mass_kg": 0.00052,
+    "body.springs.stiffness_N_per_m": 19.9,
+    "body.rings.layout": "whole",
+    "body.rings.minimum_length": 0.58,
+    "body.rings.maximum_length": 1.6,
+    "body.rings.maximum_velocity": 1.5,
+    "body.rings.passive_peak": 1.3,
+    "body.rings.lengthening_peak": 1.2,
+    "arena.friction": 1.0,
+    "arena.floor_gap_m": 0.009,
+    "arena.gravity_m_per_s2": 9.81,
+    "controller.capacitance_nF": 5.0,
+    "controller.leak_conductance_uS": 1.0,
+    "controller.range_mV": 20.0,
+    "controller.bifurcation_mV": 0.01,
+    "controller.offset_mV": 0.1,
+    "controller.inhibitory_reversal_mV": -40.0,
+    "controller.excitatory_reversal_mV": 194.0,
+    "controller.sodium_reversal_mV": 110.0,
+    "controller.gate_slope_per_mV": 0.05,
+    "controller.gate_time_constant_ms": 300.0,
+    "controller.sensor_current_nA": 20.0,
+    "controller.kick_nA": 1.0,
+    "clock.control_timestep_s": 0.001,
+}
+PAPER_S_FORMULATION = {
+    "body.formulation.kind": "chain",
+    "body.formulation.armature_kg_m2": 0.01,
+    "body.formulation.pins": "separate",
+    "body.formulation.integrator": "RK4",
+    "body.formulation.solver_iterations": 500,
+    "body.rings.length_range_m": ((0.548, 1.052), (0.609, 1.080), (0.541, 1.071)),
+    "clock.physics_timestep_s": 0.001,
+    "controller.gate_start": "toolbox",
+    "controller.activation": "sigmoid",
+    "controller.activation_slope_per_mV": 0.35,
+    "sensor.tolerance_m": 0.010,
+    "sensor.startup_hold_s": 0.2,
+}
+PLANAR = {
+    "body.side_m": 0.073,
+    "body.height_min_m": 0.065,
+    "body.height_max_m": 0.11,
+    "body.gain": 1.3,
+    "sensor.tolerance_m": 0.0001,
+    "controller.activation": "linear",
+}
+
+
+def value_at(preset: str, path: str) -> object:
+    value: object = load_config(preset)
+    for name in path.split("."):
+        value = getattr(value, name)
+    return value
+
+
+@pytest.mark.parametrize("preset", ["riddle2023", "riddle2023-rods"])
+@pytest.mark.parametrize("path", PUBLISHED)
+def test_the_robot_and_its_network_are_the_published_ones(preset: str, path: str) -> None:
+    assert value_at(preset, path) == PUBLISHED[path]
+
+
+@pytest.mark.parametrize("path", PAPER_S_FORMULATION)
+def test_the_paper_s_formulation_is_the_reconstruction(path: str) -> None:
+    assert value_at("riddle2023", path) == PAPER_S_FORMULATION[path]
+
+
+@pytest.mark.parametrize("path", [*PLANAR, *(path for path in PUBLISHED if path.startswith("controller."))])
+def test_the_planar_worm_is_the_published_one(path: str) -> None:
+    assert value_at("riddle2022-planar", path) == (PLANAR | PUBLISHED)[path]
+
+
+def test_the_peak_force_is_the_compiler_s_of_the_paper_s_time() -> None:
+    assert value_at("riddle2023", "body.rings.peak_force_N") == pytest.approx(550_000 / 4678, abs=0.01)

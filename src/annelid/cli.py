@@ -49,6 +49,12 @@ class _Sentences(TyperGroup):
             where = f"{error.filename}: " if error.filename else ""
             _complain(f"{where}{error.strerror or error}")
             raise typer.Exit(EXIT_USAGE) from None
+        except MemoryError:
+            _complain("there is not enough memory for this: try fewer segments, or a smaller picture")
+            raise typer.Exit(EXIT_USAGE) from None
+        except ArithmeticError as error:
+            _complain(f"a number is too large or too small to compute with: {str(error) or type(error).__name__}")
+            raise typer.Exit(EXIT_USAGE) from None
         except KeyboardInterrupt:
             _complain("interrupted")
             raise typer.Exit(EXIT_INTERRUPTED) from None
@@ -135,7 +141,7 @@ def run(
 
     overrides = _overrides(assignments, duration_s=duration, seed=seed)
     if resume is None:
-        config = _config(preset or DEFAULT_PRESET, overrides, segments)
+        config = _config(_or_default(preset), overrides, segments)
     elif preset is None and segments is None:
         config = _config_to_continue(resume, overrides)
     else:
@@ -148,9 +154,10 @@ def run(
     if not quiet:
         _print_table(done)
     if done.status == "interrupted":
-        _complain(f"interrupted: what was computed is in {done.path}")
+        _complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
         raise typer.Exit(EXIT_INTERRUPTED)
-    for path in (done.path, *draw_all(done, folder, video=video, quiet=quiet, complain=_complain)):
+    typer.echo(done.path)
+    for path in draw_all(done, folder, video=video, quiet=quiet, complain=_complain):
         typer.echo(path)
 
 
@@ -169,15 +176,17 @@ def build(
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
     from annelid.body import build_spec
+    from annelid.view.output import whole_file
 
     _refuse_existing(output, force)
-    config = _config(preset or DEFAULT_PRESET, _overrides(assignments), segments)
+    config = _config(_or_default(preset), _overrides(assignments), segments)
     spec = build_spec(config)
     try:
         spec.compile()
     except ValueError as error:
         raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
-    output.write_text(spec.to_xml(), encoding="utf-8")
+    with whole_file(output) as draft:
+        draft.write_text(spec.to_xml(), encoding="utf-8")
     typer.echo(output)
 
 
@@ -223,11 +232,14 @@ def plot(
     annelid plot runs/riddle2023-001 -o figure7.pdf
     """
     from annelid.simulation.runfile import open_run
-    from annelid.view.plots import figure7
+    from annelid.view.plots import figure7, plot_path
 
     opened = open_run(run)
-    target = output or opened.path.parent / "figure7.png"
-    _refuse_existing(target, force)
+    if output is None:
+        target = opened.path.parent / "figure7.png"
+    else:
+        target = plot_path(output)
+        _refuse_existing(target, force)
     typer.echo(figure7(opened, target))
 
 
@@ -239,7 +251,7 @@ def render(
         Path | None, typer.Option("--output", "-o", help="Frame to write: .png, .jpg  [default: frame.png in the run]")
     ] = None,
     video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv")] = None,
-    fps: Annotated[float, typer.Option(help="Frames a second of the video.")] = 25.0,
+    fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
     camera: Annotated[str | None, typer.Option(help="isometric, side, top or front  [default: isometric]")] = None,
     force: Force = False,
@@ -262,9 +274,10 @@ def render(
     if output is not None and at is None:
         raise typer.BadParameter("-o names the frame, so it needs --time SECONDS as well")
     opened = open_run(run)
-    frame = output or opened.path.parent / "frame.png"
-    for target in ([frame] if at is not None else []) + ([video] if video is not None else []):
-        _refuse_existing(target, force)
+    for target in (output, video):
+        if target is not None:
+            _refuse_existing(target, force)
+    frame = opened.path.parent / "frame.png" if output is None else output
     if at is not None:
         typer.echo(render_frame(opened, at, frame, camera=camera))
     if video is not None:
@@ -296,7 +309,7 @@ def presets(
         typer.echo(preset_text(name), nl=False)
         return
     if fields:
-        typer.echo("\n".join(field_lines(load_config(name or DEFAULT_PRESET))))
+        typer.echo("\n".join(field_lines(load_config(_or_default(name)))))
         return
     Console().print(presets_table([load_config(each) for each in preset_names()]))
 
@@ -316,6 +329,11 @@ def doctor() -> None:
 
 def _complain(what: object) -> None:
     typer.echo(f"annelid: {' '.join(str(what).split())}", err=True)
+
+
+def _or_default(preset: str | None) -> str:
+    # An empty name, as from an unset variable of a shell, must not pass for none.
+    return DEFAULT_PRESET if preset is None else preset
 
 
 def _overrides(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
@@ -343,16 +361,20 @@ def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
 
 @contextmanager
 def _run_folder(out: Path | None, name: str) -> Iterator[Path]:
-    """Yields the folder to run into; a numbered one that was made for the run and stayed empty is removed."""
+    """Yields the folder to run into; what was made for a numbered one and stayed empty is removed."""
     if out is not None:
         yield out
         return
-    folder = _next_free(Path("runs"), re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run")
+    parent = Path("runs")
+    first = not parent.exists()
+    folder = _next_free(parent, re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run")
     try:
         yield folder
     finally:
         with suppress(OSError):
             folder.rmdir()
+            if first:
+                parent.rmdir()
 
 
 def _next_free(parent: Path, name: str) -> Path:

@@ -18,6 +18,8 @@ def test_run_ends_with_table_file_and_pictures(annelid: Command) -> None:
     folder = Path("runs/riddle2022-planar-001")
     assert sorted(p.name for p in folder.iterdir()) == ["figure7.png", "frame.png", "run.nc", "video.mp4"]
     assert all(str(folder / name) in done.out for name in ("run.nc", "figure7.png", "frame.png", "video.mp4"))
+    paths = [line for line in done.out.splitlines() if line.startswith("runs")]
+    assert [Path(path).name for path in paths] == ["run.nc", "figure7.png", "frame.png", "video.mp4"]
     assert "riddle2022-planar: 4 segments, 0.5 s, complete" in done.out
     config = open_run(folder).config
     assert (config.body.n_segments, config.duration_s, config.seed) == (4, 0.5, 7)

@@ -43,7 +43,7 @@ def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
     assert done.exit_code == 2
     assert says in done.sentence()
     assert not [path for path in Path().rglob("*") if path.is_file()]
-    assert not list(Path().glob("runs/*")), "no empty numbered folder stays behind"
+    assert not Path("runs").exists(), "no empty folder stays behind"
 
 
 @pytest.mark.parametrize(
@@ -94,10 +94,80 @@ def test_existing_models_are_kept_unless_forced(annelid: Command) -> None:
     assert "<mujoco" in Path("worm.xml").read_text()
 
 
-def test_the_runs_own_pictures_are_not_replaced_by_plot(annelid: Command, finished: Path) -> None:
-    done = annelid("plot", finished)
+@pytest.mark.parametrize(
+    ("arguments", "option", "name"),
+    [(("plot",), "-o", "figure7.png"), (("render", "--time", "0.5"), "-o", "frame.png")],
+)
+def test_a_runs_own_pictures_are_drawn_anew_unless_they_are_named(
+    annelid: Command, finished: Path, arguments: tuple[str, ...], option: str, name: str
+) -> None:
+    own = finished / name
+    own.write_text("old")
+    named = annelid(*arguments, finished, option, own)
+    assert named.exit_code == 2
+    assert f"{name} exists" in named.sentence()
+    assert own.read_text() == "old"
+    assert annelid(*arguments, finished).exit_code == 0
+    assert own.stat().st_size > 1000
+
+
+def test_a_name_without_suffix_does_not_replace_the_png(annelid: Command, finished: Path) -> None:
+    Path("mine.png").write_text("mine")
+    done = annelid("plot", finished, "-o", "mine")
     assert done.exit_code == 2
-    assert "figure7.png exists" in done.sentence()
+    assert "mine.png exists" in done.sentence()
+    assert Path("mine.png").read_text() == "mine"
+    assert annelid("plot", finished, "-o", "other").out.split() == ["other.png"]
+    assert [path.name for path in Path().iterdir() if path.name.startswith("other")] == ["other.png"]
+
+
+@pytest.mark.parametrize("name", ["a.xyz", "a.jpg", ""])
+def test_plot_writes_three_formats_only(annelid: Command, finished: Path, name: str) -> None:
+    done = annelid("plot", finished, "-o", name)
+    assert done.exit_code == 2
+    assert ".png, .pdf, .svg" in done.sentence() or "is a folder" in done.sentence()
+    assert list(Path().iterdir()) == []
+
+
+@pytest.mark.parametrize("command", [("run",), ("build",), ("presets", "--fields")])
+def test_an_empty_name_is_not_the_default(annelid: Command, command: tuple[str, ...]) -> None:
+    done = annelid(*command, "")
+    assert done.exit_code == 2
+    assert "unknown preset ''" in done.sentence()
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [
+        (MemoryError(), "not enough memory"),
+        (OverflowError("too big"), "too big"),
+        (ZeroDivisionError(), "ZeroDivision"),
+    ],
+)
+def test_a_last_resort_is_a_sentence(
+    annelid: Command, monkeypatch: pytest.MonkeyPatch, error: Exception, says: str
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("annelid.simulation.loop.simulate", fail)
+    done = annelid("run", "riddle2022-planar")
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not Path("runs").exists()
+
+
+def test_a_runs_folder_that_was_there_stays(annelid: Command) -> None:
+    Path("runs").mkdir()
+    assert annelid("run", "riddle2022-planar", "--resume", "nothere").exit_code == 2
+    assert annelid("run", "riddle2022-planar", "--duration", "-1").exit_code == 2
+    assert Path("runs").is_dir()
+
+
+def test_fps_beyond_240_are_refused(annelid: Command, finished: Path) -> None:
+    done = annelid("render", finished, "--video", "v.mp4", "--fps", "241")
+    assert done.exit_code == 2
+    assert "fps = 241" in done.sentence()
 
 
 def test_a_foreign_and_a_truncated_file_are_refused(annelid: Command, finished: Path) -> None:
@@ -159,7 +229,7 @@ def test_a_guard_that_stops_before_any_file_is_still_a_sentence(
     done = annelid("run", "riddle2022-planar")
     assert done.exit_code == 3
     assert done.sentence() == "the ring collapsed"
-    assert list(Path("runs").iterdir()) == []
+    assert not Path("runs").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for one process")
@@ -180,3 +250,4 @@ def test_ctrl_c_prints_what_was_computed_and_exits_130(tmp_path: Path) -> None:
     assert "Traceback" not in err
     assert "interrupted: what was computed is in long/run.nc" in err
     assert "interrupted" in out.splitlines()[0]
+    assert err.splitlines()[-1].endswith("continue it with: annelid run --resume long")

@@ -66,3 +66,10 @@ def test_a_missing_item_comes_with_the_line_that_installs_it() -> None:
     line = Finding("ffmpeg", False, "not found", "pip install imageio-ffmpeg").line()
     assert line.split() == ["missing", "ffmpeg", "not", "found:", "pip", "install", "imageio-ffmpeg"]
     assert Finding("ffmpeg", True, "7.0", "pip install imageio-ffmpeg").line().split() == ["ok", "ffmpeg", "7.0"]
+
+
+def test_a_chosen_back_end_that_fails_is_to_be_unset(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    monkeypatch.setattr(gl, "works", lambda backend: False)
+    with pytest.raises(RenderingUnavailable, match=r"osmesa .* unset MUJOCO_GL"):
+        gl.find_backend()

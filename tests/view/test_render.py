@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.errors import RenderingUnavailable, RunFileError
+from annelid.errors import MissingDependency, RenderingUnavailable, RunFileError
 from annelid.simulation.runfile import Run
 from annelid.view.camera import VIEWS_DEG
 from annelid.view.gl import find_backend
@@ -118,11 +120,115 @@ def test_impossible_frames_are_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("fps", "speed"), [(0.0, 1.0), (25.0, 0.0), (25.0, -1.0), (math.nan, 1.0), (math.inf, 1.0)])
-def test_impossible_videos_are_refused(planar_run: Run, tmp_path: Path, fps: float, speed: float) -> None:
-    with pytest.raises(RunFileError, match="positive fps and speed"):
+@pytest.mark.parametrize(
+    ("fps", "speed", "says"),
+    [
+        (0.0, 1.0, "fps = 0: .* 1 to 240"),
+        (0.99, 1.0, "fps = 0.99"),
+        (240.1, 1.0, "fps = 240.1"),
+        (math.nan, 1.0, "fps = nan"),
+        (math.inf, 1.0, "fps = inf"),
+        (25.0, 0.0, "speed = 0"),
+        (25.0, -1.0, "speed = -1"),
+        (25.0, math.inf, "speed = inf"),
+    ],
+)
+def test_impossible_videos_are_refused(planar_run: Run, tmp_path: Path, fps: float, speed: float, says: str) -> None:
+    with pytest.raises(RunFileError, match=says):
         render_video(planar_run, tmp_path / "a.mp4", fps=fps, speed=speed)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("fps", "suffix"), [(1.0, "mp4"), (23.976, "mov"), (240.0, "mkv"), (29.97, "mkv")])
+def test_possible_rates_are_written_whole(planar_run: Run, tmp_path: Path, fps: float, suffix: str) -> None:
+    target = render_video(planar_run, tmp_path / f"a.{suffix}", fps=fps, speed=fps / 10, size=(160, 96))
+    assert imageio.v3.imread(target).shape[0] == 31
+
+
+def an_ffmpeg(folder: Path, while_writing: str) -> Path:
+    """An ffmpeg that reads videos as ever, but writes them in another way."""
+    import imageio_ffmpeg
+
+    script = folder / "ffmpeg"
+    real = imageio_ffmpeg.get_ffmpeg_exe()
+    script.write_text(
+        f'#!/bin/bash\ncase "$*" in *rawvideo*) {while_writing.format(real=real)} ;; *) exec "{real}" "$@" ;; esac\n'
+    )
+    script.chmod(0o755)
+    return script
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the broken ffmpeg is a shell script")
+@pytest.mark.parametrize(
+    "while_writing",
+    [
+        # Stops after two pictures, as on a full disk, but takes the others.
+        '"{real}" "${{@:1:$#-1}}" -frames:v 2 "${{@: -1}}"; cat >/dev/null; exit 1',
+        "cat >/dev/null; exit 1",
+        "echo No space left on device >&2; exit 1",
+    ],
+    ids=["truncated", "nothing", "broken pipe"],
+)
+def test_a_video_that_ffmpeg_does_not_finish_is_refused_and_removed(
+    planar_run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    while_writing: str,
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(an_ffmpeg(tmp_path, while_writing)))
+    with pytest.raises(RunFileError, match=r"cannot write .*a\.mp4: ffmpeg .* failed") as caught:
+        render_video(planar_run, out / "a.mp4", fps=5, size=(160, 96))
+    assert "\n" not in str(caught.value)
+    assert list(out.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sets no limit to a file's size")
+def test_a_video_on_a_full_disk_is_one_sentence_without_ffmpegs_own(planar_run: Run, tmp_path: Path) -> None:
+    program = (
+        "import resource, signal, sys\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
+        "from annelid.cli import main\n"
+        f"sys.argv = ['annelid', 'render', {str(planar_run.path)!r}, '--video', 'v.mp4']\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("annelid: cannot write v.mp4: ffmpeg")
+    assert len(done.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_ffmpeg_is_a_sentence(planar_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/nonexistent")
+    with pytest.raises(MissingDependency, match=r"no program /nonexistent.*pip install imageio-ffmpeg"):
+        render_video(planar_run, tmp_path / "a.mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_gl
+@pytest.mark.parametrize("view", sorted(VIEWS_DEG))
+def test_strand_ends_beyond_the_crossings_are_in_the_picture(rods_run: Run, view: str) -> None:
+    with WormScene(rods_run, 240, 136, view, fine=False) as scene:
+        for frame in range(len(scene.times_s)):
+            pixels = scene.picture(frame).astype(int)
+            blue = (pixels[:, :, 2] > pixels[:, :, 0] + 60) & (pixels[:, :, 2] > 120)
+            rows, columns = np.nonzero(blue)
+            assert rows.min() >= 0.05 * 136
+            assert rows.max() <= 0.95 * 136
+            assert columns.min() >= 0.05 * 240
+            assert columns.max() <= 0.95 * 240
+
+
+@needs_gl
+def test_the_floor_seen_from_the_top_is_not_overexposed(rods_run: Run) -> None:
+    with WormScene(rods_run, 240, 136, "top", fine=True) as scene:
+        pixels = scene.picture(0)
+    assert np.mean(pixels.max(axis=2) == 255) < 0.1
 
 
 def test_a_failing_video_leaves_nothing_and_keeps_what_was_there(planar_run: Run, tmp_path: Path) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import platform
+import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 
 from annelid.errors import RenderingUnavailable
-from annelid.view.gl import INSTALL_LINE, candidates, works
+from annelid.view.gl import candidates, find_backend, works
 
 MINIMUM_MUJOCO = (4, 0, 1)
 _PACKAGES = ("numpy", "pydantic", "xarray", "h5netcdf", "h5py", "matplotlib", "imageio", "typer", "rich")
@@ -87,20 +88,26 @@ def _back_ends() -> Iterator[Finding]:
     if any(results.values()):
         yield Finding("frames and videos", True, f"drawn with {next(b for b in tried if results[b])}")
     else:
-        remedy = INSTALL_LINE if platform.system() == "Linux" else "update the graphics driver"
-        yield Finding("frames and videos", False, "no OpenGL back-end works", remedy)
+        try:
+            find_backend()
+        except RenderingUnavailable as error:
+            yield Finding("frames and videos", False, str(error))
 
 
 def _ffmpeg() -> Finding:
-    remedy = "pip install imageio-ffmpeg"
+    remedy = "unset IMAGEIO_FFMPEG_EXE" if os.environ.get("IMAGEIO_FFMPEG_EXE") else "pip install imageio-ffmpeg"
     if find_spec("imageio_ffmpeg") is None:
         return Finding("ffmpeg", False, "not installed", remedy)
     import imageio_ffmpeg
 
     try:
-        return Finding("ffmpeg", True, imageio_ffmpeg.get_ffmpeg_version())
+        if found := imageio_ffmpeg.get_ffmpeg_version():
+            return Finding("ffmpeg", True, found)
     except (RuntimeError, OSError):
         return Finding("ffmpeg", False, "not found", remedy)
+    except (IndexError, ValueError, subprocess.SubprocessError):
+        pass
+    return Finding("ffmpeg", False, f"{imageio_ffmpeg.get_ffmpeg_exe()} is no ffmpeg", remedy)
 
 
 def _extra(name: str) -> list[str]:

@@ -29,7 +29,7 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
         folder: Where the pictures go; those of an earlier run there are replaced.
         video: Whether to draw the video.
         quiet: Whether to do without a progress bar.
-        complain: Called with the error where something cannot be drawn; the rest goes on.
+        complain: Called at the end with one sentence for each reason for which pictures could not be drawn.
 
     Yields:
         The path of each picture once it is written.
@@ -38,15 +38,31 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
     frame_time = FRAME_TIME_S
     if times.size and not times[0] <= frame_time <= times[-1]:
         frame_time = float(times[0] + times[-1]) / 2
-    try:
-        yield figure7(run, folder / "figure7.png")
-        yield render_frame(run, frame_time, folder / "frame.png")
-        if video:
-            with video_bar(quiet=quiet) as progress:
-                path = render_video(run, folder / "video.mp4", progress=progress)
+    frame_remedy = f"annelid render {folder} --time {frame_time:g}"
+    video_path = folder / "video.mp4"
+
+    def draw_video(path: Path) -> Path:
+        with video_bar(quiet=quiet) as progress:
+            return render_video(run, path, progress=progress)
+
+    pictures: list[tuple[str, Callable[[Path], Path], str]] = [
+        ("figure7.png", lambda path: figure7(run, path), f"annelid plot {folder}"),
+        ("frame.png", lambda path: render_frame(run, frame_time, path), frame_remedy),
+    ]
+    if video:
+        pictures.append((video_path.name, draw_video, f"annelid render {folder} --video {video_path}"))
+    failures: dict[str, list[tuple[str, str]]] = {}
+    for name, draw, remedy in pictures:
+        try:
+            path = draw(folder / name)
+        except (AnnelidError, OSError) as error:
+            failures.setdefault(str(error), []).append((name, remedy))
+        else:
             yield path
-    except AnnelidError as error:
-        complain(f"{error} (the run is whole; then draw it with: annelid render {folder} --time {frame_time:g})")
+    for reason, failed in failures.items():
+        names = " and ".join(name for name, _ in failed)
+        remedies = " and ".join(remedy for _, remedy in failed)
+        complain(f"{names} not drawn: {reason} (the run is whole; then draw with: {remedies})")
 
 
 @contextmanager

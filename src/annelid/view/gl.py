@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 INSTALL_LINE = "apt install libosmesa6"
 """What installs a back-end that needs neither a graphics card nor a screen (Debian, Ubuntu)."""
 
+UNSET = "unset MUJOCO_GL"
 _OFF = {"disable", "disabled", "off", "false", "0"}
 _DEFAULT = {"", "enable", "enabled", "on", "true", "1"}
 _MODULES = {"egl": "egl", "osmesa": "osmesa", "glfw": "glfw", "glx": "glfw", "wgl": "glfw", "cgl": "cgl"}
@@ -88,6 +89,8 @@ def find_backend() -> str:
     for backend in tried:
         if works(backend):
             return backend
+    if os.environ.get("MUJOCO_GL", "").strip().lower() not in _DEFAULT:
+        raise RenderingUnavailable(f"the OpenGL back-end {tried[0]} that MUJOCO_GL names does not work here: {UNSET}")
     remedy = (
         f"install one with: {INSTALL_LINE}"
         if platform.system() == "Linux"

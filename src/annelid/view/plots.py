@@ -9,6 +9,7 @@ import numpy as np
 
 from annelid.analysis.rhythm import CONTRACTED, segment_activation
 from annelid.errors import RunFileError
+from annelid.view.output import whole_file, with_suffix
 from annelid.view.style import STYLE, panel_title, segment_colors
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
 _CM = 100.0
+PLOT_SUFFIXES = (".png", ".pdf", ".svg")
 _WIDTH_IN = 7.2
 
 
@@ -29,18 +31,21 @@ def figure7(run: Run, path: str | Path) -> Path:
 
     Args:
         run: The run.
-        path: File to write; its suffix chooses the format (``.png``, ``.pdf``, ``.svg``).
+        path: File to write; its suffix chooses the format (``.png``, ``.pdf``, ``.svg``); a name without
+            one becomes a ``.png``.
 
     Returns:
         The path written.
 
     Raises:
-        RunFileError: The run holds no samples, or none of these signals.
+        RunFileError: The run holds no samples, or none of these signals; or the file has another suffix or cannot
+            be written.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    path = plot_path(path)
     data = run.data
     if data.sizes.get("time", 0) < 2 or "stretch_length" not in data:
         raise RunFileError(f"{run.path} holds too little to plot: fewer than two samples of stretch lengths")
@@ -58,8 +63,18 @@ def figure7(run: Run, path: str | Path) -> Path:
         lengths.set_xlim(float(data["time"].values[0]), float(data["time"].values[-1]))
         figure.suptitle(f"{run.config.name}: {n_segments} segments", x=0.01, ha="left", fontsize=11, weight="bold")
         figure.align_ylabels()
-        figure.savefig(path)
-    return Path(path)
+        with whole_file(path) as draft:
+            figure.savefig(draft)
+    return path
+
+
+def plot_path(path: str | Path) -> Path:
+    """Returns the file that `figure7` writes for a name: one without a suffix becomes a ``.png``.
+
+    Raises:
+        RunFileError: Another suffix, or a folder.
+    """
+    return with_suffix(path, PLOT_SUFFIXES, "a figure", default=".png")
 
 
 def _potentials(axes: Axes, run: Run, colors: list) -> None:

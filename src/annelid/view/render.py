@@ -6,6 +6,7 @@ The 3D worm is drawn by MuJoCo and needs OpenGL; the planar worms are drawn by m
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from annelid.config import PlanarBody
 from annelid.errors import MissingDependency, RunFileError
+from annelid.view.output import whole_file, with_suffix
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -26,6 +28,8 @@ VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432)}
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 DEFAULT_CAMERA = "isometric"
+FPS_RANGE = (1.0, 240.0)
+_FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip install imageio-ffmpeg"
 
 Progress = Callable[[int, int], object]
 """Called with the number of frames done and their total."""
@@ -62,16 +66,18 @@ def render_frame(
         The path written.
 
     Raises:
-        RunFileError: The run does not hold that time, has no such camera, or the path has another suffix.
+        RunFileError: The run does not hold that time, has no such camera, or the path has another suffix or
+            cannot be written.
         RenderingUnavailable: No OpenGL back-end works.
     """
     import imageio.v3
 
-    path = _with_suffix(path, FRAME_SUFFIXES, "a picture")
+    path = with_suffix(path, FRAME_SUFFIXES, "a picture")
     size = size or FRAME_SIZE[run.config.body.kind]
     with _scene(run, size, camera, fine=True) as scene:
         pixels = scene.picture(_nearest(run, scene.times_s, time_s))
-    imageio.v3.imwrite(path, pixels)
+    with whole_file(path) as draft:
+        imageio.v3.imwrite(draft, pixels)
     return path
 
 
@@ -92,7 +98,7 @@ def render_video(
     Args:
         run: The run.
         path: Video to write (``.mp4``, ``.mov``, ``.mkv``).
-        fps: Frames a second of the video; the recorded posture nearest to each is shown.
+        fps: Frames a second of the video, 1 to 240; the recorded posture nearest to each is shown.
         speed: Simulated seconds a second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.view.camera.VIEWS_DEG`; by default isometric.
         size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`.
@@ -102,26 +108,29 @@ def render_video(
         The path written.
 
     Raises:
-        RunFileError: The run has no such camera, the path another suffix, or ``fps`` or ``speed`` not positive.
+        RunFileError: The run has no such camera, the path another suffix, ``fps`` or ``speed`` is out of range,
+            or the file cannot be written whole, as on a full disk.
         RenderingUnavailable: No OpenGL back-end works.
         MissingDependency: There is no ffmpeg to write videos with.
     """
-    path = _with_suffix(path, VIDEO_SUFFIXES, "a video")
-    if not (0 < fps < math.inf and 0 < speed < math.inf):
-        raise RunFileError(f"a video needs a positive fps and speed, not fps = {fps:g} and speed = {speed:g}")
+    path = with_suffix(path, VIDEO_SUFFIXES, "a video")
+    slowest, fastest = FPS_RANGE
+    if not slowest <= fps <= fastest:
+        raise RunFileError(f"fps = {fps:g}: a video has {slowest:g} to {fastest:g} frames a second")
+    if not 0 < speed < math.inf:
+        raise RunFileError(f"speed = {speed:g}: the speed of a video must be positive and finite")
     size = size or VIDEO_SIZE[run.config.body.kind]
-    draft = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        with _scene(run, size, camera, fine=False) as scene, _video_writer(draft, fps) as write:
-            first, last = float(scene.times_s[0]), float(scene.times_s[-1])
-            total = math.floor((last - first) * fps / speed + 1e-6) + 1
-            for done in range(total):
-                write(scene.picture(_nearest(run, scene.times_s, first + done * speed / fps)))
-                if progress is not None:
-                    progress(done + 1, total)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
+    with (
+        _scene(run, size, camera, fine=False) as scene,
+        whole_file(path) as draft,
+        _video_writer(draft, fps, path) as video,
+    ):
+        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        total = math.floor((last - first) * fps / speed + 1e-6) + 1
+        for done in range(total):
+            video.write(scene.picture(_nearest(run, scene.times_s, first + done * speed / fps)))
+            if progress is not None:
+                progress(done + 1, total)
     return path
 
 
@@ -147,25 +156,52 @@ def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
     return int(np.abs(times_s - time_s).argmin())
 
 
-def _with_suffix(path: str | Path, suffixes: tuple[str, ...], what: str) -> Path:
-    path = Path(path)
-    if path.suffix.lower() not in suffixes:
-        raise RunFileError(f"{path} cannot be written as {what}: its name must end in {', '.join(suffixes)}")
-    return path
+class _VideoWriter:
+    """Hands pictures to ffmpeg and counts them."""
+
+    def __init__(self, writer: Any) -> None:
+        self._writer = writer
+        self.n_frames = 0
+
+    def write(self, pixels: NDArray[np.uint8]) -> None:
+        """Adds a picture."""
+        self._writer.append_data(pixels)
+        self.n_frames += 1
 
 
 @contextmanager
-def _video_writer(path: Path, fps: float) -> Iterator[Callable[[Any], object]]:
+def _video_writer(path: Path, fps: float, name: Path) -> Iterator[_VideoWriter]:
+    """Opens a video, and at the end makes sure that every picture is in it, for ffmpeg's exit status is lost."""
     import imageio.v2
 
     try:
         import imageio_ffmpeg
 
-        imageio_ffmpeg.get_ffmpeg_exe()
+        ffmpeg = imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError):
-        raise MissingDependency("no ffmpeg to write videos with: install it with: pip install imageio-ffmpeg") from None
-    writer = imageio.v2.get_writer(path, format="FFMPEG", fps=fps, codec="libx264", quality=7)  # type: ignore[arg-type]
+        raise MissingDependency(f"no ffmpeg to write {name} with: {_FFMPEG_REMEDY}") from None
+    if shutil.which(ffmpeg) is None:
+        raise MissingDependency(f"no ffmpeg to write {name} with, there is no program {ffmpeg}: {_FFMPEG_REMEDY}")
+    opened = imageio.v2.get_writer(
+        path,
+        format="FFMPEG",  # type: ignore[arg-type]
+        fps=fps,
+        codec="libx264",
+        quality=7,
+        ffmpeg_log_level="quiet",
+    )
+    writer = _VideoWriter(opened)
+    broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"
     try:
-        yield lambda pixels: writer.append_data(pixels)
-    finally:
-        writer.close()
+        try:
+            yield writer
+        finally:
+            opened.close()
+    except OSError as error:
+        raise RunFileError(broken) from error
+    try:
+        n_frames, _ = imageio_ffmpeg.count_frames_and_secs(path)
+    except (RuntimeError, OSError, ValueError) as error:
+        raise RunFileError(broken) from error
+    if n_frames != writer.n_frames:
+        raise RunFileError(f"{broken} {n_frames} of {writer.n_frames} pictures are in it")

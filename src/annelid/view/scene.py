@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
+AMBIENT = 0.5
+HEADLIGHT = 0.25
+"""Light from all sides, and from the camera; the lamp adds 0.4."""
 CONTRACTED_WIDTH = 1.8
 """A contracted ring muscle is drawn this much thicker than a relaxed one."""
 HAZE = (0.94, 0.955, 0.97)
@@ -53,6 +57,9 @@ class WormScene:
         self._run = run
         self.times_s: NDArray[np.float64] = data["frame_time"].values
         self._model, self._rings = _model_to_draw(run.config)
+        # The floor takes the more of the headlight the steeper it is seen; seen from the top it would be white.
+        steepness = abs(math.sin(math.radians(self._angles[1])))
+        self._model.vis.headlight.ambient[:] = min(AMBIENT, AMBIENT + 0.1 - HEADLIGHT * steepness)
         if data.sizes["coordinate"] != self._model.nq:
             raise RunFileError(
                 f"{run.path} holds postures of {data.sizes['coordinate']} coordinates, but the body built "
@@ -62,7 +69,9 @@ class WormScene:
         self._ring_width = self._model.tendon_width[self._rings].copy()
         self._aspect = width / height
         self._target = data["crossing_position"].values.mean(axis=1)
-        self._target[:, 2] = self._target[0, 2]
+        points = self._points_drawn()
+        self._target[:, 2] = (points[:, :, 2].min() + points[:, :, 2].max()) / 2
+        self._offsets = (points - self._target[:, None]).reshape(-1, 3)
         self._canvas = Canvas(self._model, width, height, backend, fine=fine)
 
     def __enter__(self) -> Self:
@@ -100,14 +109,33 @@ class WormScene:
             self._model.tendon_rgba[ring] = (*activation_color(float(value)), 1.0)
             self._model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * float(value))
 
+    def _points_drawn(self) -> NDArray[np.float64]:
+        """Both ends of every part of the worm in every recorded posture, m, shape ``(frame, point, 3)``.
+
+        The strands' free ends reach beyond the crossings, so these would not do.
+        """
+        import mujoco
+
+        model, posture = self._model, self._posture
+        parts = np.flatnonzero(model.geom_bodyid > 0)
+        capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
+        half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
+        points = []
+        for qpos in self._run.data["qpos"].values:
+            posture.qpos[:] = qpos
+            mujoco.mj_kinematics(model, posture)
+            middles, axes = posture.geom_xpos[parts], posture.geom_xmat[parts].reshape(-1, 3, 3)[:, :, 2]
+            reach = half_lengths[:, None] * axes
+            points.append(np.concatenate([middles - reach, middles + reach]))
+        return np.stack(points)
+
     def _camera_and_option(self) -> tuple[mujoco.MjvCamera, mujoco.MjvOption]:
         import mujoco
 
         camera = mujoco.MjvCamera()
         camera.type = mujoco.mjtCamera.mjCAMERA_FREE
         camera.azimuth, camera.elevation = self._angles
-        offsets = self._run.data["crossing_position"].values - self._target[:, None]
-        camera.distance = fitting_distance(offsets.reshape(-1, 3), *self._angles, self._aspect)
+        camera.distance = fitting_distance(self._offsets, *self._angles, self._aspect)
         option = mujoco.MjvOption()
         mujoco.mjv_defaultOption(option)
         option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
@@ -125,8 +153,7 @@ def _model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]
     spec = build_spec(config)
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
-    visual.headlight.ambient = [0.5, 0.5, 0.5]
-    visual.headlight.diffuse = [0.25, 0.25, 0.25]
+    visual.headlight.diffuse = [HEADLIGHT] * 3
     visual.headlight.specular = [0.05, 0.05, 0.05]
     visual.quality.shadowsize = 4096
     visual.rgba.fog = [*HAZE, 1.0]

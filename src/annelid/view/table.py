@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarBody, field_paths
+from annelid.config import PlanarBody, fields_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from annelid.config import RunConfig
 
 UNKNOWN = "-"
-_ABSENT = object()
 _ONSETS_SHOWN = 12
+_NARROWEST, _NARROWEST_OURS = 12, 16
 
 # Field of the summary: what it is called, what it is multiplied by, digits, unit.
 _ROWS = {
@@ -60,10 +60,10 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
-    table.add_column("quantity", no_wrap=True)
-    table.add_column("this run", overflow="fold")
+    table.add_column("quantity", min_width=_NARROWEST, overflow="fold")
+    table.add_column("this run", min_width=_NARROWEST_OURS, overflow="fold")
     if beside:
-        table.add_column("published", no_wrap=True)
+        table.add_column("published", overflow="fold")
     for label, ours, field in _cells(numbers, planar=isinstance(config.body, PlanarBody)):
         theirs = _theirs(field, beside.get(field))
         if ours != UNKNOWN or theirs:
@@ -88,13 +88,12 @@ def presets_table(presets: Sequence[RunConfig]) -> Table:
 def field_lines(config: RunConfig) -> list[str]:
     """Returns one line for every field of a configuration: path, value as TOML writes it, and what it means."""
     lines = []
-    for path, meaning in field_paths().items():
+    for path, meaning in fields_of(config).items():
         value: Any = config
         for key in path.split("."):
-            value = getattr(value, key, _ABSENT)
-        if value is not _ABSENT:
-            setting = f"{path} = {_toml(value)}" if value is not None else f"{path} (not set)"
-            lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
+            value = getattr(value, key)
+        setting = f"{path} = {_toml(value)}" if value is not None else f"{path} (not set)"
+        lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
     return lines
 
 
@@ -150,4 +149,4 @@ def _quantity(value: float | Sequence[float | None] | None, factor: float, digit
     if isinstance(value, list | tuple):
         return f"{' / '.join(_quantity(v, factor, digits, '') for v in value)} {unit}"
     assert isinstance(value, int | float)
-    return f"{factor * value:.{digits}f} {unit}".rstrip()
+    return f"{factor * value:z.{digits}f} {unit}".rstrip()

@@ -1,0 +1,65 @@
+"""Files that appear under their name only when they are whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from annelid.errors import RunFileError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Gives a hidden draft beside a file, to be written and then moved into its place.
+
+    Args:
+        path: The file to write; what is there stays until the draft is complete.
+
+    Yields:
+        The draft, which has the same suffix; it is removed where the block ends in an error.
+
+    Raises:
+        RunFileError: The file cannot be written, for example because the disk is full.
+    """
+    path = Path(path)
+    target = path.resolve()
+    # A device or a pipe must be written as it is: moving a file there would replace it.
+    direct = target.exists() and not target.is_file()
+    draft = target if direct else target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
+    try:
+        yield draft
+        if not direct:
+            draft.replace(target)
+    except OSError as error:
+        raise RunFileError(f"cannot write {path}: {error.strerror or str(error).partition(chr(10))[0]}") from error
+    finally:
+        if not direct:
+            with suppress(OSError):
+                draft.unlink()
+
+
+def with_suffix(path: str | Path, suffixes: tuple[str, ...], what: str, default: str | None = None) -> Path:
+    """Checks a file's suffix.
+
+    Args:
+        path: The file to write.
+        suffixes: The suffixes allowed, in lower case.
+        what: What is written, for the sentence.
+        default: Suffix to add where the name has none; None refuses such a name.
+
+    Returns:
+        The path, with a suffix.
+
+    Raises:
+        RunFileError: Another suffix, or the path is a folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise RunFileError(f"{path} is a folder: name a file")
+    if not path.suffix and default is not None:
+        return path.with_name(path.name + default)
+    if path.suffix.lower() not in suffixes:
+        raise RunFileError(f"{path} cannot be written as {what}: its name must end in {', '.join(suffixes)}")
+    return path

@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from annelid.view import doctor, gl
+
+
+def finding(item: str) -> str:
+    return next(each.line() for each in doctor.examine() if each.item == item)
+
+
+@pytest.mark.parametrize("program", ["/bin/false", "/bin/echo", "/nonexistent"])
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such programs")
+def test_a_program_that_is_no_ffmpeg_is_found_out(monkeypatch: pytest.MonkeyPatch, program: str) -> None:
+    monkeypatch.setattr(doctor, "works", lambda backend: True)
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", program)
+    line = finding("ffmpeg")
+    assert line.startswith("missing")
+    assert line.endswith("unset IMAGEIO_FFMPEG_EXE")
+
+
+def test_a_back_end_of_the_users_that_fails_is_to_be_unset(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setattr(gl, "works", lambda backend: False)
+    monkeypatch.setattr(doctor, "works", lambda backend: False)
+    assert "unset MUJOCO_GL" in finding("frames and videos")

@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from annelid.errors import RenderingUnavailable
+from annelid.simulation.runfile import Run
+from annelid.view import gallery
+
+
+def test_a_picture_that_fails_does_not_cost_the_others(
+    planar_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(gallery, "figure7", full)
+    said: list[str] = []
+    drawn = gallery.draw_all(
+        planar_run, tmp_path, video=False, quiet=True, complain=lambda what: said.append(str(what))
+    )
+    assert list(drawn) == [tmp_path / "frame.png"]
+    assert len(said) == 1
+    assert "figure7.png not drawn" in said[0]
+    assert os.strerror(errno.ENOSPC) in said[0]
+    assert f"annelid plot {tmp_path}" in said[0]
+    assert [path.name for path in tmp_path.iterdir()] == ["frame.png"]
+
+
+def test_one_reason_is_said_once_for_all_its_pictures(
+    planar_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: object, **__: object) -> None:
+        raise RenderingUnavailable("no back-end")
+
+    monkeypatch.setattr(gallery, "render_frame", none)
+    monkeypatch.setattr(gallery, "render_video", none)
+    said: list[str] = []
+    drawn = gallery.draw_all(planar_run, tmp_path, video=True, quiet=True, complain=lambda what: said.append(str(what)))
+    assert next(drawn) == tmp_path / "figure7.png", "each path comes once it is drawn"
+    assert said == []
+    assert list(drawn) == []
+    assert len(said) == 1
+    assert "frame.png and video.mp4 not drawn: no back-end" in said[0]
+    assert f"--time 1.5 and annelid render {tmp_path} --video {tmp_path / 'video.mp4'}" in said[0]

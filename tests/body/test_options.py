@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import build_spec
+from annelid.body import build_spec, mesh_of
 from annelid.body.rods import rayleigh_damping_s
-from annelid.config import Strands, load_config
+from annelid.config import Mesh, Strands, load_config
 from annelid.morphology import helical_mesh
 
 Read = Callable[[mujoco.MjModel], Any]
@@ -185,3 +185,30 @@ def test_slippery_ground_lets_a_pushed_worm_slide() -> None:
         travelled.append(data.subtree_com[0, 0] - start)
     assert travelled[0] > 0.05
     assert travelled[1] < 0.2 * travelled[0]
+
+
+def test_every_field_of_the_mesh_shapes_it() -> None:
+    fields = {
+        "n_segments": 4,
+        "n_helices": 8,
+        "radius_m": 0.1,
+        "angular_rate_rad_per_m": 20.0,
+        "elements_per_side": 2,
+        "elements_per_end": 4,
+        "planes_between_rings": 3,
+        "free_planes_at_ends": 2,
+        "rear_overhang_m": 0.013,
+    }
+    assert set(fields) == set(Mesh.model_fields)
+    ours = mesh_of(Mesh.model_validate(fields))
+    expected = helical_mesh(fields.pop("n_segments"), **fields)  # type: ignore[arg-type]
+    assert np.array_equal(ours.vertices_m, expected.vertices_m)
+    assert np.array_equal(ours.rings, expected.rings)
+
+
+def test_twist_hinges_carry_the_polar_inertia_of_their_edge() -> None:
+    model = compiled({})
+    edge = np.linalg.norm(np.diff(helical_mesh(3).vertices_m[0], axis=0), axis=1)
+    hinges = [model.joint(f"strand_4_twist_{k}").bodyid[0] for k in range(len(edge) - 1)]
+    expected = 0.5 * 0.01291 * edge[:-1] * 0.002**2
+    assert model.body_inertia[hinges, 0] == pytest.approx(expected, rel=1e-6)

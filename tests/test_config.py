@@ -163,6 +163,7 @@ def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
         ("body.strands.radius_m=0.5", "must be less than body.mesh.radius_m = 0.16"),
         ("arena.contact_impedance=[1, 2, 3]", "must be less than 1"),
         ("arena.floor_gap_m=-0.1", "must be at least 0"),
+        ("arena.friction=0", "must be at least 0.01"),
     ],
 )
 def test_a_bad_value_is_named_with_what_would_be_valid(assignment: str, sentence: str) -> None:

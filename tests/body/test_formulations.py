@@ -92,7 +92,7 @@ def test_half_rings_share_their_ring_between_left_and_right() -> None:
     assert lengths.sum(axis=1) == pytest.approx(tendon_lengths(whole, mujoco.MjData(whole), "ring_"))
     data = mujoco.MjData(halves)
     mujoco.mj_kinematics(halves, data)
-    for side, sign in (("left", 1), ("right", -1)):
+    for side, sign in (("left", -1), ("right", 1)):
         tendon = halves.tendon(f"ring_1_{side}").id
         start = halves.tendon_adr[tendon]
         sites = halves.wrap_objid[start : start + halves.tendon_num[tendon]]

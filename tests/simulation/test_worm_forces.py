@@ -41,7 +41,7 @@ def momentum(plant: WormPlant) -> np.ndarray:
 @pytest.mark.parametrize("formulation", [{}, CHAIN], ids=["rods", "chain"])
 def test_the_floor_s_force_and_the_weight_change_the_momentum(formulation: dict[str, Any]) -> None:
     """Newton's second law for the whole worm: all other forces, also those of armature and damping, are inner ones."""
-    plant = after(worm(**formulation), 0.05)
+    plant = after(worm(**formulation, **{"arena.friction": 0.5}), 0.05)
     weight = np.array([0.0, 0.0, -9.81 * plant.total_mass_kg])
     checked = 0
     for _ in range(40):

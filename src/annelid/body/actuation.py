@@ -67,7 +67,8 @@ def ring_paths(geometry: MeshGeometry, segment: int, rings: Rings) -> list[list[
     closed = np.roll(ring, -top)
     first = closed[: half + 1].tolist()
     second = [*closed[half:].tolist(), int(closed[0])]
-    first_is_left = geometry.crossings_m[first, 1].mean() > geometry.crossings_m[second, 1].mean()
+    # Segment 1 leads towards -x, so the worm's left is -y.
+    first_is_left = geometry.crossings_m[first, 1].mean() < geometry.crossings_m[second, 1].mean()
     return [first, second] if first_is_left else [second, first]
 
 

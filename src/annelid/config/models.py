@@ -97,7 +97,8 @@ class Rings(Section):
     """
 
     layout: Literal["whole", "halves"] = Field(
-        default="whole", description="one muscle round the body, or a left and a right one"
+        default="whole",
+        description="one muscle round the body, or a left (-y: segment 1 leads towards -x) and a right one",
     )
     peak_force_N: Positive = Field(default=117.57, description="isometric force at the optimal length, F0")
     length_range_m: Range | tuple[Range, ...] = Field(
@@ -203,6 +204,11 @@ class WormBody(Section):
                 f"body.strands.radius_m = {self.strands.radius_m:g} must be less than "
                 f"body.mesh.radius_m = {self.mesh.radius_m:g}"
             )
+        if self.rings.layout == "halves" and self.mesh.n_helices % 4:
+            raise ValueError(
+                f"body.rings.layout = 'halves' needs body.mesh.n_helices to be a multiple of 4, "
+                f"not {self.mesh.n_helices}: equal halves need an even number of crossings round a ring"
+            )
         n = len(self.rings.length_ranges(self.mesh.n_segments))
         if n != self.mesh.n_segments:
             raise ValueError(
@@ -237,7 +243,9 @@ Body = Annotated[Annotated[WormBody, Tag("worm")] | Annotated[PlanarBody, Tag("r
 class Arena(Section):
     """Where the worm crawls: flat ground under gravity."""
 
-    friction: NonNegative = Field(default=1.0, description="coefficient of sliding friction")
+    friction: Annotated[float, Field(ge=0.01, le=100)] = Field(
+        default=1.0, description="coefficient of sliding friction"
+    )
     floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
     gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
     contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")

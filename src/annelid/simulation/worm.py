@@ -80,10 +80,9 @@ class WormPlant:
     def _resolve_names(self) -> None:
         model, geometry = self.model, self.geometry
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(geometry.n_crossings)])
-        springs = np.array([model.tendon(f"spring_{k}").id for k in range(len(geometry.springs))])
         self._sensor = geometry.sensor_springs
         self._floor = model.geom("floor").id
-        self._rest_stretch = model.tendon_lengthspring[springs, 1][self._sensor]
+        self._rest_stretch = geometry.spring_length_m[self._sensor]
         self._ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self._muscle_names])
         self._segment_of_geom = self._segments_of_geoms()
         self._inverse_edge_length = 1.0 / model.flexedge_length0

@@ -212,3 +212,16 @@ def test_twist_hinges_carry_the_polar_inertia_of_their_edge() -> None:
     hinges = [model.joint(f"strand_4_twist_{k}").bodyid[0] for k in range(len(edge) - 1)]
     expected = 0.5 * 0.01291 * edge[:-1] * 0.002**2
     assert model.body_inertia[hinges, 0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", [{}, CHAIN], ids=["rods", "chain"])
+def test_the_model_has_sensors_of_every_spring_and_ring(formulation: dict[str, Any]) -> None:
+    model = compiled(formulation)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 1.0
+    mujoco.mj_forward(model, data)
+    for tendon in range(model.ntendon):
+        assert data.sensor(f"{model.tendon(tendon).name}_length").data[0] == data.ten_length[tendon]
+    forces = [data.sensor(f"ring_{ring}_force").data[0] for ring in range(3)]
+    assert forces == data.actuator_force.tolist()
+    assert max(forces) < -100

@@ -39,6 +39,7 @@ def add_springs(spec: mujoco.MjSpec, geometry: MeshGeometry, springs: Springs) -
         )
         tendon.wrap_site(crossing_site(int(front)))
         tendon.wrap_site(crossing_site(int(rear)))
+        _add_length_sensor(spec, f"spring_{index}")
 
 
 def add_ring_muscles(spec: mujoco.MjSpec, geometry: MeshGeometry, rings: Rings) -> None:
@@ -97,3 +98,20 @@ def _add_muscle(spec: mujoco.MjSpec, name: str, path: list[int], span: list[floa
     )
     if not rings.activation_dynamics:
         actuator.dyntype = mujoco.mjtDyn.mjDYN_NONE
+    _add_length_sensor(spec, name)
+    spec.add_sensor(
+        name=f"{name}_force",
+        type=mujoco.mjtSensor.mjSENS_ACTUATORFRC,
+        objtype=mujoco.mjtObj.mjOBJ_ACTUATOR,
+        objname=name,
+    )
+
+
+def _add_length_sensor(spec: mujoco.MjSpec, tendon: str) -> None:
+    """Adds the engine's own sensor of a tendon's length, for users of the written MJCF."""
+    spec.add_sensor(
+        name=f"{tendon}_length",
+        type=mujoco.mjtSensor.mjSENS_TENDONPOS,
+        objtype=mujoco.mjtObj.mjOBJ_TENDON,
+        objname=tendon,
+    )

@@ -17,6 +17,11 @@ class StepRatio:
     control_timestep_s: float
     physics_timestep_s: float
 
+    @property
+    def control_steps_per_move(self) -> int:
+        """Control steps from one movement of the body to the next: 1 unless the physics is the coarser clock."""
+        return max(1, round(self.physics_timestep_s / self.control_timestep_s))
+
     def physics_steps_due(self, control_step: int) -> int:
         """Number of physics steps that control step ``control_step`` (counted from 1) completes.
 
@@ -25,4 +30,4 @@ class StepRatio:
         """
         if self.control_timestep_s >= self.physics_timestep_s:
             return round(self.control_timestep_s / self.physics_timestep_s)
-        return int(control_step % round(self.physics_timestep_s / self.control_timestep_s) == 0)
+        return int(control_step % self.control_steps_per_move == 0)

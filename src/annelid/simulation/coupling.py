@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from annelid.clock import StepRatio
 from annelid.config import RunConfig
 from annelid.errors import RunFileError, SimulationStopped
 from annelid.protocols import Array, Controller, Plant, Sensation, Stateful, Watched
@@ -51,7 +52,9 @@ class Coupling:
         self._watched = ["stretch_m"]
         self._watched += [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]
         # Nothing new can run away between two steps of a slower body.
-        self._watch_every = max(1, round(config.clock.physics_timestep_s / config.clock.control_timestep_s))
+        self._watch_every = StepRatio(
+            config.clock.control_timestep_s, config.clock.physics_timestep_s
+        ).control_steps_per_move
         self._alarms = [part.alarm for part in (plant, controller) if isinstance(part, Watched)]
 
     def advance(self) -> None:

@@ -37,7 +37,7 @@ ENGINE_WARNINGS = {
     mujoco.mjtWarning.mjWARN_BADQACC: "an acceleration became unbounded or NaN",
 }
 ALARM_EVERY = 10
-"""Physics steps between two looks at the kinetic energy, which costs a pass over all joints."""
+"""Movements of the body between two looks at the kinetic energy, which costs a pass over all joints."""
 
 
 class WormPlant:
@@ -71,9 +71,6 @@ class WormPlant:
         self._muscle_names = ring_names(config.body.n_segments, config.body.rings)
         self._resolve_names()
         self._mass = self.model.body_mass / self.model.body_mass.sum()
-        self._control_steps_per_physics = max(
-            1, round(config.clock.physics_timestep_s / config.clock.control_timestep_s)
-        )
         self._control_step = 0
         self._forget_forces()
 
@@ -237,7 +234,7 @@ class WormPlant:
             ("guard.edge_strain", "edge strain of a rod", self._edge_strain, guard.edge_strain, ""),
             ("guard.pin_gap_m", "gap at a pin", self._pin_gap, guard.pin_gap_m, " m"),
         ]
-        if self._control_step % (ALARM_EVERY * self._control_steps_per_physics) == 0:
+        if self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0:
             energy = self.kinetic_energy_J()
             readings.append(("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"))
         for field, words, value, limit, unit in readings:
@@ -280,7 +277,6 @@ class WormPlant:
             attrs={
                 "total_mass_kg": self.total_mass_kg,
                 "body_length_m": geometry.length_m,
-                "mujoco_version": mujoco.__version__,
             },
         )
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from annelid.analysis.rhythm import CONTRACTED, segment_activation
 from annelid.errors import RunFileError
-from annelid.view.output import whole_file, with_suffix
-from annelid.view.style import STYLE, panel_title, segment_colors
+from annelid.view.canvas import canvas, save
+from annelid.view.output import with_suffix
+from annelid.view.style import panel_title, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 _CM = 100.0
 PLOT_SUFFIXES = (".png", ".pdf", ".svg")
-_WIDTH_IN = 7.2
 
 
 def figure7(run: Run, path: str | Path) -> Path:
@@ -41,10 +41,6 @@ def figure7(run: Run, path: str | Path) -> Path:
         RunFileError: The run holds no samples, or none of these signals; or the file has another suffix or cannot
             be written.
     """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     path = plot_path(path)
     data = run.data
     if data.sizes.get("time", 0) < 2 or "stretch_length" not in data:
@@ -52,9 +48,7 @@ def figure7(run: Run, path: str | Path) -> Path:
     n_segments = run.config.body.n_segments
     colors = segment_colors(n_segments)
     phase_height = 0.35 + 0.13 * n_segments
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH_IN, 5.0 + phase_height), layout="constrained")
-        FigureCanvasAgg(figure)
+    with canvas(5.0 + phase_height) as figure:
         neural, phases, lengths = figure.subplots(3, 1, sharex=True, height_ratios=[2.5, phase_height, 2.5])
         _potentials(neural, run, colors)
         _phases(phases, run, colors)
@@ -63,9 +57,7 @@ def figure7(run: Run, path: str | Path) -> Path:
         lengths.set_xlim(float(data["time"].values[0]), float(data["time"].values[-1]))
         figure.suptitle(f"{run.config.name}: {n_segments} segments", x=0.01, ha="left", fontsize=11, weight="bold")
         figure.align_ylabels()
-        with whole_file(path) as draft:
-            figure.savefig(draft)
-    return path
+        return save(figure, path)
 
 
 def plot_path(path: str | Path) -> Path:

@@ -27,6 +27,7 @@ STYLE: Any = {
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.4,
     "savefig.dpi": 150,
+    "svg.hashsalt": "annelid",
     "figure.facecolor": "white",
 }
 

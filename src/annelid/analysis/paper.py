@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from annelid.config import PlanarBody, RunConfig
+from annelid.config import PlanarBody, RunConfig, SnsController
 
 PAPER_2023 = "Riddle et al. 2023"
 PAPER_2022 = "Riddle et al. 2022"
@@ -28,10 +28,12 @@ class Published:
 def published(config: RunConfig) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
-    Numbers are given for the configurations named after a paper, whatever else was overridden:
-    the three-segment worm of ``riddle2023`` and its rods, and the planar worms of ``riddle2022`` with the
+    Numbers are given for the configurations named after a paper, whatever else was overridden but the kind of
+    controller: the three-segment worm of ``riddle2023`` and its rods, and the planar worms of ``riddle2022`` with the
     gate time constants and gains that go together. For all others the result is empty.
     """
+    if not isinstance(config.controller, SnsController):
+        return {}
     if config.name.startswith("riddle2023") and config.body.n_segments == 3:
         return dict(_RIDDLE_2023)
     if config.name.startswith("riddle2022") and isinstance(config.body, PlanarBody):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -44,7 +44,37 @@ def segment_activation(activation: ArrayLike, n_segments: int) -> NDArray[np.flo
         Shape ``(n_times, n_segments)``.
     """
     values = np.asarray(activation, dtype=float)
-    return values.reshape(len(values), n_segments, -1).mean(axis=2)
+    return values.reshape(len(values), n_segments, values.shape[1] // n_segments).mean(axis=2)
+
+
+def contractions(
+    time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRACTED, shortest_s: float = 0.0
+) -> NDArray[np.float64]:
+    """Finds from when to when one signal is at or above a threshold, interpolating linearly between samples.
+
+    Args:
+        time_s: Sample times, s, rising, shape ``(n_times,)``.
+        signal: Same shape.
+        threshold: In the signal's unit.
+        shortest_s: Interruptions shorter than this are bridged, then contractions shorter than this left out, s.
+
+    Returns:
+        Onset and release of each contraction, s, shape ``(n_contractions, 2)``. What is contracted at the first
+        sample begins there; what is contracted at the last ends at infinity, and is as long as was seen of it.
+    """
+    times = np.asarray(time_s, dtype=float)
+    values = np.asarray(signal, dtype=float)
+    on = values >= threshold
+    before = np.flatnonzero(on[1:] != on[:-1])
+    fraction = (threshold - values[before]) / (values[before + 1] - values[before])
+    edges = (times[before] + fraction * (times[before + 1] - times[before])).tolist()
+    started = [float(times[0])] if on.size and on[0] else []
+    unended = [np.inf] if on.size and on[-1] else []
+    onsets, releases = np.array([*started, *edges, *unended]).reshape(-1, 2).T
+    apart = onsets[1:] - releases[:-1] >= shortest_s
+    onsets, releases = onsets[np.append(True, apart)[: onsets.size]], releases[np.append(apart, True)[: releases.size]]
+    seen_s = np.minimum(releases, times[-1] if times.size else 0.0) - onsets
+    return np.stack([onsets, releases], axis=1)[seen_s >= shortest_s]
 
 
 def onset_times(time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRACTED) -> list[float]:
@@ -58,13 +88,37 @@ def onset_times(time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRAC
     Returns:
         Onset times, s, rising.
     """
+    return contractions(time_s, signal, threshold)[:, 0].tolist()
+
+
+def is_continued(time_s: ArrayLike) -> bool:
+    """Tells a run that continues another, whose first sample is later than time zero."""
+    return bool(np.size(time_s)) and bool(np.asarray(time_s)[0] > 0)
+
+
+def startup_end(time_s: ArrayLike) -> float:
+    """Returns until when onsets belong to the initial state, s: the first sampling interval of a run.
+
+    A continued run has no initial state: minus infinity.
+    """
     times = np.asarray(time_s, dtype=float)
-    values = np.asarray(signal, dtype=float)
-    rising = np.flatnonzero((values[:-1] < threshold) & (values[1:] >= threshold))
-    fraction = (threshold - values[rising]) / (values[rising + 1] - values[rising])
-    onsets = times[rising] + fraction * (times[rising + 1] - times[rising])
-    started = [float(times[0])] if len(values) and values[0] >= threshold else []
-    return started + onsets.tolist()
+    if is_continued(times):
+        return -np.inf
+    return float(times[min(1, times.size - 1)]) if times.size else 0.0
+
+
+def segment_intervals(onsets_s: Sequence[ArrayLike], after_s: float) -> NDArray[np.float64]:
+    """Returns the intervals between successive onsets of the same segment that begin after ``after_s``.
+
+    Args:
+        onsets_s: Onset times of each segment, s, rising.
+        after_s: Such as `startup_end`, s.
+
+    Returns:
+        Intervals of all segments, s, shape ``(n_intervals,)``.
+    """
+    of_each = [np.asarray(onsets, dtype=float) for onsets in onsets_s]
+    return np.concatenate([np.empty(0), *(np.diff(onsets[onsets > after_s]) for onsets in of_each)])
 
 
 def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
@@ -84,19 +138,18 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     times = np.asarray(time_s, dtype=float)
     values = np.asarray(activation, dtype=float)
     n_segments = values.shape[1]
-    continued = bool(len(times)) and times[0] > 0
+    continued = is_continued(times)
     by_segment = [
         onset_times(times, values[:, i])[int(continued and values[0, i] >= CONTRACTED) :] for i in range(n_segments)
     ]
     events = sorted((onset, i + 1) for i, onsets in enumerate(by_segment) for onset in onsets)
     order = tuple(segment for _, segment in events)
-    start_ends_s = times[min(1, len(times) - 1)] if len(times) else 0.0
-    periods = [b - a for onsets in by_segment for a, b in pairwise(onsets) if continued or a > start_ends_s]
+    periods = segment_intervals(by_segment, startup_end(times))
     return Rhythm(
         order=order,
         onsets_s=tuple(onset for onset, _ in events),
-        period_s=float(np.mean(periods)) if periods else None,
-        period_std_s=float(np.std(periods)) if len(periods) > 1 else None,
+        period_s=float(periods.mean()) if periods.size else None,
+        period_std_s=float(periods.std()) if periods.size > 1 else None,
         wave=is_wave(order, n_segments, any_start=continued),
         full_cycles=full_cycles(order, n_segments),
     )

@@ -4,6 +4,12 @@ Every mesh vertex is a body on three slides; a crossing is ONE such body for bot
 no constraint and cannot part. Each strand is a 1D flex through its vertices' bodies, a discrete elastic rod with
 bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge an edge, found by its
 name; without the hinges the model compiles and is far too floppy.
+
+Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by a spring
+and a dashpot in N/m and N s/m. Lateral damping resists bending across the plane of a strand's rest curvature, which
+the engine leaves undamped: its Rayleigh damping of a curved vertex acts on the size of the curvature alone. Both are
+constraint rows, whose static stiffness and damping follow from their reference and regularisation
+(MuJoCo's documentation, "Constraint model") and which the Newton solver takes at little cost.
 """
 
 from __future__ import annotations
@@ -23,6 +29,8 @@ STRAND_RGBA = ((0.12, 0.35, 0.75, 1.0), (0.25, 0.5, 0.85, 1.0))
 PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
 EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
 HIDDEN_GROUP = 4
+STRAIGHT_RAD = 1e-4
+"""Vertices less bent than this at rest count as straight; there the engine damps bending in every direction."""
 TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
 
@@ -38,7 +46,7 @@ def add_rods(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formul
         arena: Contact settings, which the strands share with the floor.
     """
     _set_solver(spec, formulation)
-    names = _add_vertices(spec, geometry, body, contact_options(arena))
+    names = _add_vertices(spec, geometry, body, formulation, contact_options(arena))
     for strand in range(geometry.n_strands):
         add_rod(
             spec,
@@ -63,7 +71,7 @@ def _set_solver(spec: mujoco.MjSpec, formulation: Rods) -> None:
 
 
 def _add_vertices(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, contact: dict[str, list[float]]
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, contact: dict[str, list[float]]
 ) -> list[list[str]]:
     """Adds a body for every vertex, crossings first (which the solver is fastest with).
 
@@ -71,12 +79,12 @@ def _add_vertices(
         The names of each strand's bodies from front to back.
     """
     masses = lumped_masses(geometry.vertices_m[0], body.strands.linear_density_kg_per_m).tolist()
-    names = [[f"vertex_{s}_{v}" for v in range(len(masses))] for s in range(geometry.n_strands)]
+    names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
+    shared = formulation.pins == "shared"
     for crossing in range(geometry.n_crossings):
         name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
-        for strand in geometry.crossing_strands[crossing]:
-            names[strand][vertex] = name
-        pin = add_vertex(spec, name, geometry.crossings_m[crossing], 2 * masses[vertex] + body.pins.mass_kg)
+        place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
+        pin = add_vertex(spec, name, place, body.pins.mass_kg + (2 * masses[vertex] if shared else 0.0))
         pin.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
@@ -87,7 +95,15 @@ def _add_vertices(
             rgba=PIN_RGBA,
         )
         pin.add_site(name=name, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
-        _add_touch(pin, body.strands.radius_m, contact)
+        if shared:
+            _add_touch(pin, body.strands.radius_m, contact)
+            for strand in strands:
+                names[strand][vertex] = name
+            continue
+        for strand in strands:
+            point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
+            _add_touch(point, body.strands.radius_m, contact)
+            _tie(spec, pin, point, formulation)
 
     at_crossing = set(geometry.crossing_vertex.tolist())
     for strand, own in enumerate(names):
@@ -96,6 +112,53 @@ def _add_vertices(
                 point = add_vertex(spec, name, geometry.vertices_m[strand, vertex], masses[vertex])
                 _add_touch(point, body.strands.radius_m, contact)
     return names
+
+
+def vertex_name(strand: int, vertex: int) -> str:
+    """Name of the body of a strand's own vertex."""
+    return f"vertex_{strand}_{vertex}"
+
+
+def _tie(spec: mujoco.MjSpec, pin: mujoco.MjsBody, point: mujoco.MjsBody, formulation: Rods) -> None:
+    """Ties a strand's vertex to its pin by a spring and a dashpot at one place."""
+    solref, solimp = spring_row(
+        1.0 / pin.mass + 1.0 / point.mass,
+        formulation.pin_stiffness_N_per_m,
+        formulation.pin_damping_Ns_per_m,
+        formulation.pin_inertance_kg,
+    )
+    spec.add_equality(
+        name=f"tie_{point.name}",
+        type=mujoco.mjtEq.mjEQ_CONNECT,
+        objtype=mujoco.mjtObj.mjOBJ_BODY,
+        name1=pin.name,
+        name2=point.name,
+        data=[0.0] * 12,
+        solref=solref,
+        solimp=solimp,
+    )
+
+
+def spring_row(
+    inverse_mass: float, stiffness: float, damping: float, inertance: float
+) -> tuple[list[float], list[float]]:
+    """Returns the engine's ``solref`` and ``solimp`` of a constraint row that acts as spring, dashpot and inerter.
+
+    A row's force is ``(-b v - k r - a) / R`` for a violation r, its rate v and its acceleration a, where
+    ``R = inverse_mass (1 - d) / d`` at impedance d, and the engine divides the coefficients given by d and d^2.
+
+    Args:
+        inverse_mass: The row's inverse inertia at rest as the engine computes it, 1/kg (or 1/(kg m^2)).
+        stiffness: Force per violation, N/m (or N m/rad).
+        damping: Force per rate, N s/m (or N m s/rad).
+        inertance: Force per acceleration, kg (or kg m^2).
+    """
+    impedance = inertance * inverse_mass / (1.0 + inertance * inverse_mass)
+    compliance = inverse_mass * (1.0 - impedance) / impedance
+    return (
+        [-stiffness * compliance * impedance, -damping * compliance * impedance],
+        [impedance, impedance, 0.001, 0.5, 2.0],
+    )
 
 
 def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> mujoco.MjsBody:
@@ -109,8 +172,8 @@ def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> 
         inertia=[1e-6 * mass] * 3,
         explicitinertial=True,
     )
-    for axis in AXES:
-        point.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    for axis, letter in zip(AXES, "xyz", strict=True):
+        point.add_joint(name=f"{name}_{letter}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     return point
 
 
@@ -188,6 +251,43 @@ def add_rod(
         name1=name,
         solref=[formulation.edge_time_constant_s, 1.0],
         solimp=EDGE_IMPEDANCE,
+    )
+    if formulation.lateral_damping_Nms_per_rad > 0:
+        for vertex in range(1, n_edges):
+            _add_lateral_damper(spec, name, vertices_m, bodies, vertex, formulation.lateral_damping_Nms_per_rad)
+
+
+def _add_lateral_damper(
+    spec: mujoco.MjSpec, rod: str, vertices_m: Array, bodies: list[str], vertex: int, damping: float
+) -> None:
+    """Damps the angle at a curved vertex across its plane at rest: a fixed tendon over its neighbours' slides."""
+    before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
+    lengths = np.linalg.norm(before), np.linalg.norm(after)
+    binormal = np.cross(before / lengths[0], after / lengths[1])
+    sine = np.linalg.norm(binormal)
+    if sine < STRAIGHT_RAD:
+        return
+    name = f"{rod}_lateral_{vertex}"
+    tendon = spec.add_tendon(name=name)
+    inverse_inertia = 0.0
+    weights = (1.0 / lengths[0], -1.0 / lengths[0] - 1.0 / lengths[1], 1.0 / lengths[1])
+    for body, weight in zip(bodies[vertex - 1 : vertex + 2], weights, strict=True):
+        if body == "world":
+            continue
+        inverse_inertia += weight**2 / spec.body(body).mass
+        for letter, share in zip("xyz", binormal / sine, strict=True):
+            if abs(share) > 1e-6:
+                tendon.wrap_joint(f"{body}_{letter}", float(weight * share))
+    # An inertance as small as the vertices' own, and next to no stiffness: the engine wants both numbers.
+    solref, solimp = spring_row(inverse_inertia, 1e-12, damping, 1.0 / inverse_inertia)
+    spec.add_equality(
+        name=name,
+        type=mujoco.mjtEq.mjEQ_TENDON,
+        objtype=mujoco.mjtObj.mjOBJ_TENDON,
+        name1=name,
+        data=[0.0] * 12,
+        solref=solref,
+        solimp=solimp,
     )
 
 

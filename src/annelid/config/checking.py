@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -25,9 +25,8 @@ def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[st
     """Returns the dotted path and the description of every field, for help texts and suggestions."""
     paths: dict[str, str] = {}
     for name, info in model.model_fields.items():
-        sections = _sections_of(info.annotation)
-        if sections:
-            for section in sections:
+        if _is_branch(info.annotation):
+            for section in _sections_of(info.annotation):
                 paths.update(field_paths(section, f"{prefix}{name}."))
         else:
             paths[f"{prefix}{name}"] = info.description or ""
@@ -45,9 +44,14 @@ def _fields_of_section(section: BaseModel, prefix: str) -> dict[str, str]:
         value = getattr(section, name)
         if isinstance(value, BaseModel):
             paths.update(_fields_of_section(value, f"{prefix}{name}."))
-        elif not _sections_of(info.annotation):
+        elif not _is_branch(info.annotation):
             paths[f"{prefix}{name}"] = info.description or ""
     return paths
+
+
+def _is_branch(annotation: Any) -> bool:
+    """Tells a section from a field; a list of sections is one field, set as a whole."""
+    return get_origin(annotation) is not tuple and bool(_sections_of(annotation))
 
 
 def _sections_of(annotation: Any) -> list[type[Section]]:
@@ -59,7 +63,7 @@ def _sections_of(annotation: Any) -> list[type[Section]]:
     return found
 
 
-_KINDS = {"worm", "riddle2022", "rods", "chain", "sns"}
+_KINDS = {"worm", "riddle2022", "rods", "chain", "sns", "program"}
 _WORDS = {
     "greater_than": "must be greater than {gt:g}",
     "greater_than_equal": "must be at least {ge:g}",
@@ -75,8 +79,7 @@ _WORDS = {
     "finite_number": "must be a finite number",
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",
-    "missing": "must be given",
-    "tuple_type": "must be a list of numbers",
+    "tuple_type": "must be a list",
     "too_long": "has too many entries",
     "model_type": "is a section; set one of its fields instead",
     "model_attributes_type": "is a section; set one of its fields instead",
@@ -88,6 +91,8 @@ def _explain(detail: ErrorDetails) -> str:
     kind = detail["type"]
     if kind == "extra_forbidden":
         return f"unknown field {path!r}: {_nearest_fields(detail['loc'])}"
+    if kind == "missing":
+        return f"{path} must be given"
     if kind == "value_error":
         message = str(detail.get("ctx", {}).get("error", detail["msg"]))
         given = detail["input"]

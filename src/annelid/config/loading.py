@@ -40,7 +40,8 @@ def load_config(source: str | Path | Mapping[str, Any], overrides: Mapping[str, 
         source: Name of a preset, path of a TOML file (recognised by its suffix ``.toml``), or nested mapping.
             A file or mapping may name a preset or another file to start from with ``extends``; a file that
             neither does so nor states ``body.kind`` starts from ``riddle2023-rods``.
-        overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``.
+        overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``; whole sections too.
+            A section whose ``kind`` changes keeps nothing of what it had before.
 
     Returns:
         The checked configuration.
@@ -49,7 +50,7 @@ def load_config(source: str | Path | Mapping[str, Any], overrides: Mapping[str, 
         ConfigError: Unknown preset or field, unreadable file, or a value out of its range.
     """
     tree = _read_tree(source)
-    for path, value in (overrides or {}).items():
+    for path, value in sorted((overrides or {}).items(), key=_kinds_first):
         nested: Any = value
         for key in reversed(path.split(".")):
             nested = {key: nested}
@@ -110,6 +111,12 @@ def _read_file(path: Path) -> dict[str, Any]:
         raise ConfigError(f"cannot read the configuration file {path}: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path} is not valid TOML: {error}") from None
+
+
+def _kinds_first(override: tuple[str, Any]) -> float:
+    """Orders overrides: those of a kind, outer ones first, would drop others of their section if they came later."""
+    path, _ = override
+    return path.count(".") if path.split(".")[-1] == "kind" else float("inf")
 
 
 def _merge(base: dict[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:

@@ -133,7 +133,7 @@ class Rings(Section):
 
 
 class Rods(Section):
-    """The fast formulation: elastic rods that share one vertex at each crossing, so pins cannot part."""
+    """The fast formulation: elastic rods, which share one vertex at each crossing unless pins are separate."""
 
     kind: Literal["rods"] = "rods"
     edge_time_constant_s: Positive = Field(default=0.001, description="time constant of the inextensible edges")
@@ -143,6 +143,22 @@ class Rods(Section):
     solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
     friction_impedance_ratio: Positive = Field(
         default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
+    )
+    lateral_damping_Nms_per_rad: NonNegative = Field(
+        default=0.0,
+        description="viscous resistance to bending across the plane of a strand's own curvature, for which the "
+        "engine's curved rods have none",
+    )
+    pins: Literal["shared", "separate"] = Field(
+        default="shared",
+        description="both strands of a crossing share its vertex, or a pin mass is tied to a vertex of each",
+    )
+    pin_stiffness_N_per_m: Positive = Field(
+        default=22.0, description="of the tie between a separate pin and each of its strands"
+    )
+    pin_damping_Ns_per_m: Positive = Field(default=0.88, description="of the same tie")
+    pin_inertance_kg: Positive = Field(
+        default=0.0094, description="of the same tie: its force per relative acceleration, numerical"
     )
 
 
@@ -298,6 +314,40 @@ class SnsController(Section):
     )
 
 
+class Contraction(Section):
+    """One contraction of one segment's ring."""
+
+    segment: Annotated[int, Field(ge=1, le=200)] = Field(description="counted from 1 at the front")
+    start_s: NonNegative = Field(description="when the activation begins to rise")
+    stop_s: Positive = Field(description="when it begins to fall")
+    activation: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="level that it rises to")
+
+    @model_validator(mode="after")
+    def _starts_before_it_stops(self) -> Self:
+        if self.start_s >= self.stop_s:
+            raise ValueError(
+                f"controller.contractions: stop_s = {self.stop_s:g} of a contraction of segment {self.segment} must be "
+                f"greater than its start_s = {self.start_s:g}"
+            )
+        return self
+
+
+class Program(Section):
+    """Open loop: contractions at times laid down beforehand, whatever the sensors read.
+
+    Where contractions of one segment overlap, the larger activation wins.
+    """
+
+    kind: Literal["program"] = "program"
+    contractions: tuple[Contraction, ...] = Field(description="segment, start_s, stop_s and activation of each")
+    ramp_s: NonNegative = Field(default=0.0, description="time that a rise or fall between 0 and the full level takes")
+
+
+ControllerSection = Annotated[
+    Annotated[SnsController, Tag("sns")] | Annotated[Program, Tag("program")], _kind_or("sns")
+]
+
+
 class Clock(Section):
     """Time steps: one is an integer multiple of the other."""
 
@@ -340,7 +390,7 @@ class RunConfig(Section):
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
     body: Body = WormBody()
     arena: Arena | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
-    controller: SnsController = SnsController()
+    controller: ControllerSection = SnsController()
     sensor: StretchSensor = StretchSensor()
     clock: Clock = Clock()
     record: Record = Record()
@@ -359,6 +409,17 @@ class RunConfig(Section):
     def _no_ground_for_planar_worms(self) -> Self:
         if isinstance(self.body, PlanarBody) and self.arena is not None:
             raise ValueError(f"arena has no effect on body.kind = {self.body.kind!r}, which touches no ground")
+        return self
+
+    @model_validator(mode="after")
+    def _contractions_are_of_segments_that_exist(self) -> Self:
+        if isinstance(self.controller, Program):
+            for i, contraction in enumerate(self.controller.contractions):
+                if contraction.segment > self.body.n_segments:
+                    raise ValueError(
+                        f"controller.contractions.{i}.segment = {contraction.segment}: must be in "
+                        f"1 .. {self.body.n_segments}, the segments of the body"
+                    )
         return self
 
     @model_validator(mode="after")

@@ -7,7 +7,7 @@ from typing import cast
 
 from numpy.typing import ArrayLike
 
-from annelid.config import PlanarBody, RunConfig
+from annelid.config import PlanarBody, Program, RunConfig
 from annelid.protocols import Controller, Plant, Sensation
 
 
@@ -32,6 +32,10 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
+    if isinstance(config.controller, Program):
+        from annelid.control.program import ProgramController
+
+        return ProgramController(config.controller, plant.n_segments, plant.n_muscles)
     from annelid.control.sns import SnsController
 
     return SnsController(

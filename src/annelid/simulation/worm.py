@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from annelid.body import build_spec, mesh_of
 from annelid.body.actuation import crossing_site, ring_names
+from annelid.body.rods import vertex_name
 from annelid.clock import StepRatio
-from annelid.config import Chain, RunConfig, WormBody
+from annelid.config import Chain, Rods, RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, MeshGeometry
 from annelid.protocols import Recordable, Sensation, Signal, State
@@ -84,6 +85,20 @@ class WormPlant:
         self._segment_of_geom = self._segments_of_geoms()
         self._inverse_edge_length = 1.0 / model.flexedge_length0
         self._segment_rows = np.eye(geometry.n_segments)
+        self._pinned_vertices = self._vertices_at_pins()
+
+    def _vertices_at_pins(self) -> NDArray[np.int64] | None:
+        """Bodies of both strands at every crossing of rods with separate pins, ``(n_crossings, 2)``."""
+        formulation, geometry = self._body.formulation, self.geometry
+        if not isinstance(formulation, Rods) or formulation.pins == "shared":
+            return None
+        vertices = geometry.crossing_vertex[geometry.crossing_plane]
+        return np.array(
+            [
+                [self.model.body(vertex_name(int(strand), int(vertex))).id for strand in strands]
+                for strands, vertex in zip(geometry.crossing_strands, vertices, strict=True)
+            ]
+        )
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
         """Crossings along a ring tendon."""
@@ -169,11 +184,18 @@ class WormPlant:
         if self.model.nflexedge:
             strain = data.flexedge_length * self._inverse_edge_length - 1.0
             self._edge_strain = max(float(strain.max()), -float(strain.min()))
-        else:
+        if self._pins_can_part:
             self._pin_gap = self._largest_pin_gap()
+
+    @property
+    def _pins_can_part(self) -> bool:
+        return self._pinned_vertices is not None or not self.model.nflexedge
 
     def _largest_pin_gap(self) -> float:
         """Distance between the two strands of the crossing that parts most, m."""
+        if self._pinned_vertices is not None:
+            ends = self.data.xpos[self._pinned_vertices]
+            return float(_norm(ends[:, 1] - ends[:, 0]).max())
         residual = self.data.efc_pos[: 3 * self.model.neq].reshape(self.model.neq, 3)
         formulation = self._body.formulation
         if isinstance(formulation, Chain) and formulation.pins == "separate":
@@ -248,11 +270,11 @@ class WormPlant:
         sensors = geometry.sensor_springs.shape[1]
         stretch = ("segment", "sensor")
         shape = (n, sensors)
-        strain: tuple[Signal, ...] = (
-            (Signal("edge_strain", (), (), "1", "largest strain of a rod's edge"),)
-            if self.model.nflexedge
-            else (Signal("pin_gap", (), (), "m", "largest gap between two pinned strands"),)
-        )
+        extremes: list[Signal] = []
+        if self.model.nflexedge:
+            extremes.append(Signal("edge_strain", (), (), "1", "largest strain of a rod's edge"))
+        if self._pins_can_part:
+            extremes.append(Signal("pin_gap", (), (), "m", "largest gap between two pinned strands"))
         return Recordable(
             signals=(
                 Signal("stretch_length", stretch, shape, "m", "length of the springs that span a ring"),
@@ -262,7 +284,7 @@ class WormPlant:
                 Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the floor on a segment"),
                 Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass"),
                 Signal("kinetic_energy", (), (), "J", "kinetic energy"),
-                *strain,
+                *extremes,
                 Signal(
                     "crossing_position",
                     ("crossing", "axis"),
@@ -294,8 +316,10 @@ class WormPlant:
             "kinetic_energy": self.kinetic_energy_J(),
         }
         if self.model.nflexedge:
-            return values | {"edge_strain": self._edge_strain}
-        return values | {"pin_gap": self._pin_gap}
+            values["edge_strain"] = self._edge_strain
+        if self._pins_can_part:
+            values["pin_gap"] = self._pin_gap
+        return values
 
     def get_state(self) -> State:
         """Returns the engine's whole state and what was felt last."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from annelid.errors import RunFileError, suggest
 
@@ -46,11 +46,44 @@ def fitting_distance(offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: fl
         Distance from the camera to the point looked at, m.
     """
     points = np.asarray(offsets_m, dtype=float)
+    right, up, sight = picture_axes(azimuth_deg, elevation_deg)
+    half_height = math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * MARGIN
+    needed = np.maximum(np.abs(points @ up) / half_height, np.abs(points @ right) / (half_height * aspect))
+    return float(np.max(needed - points @ sight))
+
+
+def picture_axes(
+    azimuth_deg: float, elevation_deg: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Returns the unit vectors of a view: to the right and up in the picture, and along the line of sight.
+
+    Args:
+        azimuth_deg: Direction of sight, about z.
+        elevation_deg: Direction of sight, negative when looking down.
+    """
     azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
     level = math.cos(elevation)
     sight = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
     right = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0])
-    up = np.cross(right, sight)
-    half_height = math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * MARGIN
-    needed = np.maximum(np.abs(points @ up) / half_height, np.abs(points @ right) / (half_height * aspect))
-    return float(np.max(needed - points @ sight))
+    return right, np.cross(right, sight), sight
+
+
+def picture_points(
+    offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: float, distance_m: float, aspect: float
+) -> NDArray[np.float64]:
+    """Finds where points appear in a perspective picture.
+
+    Args:
+        offsets_m: Points relative to the one that the camera looks at, m, shape ``(..., 3)``.
+        azimuth_deg: Direction of sight, about z.
+        elevation_deg: Direction of sight, negative when looking down.
+        distance_m: From the camera to the point looked at.
+        aspect: Width over height of the picture.
+
+    Returns:
+        Places as shares of the picture's width and height from its upper left corner, shape ``(..., 2)``.
+    """
+    points = np.asarray(offsets_m, dtype=float)
+    right, up, sight = picture_axes(azimuth_deg, elevation_deg)
+    height = 2.0 * math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * (points @ sight + distance_m)
+    return np.stack([0.5 + points @ right / (height * aspect), 0.5 - points @ up / height], axis=-1)

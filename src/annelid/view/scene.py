@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import RunConfig, WormBody
 from annelid.errors import RunFileError
-from annelid.view.camera import FIELD_OF_VIEW_DEG, fitting_distance, view_angles
+from annelid.view.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_points, view_angles
 from annelid.view.gl import Canvas, find_backend
-from annelid.view.style import activation_color
+from annelid.view.style import CONTRACTED, activation_color
 
 if TYPE_CHECKING:
     import mujoco
@@ -26,6 +27,10 @@ CONTRACTED_WIDTH = 1.8
 """A contracted ring muscle is drawn this much thicker than a relaxed one."""
 HAZE = (0.94, 0.955, 0.97)
 """What the floor fades into with distance."""
+STILL_AMBIENT = 0.7
+"""Without a floor that it would bleach, there may be more light from all sides."""
+PALE = 3.0
+"""On white, what lies this many half worms behind its middle would vanish."""
 SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
 """Axial springs, apart from the red of a contracted ring."""
 
@@ -91,55 +96,153 @@ class WormScene:
         Returns:
             Pixels, shape ``(height, width, 3)``.
         """
-        import mujoco
-
-        model, posture = self._model, self._posture
-        posture.qpos[:] = self._run.data["qpos"].values[frame]
-        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
-            stage(model, posture)
-        mujoco.mj_flex(model, posture)
-        mujoco.mj_tendon(model, posture)
+        _pose(self._model, self._posture, self._run.data["qpos"].values[frame])
         self._color_rings(float(self.times_s[frame]))
         self._camera.lookat[:] = self._target[frame]
-        return self._canvas.draw(posture, self._camera, self._option, f"{self.times_s[frame]:.2f} s")
+        return self._canvas.draw(self._posture, self._camera, self._option, f"{self.times_s[frame]:.2f} s")
 
     def _color_rings(self, time_s: float) -> None:
         activation = self._run.data["activation"].sel(time=time_s, method="nearest").values
-        for ring, width, value in zip(self._rings, self._ring_width, activation, strict=True):
-            self._model.tendon_rgba[ring] = (*activation_color(float(value)), 1.0)
-            self._model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * float(value))
+        _color_rings(self._model, self._rings, self._ring_width, activation)
 
     def _points_drawn(self) -> NDArray[np.float64]:
-        """Both ends of every part of the worm in every recorded posture, m, shape ``(frame, point, 3)``.
-
-        The strands' free ends reach beyond the crossings, so these would not do.
-        """
-        import mujoco
-
-        model, posture = self._model, self._posture
-        parts = np.flatnonzero(model.geom_bodyid > 0)
-        capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
-        half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
-        points = []
-        for qpos in self._run.data["qpos"].values:
-            posture.qpos[:] = qpos
-            mujoco.mj_kinematics(model, posture)
-            middles, axes = posture.geom_xpos[parts], posture.geom_xmat[parts].reshape(-1, 3, 3)[:, :, 2]
-            reach = half_lengths[:, None] * axes
-            points.append(np.concatenate([middles - reach, middles + reach]))
-        return np.stack(points)
+        """Both ends of every part of the worm in every recorded posture, m, shape ``(frame, point, 3)``."""
+        return np.stack([_part_ends(self._model, self._posture, qpos) for qpos in self._run.data["qpos"].values])
 
     def _camera_and_option(self) -> tuple[mujoco.MjvCamera, mujoco.MjvOption]:
-        import mujoco
+        return _free_camera(self._angles, fitting_distance(self._offsets, *self._angles, self._aspect)), _options()
 
-        camera = mujoco.MjvCamera()
-        camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        camera.azimuth, camera.elevation = self._angles
-        camera.distance = fitting_distance(self._offsets, *self._angles, self._aspect)
-        option = mujoco.MjvOption()
-        mujoco.mjv_defaultOption(option)
-        option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
-        return camera, option
+
+@dataclass(frozen=True)
+class Still:
+    """A rendered posture that marks can be drawn on.
+
+    Attributes:
+        pixels: Shape ``(height, width, 3)``.
+        target_m: Point that the camera looks at, shape ``(3,)``.
+        angles_deg: Azimuth and elevation of the line of sight.
+        distance_m: From the camera to the point that it looks at.
+    """
+
+    pixels: NDArray[np.uint8]
+    target_m: NDArray[np.float64]
+    angles_deg: tuple[float, float]
+    distance_m: float
+
+    def places(self, points_m: ArrayLike) -> NDArray[np.float64]:
+        """Finds the pixels (column, row) at which points appear.
+
+        Args:
+            points_m: Points, m, shape ``(..., 3)``.
+
+        Returns:
+            Columns and rows, counted from the picture's upper left corner, shape ``(..., 2)``.
+        """
+        height, width = self.pixels.shape[:2]
+        offsets = np.asarray(points_m, dtype=float) - self.target_m
+        shares = picture_points(offsets, *self.angles_deg, self.distance_m, width / height)
+        return shares * [width, height] - 0.5
+
+
+def render_still(
+    config: RunConfig,
+    angles_deg: tuple[float, float],
+    size: tuple[int, int],
+    *,
+    qpos: NDArray[np.float64] | None = None,
+    activation: NDArray[np.float64] | None = None,
+) -> Still:
+    """Renders one posture on white, without a floor; what lies behind is paler.
+
+    Args:
+        config: Configuration of the 3D worm.
+        angles_deg: Azimuth and elevation of the line of sight.
+        size: Width and height, pixels.
+        qpos: The posture as a run records it; by default at rest.
+        activation: Colours and widths of the ring muscles; by default all rings and springs are red.
+
+    Returns:
+        The picture.
+
+    Raises:
+        RenderingUnavailable: No OpenGL back-end works.
+    """
+    import mujoco
+
+    backend = find_backend()
+    model, rings = _model_to_draw(config)
+    if activation is None:
+        model.tendon_rgba[:] = (*CONTRACTED, 1.0)
+    else:
+        _color_rings(model, rings, model.tendon_width[rings].copy(), activation)
+    model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
+    model.vis.headlight.ambient[:] = STILL_AMBIENT
+    posture = mujoco.MjData(model)
+    points = _part_ends(model, posture, model.qpos0 if qpos is None else qpos)
+    target = (points.min(axis=0) + points.max(axis=0)) / 2
+    distance = fitting_distance(points - target, *angles_deg, size[0] / size[1])
+    reach = float(np.linalg.norm(points - target, axis=1).max()) / model.stat.extent
+    model.vis.rgba.fog[:] = 1.0
+    model.vis.map.fogstart = distance / model.stat.extent - reach
+    model.vis.map.fogend = distance / model.stat.extent + PALE * reach
+    _pose(model, posture, model.qpos0 if qpos is None else qpos)
+    camera = _free_camera(angles_deg, distance)
+    camera.lookat[:] = target
+    with Canvas(model, *size, backend) as canvas:
+        return Still(canvas.draw(posture, camera, _options()), target, angles_deg, distance)
+
+
+def _pose(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.float64]) -> None:
+    """Brings all that is drawn into a posture."""
+    import mujoco
+
+    posture.qpos[:] = qpos
+    for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex, mujoco.mj_tendon):
+        stage(model, posture)
+
+
+def _color_rings(
+    model: mujoco.MjModel, rings: NDArray[np.int64], widths: NDArray[np.float64], activation: NDArray[np.float64]
+) -> None:
+    for ring, width, value in zip(rings, widths, activation, strict=True):
+        model.tendon_rgba[ring] = (*activation_color(float(value)), 1.0)
+        model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * float(value))
+
+
+def _part_ends(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Both ends of every part of the worm, m, shape ``(point, 3)``.
+
+    The strands' free ends reach beyond the crossings, so these would not do.
+    """
+    import mujoco
+
+    parts = np.flatnonzero(model.geom_bodyid > 0)
+    capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
+    half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
+    posture.qpos[:] = qpos
+    mujoco.mj_kinematics(model, posture)
+    middles, axes = posture.geom_xpos[parts], posture.geom_xmat[parts].reshape(-1, 3, 3)[:, :, 2]
+    reach = half_lengths[:, None] * axes
+    return np.concatenate([middles - reach, middles + reach])
+
+
+def _free_camera(angles_deg: tuple[float, float], distance_m: float) -> mujoco.MjvCamera:
+    import mujoco
+
+    camera = mujoco.MjvCamera()
+    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera.azimuth, camera.elevation = angles_deg
+    camera.distance = distance_m
+    return camera
+
+
+def _options() -> mujoco.MjvOption:
+    import mujoco
+
+    option = mujoco.MjvOption()
+    mujoco.mjv_defaultOption(option)
+    option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
+    return option
 
 
 def _model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarBody, fields_of
+from annelid.config import PlanarBody, Section, fields_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -100,6 +100,8 @@ def field_lines(config: RunConfig) -> list[str]:
 def _toml(value: Any) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(_toml(item) for item in value)}]"
+    if isinstance(value, Section):
+        return f"{{{', '.join(f'{name} = {_toml(item)}' for name, item in value)}}}"
     return f"{value:g}" if isinstance(value, float) else json.dumps(value)
 
 

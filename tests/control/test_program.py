@@ -1,0 +1,238 @@
+"""Open-loop contractions: activation over time, halves, refusals, and runs from beginning to end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.analysis.paper import published
+from annelid.config import Contraction, Program, RunConfig, SnsController, load_config, parse_assignments
+from annelid.control import ProgramController
+from annelid.control.program import program_activation
+from annelid.errors import ConfigError
+from annelid.protocols import Controller, Records, Sensation, Stateful
+from annelid.simulation import Run, simulate
+from annelid.view.table import field_lines
+
+ONE = {"segment": 1, "start_s": 0.0, "stop_s": 0.6}
+
+
+def program(*contractions: tuple[int, float, float, float], ramp_s: float = 0.0) -> Program:
+    several = (Contraction(segment=s, start_s=a, stop_s=b, activation=level) for s, a, b, level in contractions)
+    return Program(contractions=tuple(several), ramp_s=ramp_s)
+
+
+def programmed(*contractions: dict[str, Any], **fields: Any) -> dict[str, Any]:
+    return {"controller": {"kind": "program", "contractions": list(contractions), **fields}}
+
+
+def at(time_s: float, n_segments: int = 3) -> Sensation:
+    unfelt = np.full((n_segments, 1), np.nan)
+    return Sensation(time_s, unfelt, unfelt, unfelt[:, 0], unfelt[:, 0], np.zeros((n_segments, 3)), np.zeros(3))
+
+
+def test_is_a_controller_that_records_and_restores() -> None:
+    one: Controller = ProgramController(program(), 3, 3)
+    assert isinstance(one, Records)
+    assert isinstance(one, Stateful)
+
+
+def test_without_a_ramp_activation_steps_at_start_and_stop() -> None:
+    activation = program_activation(program((2, 0.3, 0.6, 0.8)), 3, [0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0])
+    np.testing.assert_array_equal(activation[:, 1], [0, 0, 0.8, 0.8, 0.8, 0, 0])
+    assert not activation[:, [0, 2]].any()
+
+
+@given(start=st.integers(0, 5000), steps=st.integers(1, 3000))
+def test_a_contraction_lasts_exactly_its_number_of_control_steps(start: int, steps: int) -> None:
+    """Whichever way the times of the steps are rounded."""
+    dt = 0.001
+    one = program((1, start * dt, (start + steps) * dt, 1.0))
+    for times in (np.arange(9000) * dt, np.cumsum(np.full(9000, dt)) - dt):
+        on = np.flatnonzero(program_activation(one, 1, times)[:, 0])
+        assert (on[0], len(on)) == (start, steps)
+
+
+def test_a_ramp_rises_from_the_start_and_falls_from_the_stop() -> None:
+    one = program((1, 1.0, 2.0, 0.6), ramp_s=0.2)
+    times = [0.9, 1.0, 1.05, 1.1, 1.2, 1.7, 2.0, 2.05, 2.1, 2.2, 3.0]
+    expected = [0.0, 0.0, 0.15, 0.3, 0.6, 0.6, 0.6, 0.45, 0.3, 0.0, 0.0]
+    np.testing.assert_allclose(program_activation(one, 1, times)[:, 0], expected, atol=1e-12)
+
+
+def test_a_contraction_shorter_than_its_ramp_falls_from_what_it_has_reached() -> None:
+    one = program((1, 1.0, 1.1, 1.0), ramp_s=0.4)
+    activation = program_activation(one, 1, [1.0, 1.05, 1.1, 1.15, 1.2, 1.3])[:, 0]
+    np.testing.assert_allclose(activation, [0.0, 0.125, 0.25, 0.125, 0.0, 0.0], atol=1e-12)
+
+
+contractions = st.tuples(st.integers(1, 4), st.floats(0, 5), st.floats(0.01, 3), st.floats(0.05, 1.0)).map(
+    lambda one: (one[0], one[1], one[1] + one[2], one[3])
+)
+
+
+@given(several=st.lists(contractions, max_size=6), ramp_s=st.sampled_from([0.0, 0.1, 0.7]))
+def test_of_overlapping_contractions_the_larger_wins(
+    several: list[tuple[int, float, float, float]], ramp_s: float
+) -> None:
+    times = np.linspace(0.0, 9.0, 400)
+    alone = [program_activation(program(one, ramp_s=ramp_s), 4, times) for one in several]
+    together = program_activation(program(*several, ramp_s=ramp_s), 4, times)
+    np.testing.assert_array_equal(together, np.max([np.zeros((400, 4)), *alone], axis=0))
+    assert together.min() >= 0
+    assert together.max() <= 1
+
+
+@given(one=contractions, ramp_s=st.floats(0.05, 2.0))
+def test_a_ramp_moves_activation_no_faster_than_its_level_over_the_ramp(
+    one: tuple[int, float, float, float], ramp_s: float
+) -> None:
+    times = np.linspace(0.0, 10.0, 2001)
+    activation = program_activation(program(one, ramp_s=ramp_s), 4, times)
+    assert np.abs(np.diff(activation, axis=0)).max() <= one[3] * 0.005 / ramp_s + 1e-9
+
+
+def test_halves_of_a_ring_contract_alike() -> None:
+    halves = ProgramController(program((2, 0.0, 1.0, 0.7), (3, 0.5, 1.0, 1.0)), 3, 6)
+    np.testing.assert_array_equal(halves.step(at(0.2)), [0, 0, 0.7, 0.7, 0, 0])
+    np.testing.assert_array_equal(halves.step(at(0.6)), [0, 0, 0.7, 0.7, 1, 1])
+
+
+def test_what_a_step_returns_depends_on_time_alone() -> None:
+    one = ProgramController(program((1, 0.1, 0.5, 1.0), ramp_s=0.1), 3, 3)
+    before = one.step(at(0.15))
+    one.step(at(0.4))
+    np.testing.assert_array_equal(one.step(at(0.15)), before)
+    assert before.tolist() == pytest.approx([0.5, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("contraction", "sentence"),
+    [
+        ({"segment": 4}, r"controller\.contractions\.0\.segment = 4: must be in 1 \.\. 3, the segments of the body"),
+        ({"segment": 0}, r"controller\.contractions\.0\.segment = 0: must be at least 1"),
+        ({"segment": 1.5}, "must be a whole number"),
+        ({"start_s": -0.1}, r"start_s = -0\.1: must be at least 0"),
+        ({"start_s": 0.6}, r"stop_s = 0\.6 of a contraction of segment 1 must be greater than its start_s = 0\.6"),
+        ({"activation": 0}, "activation = 0: must be greater than 0"),
+        ({"activation": 1.01}, r"activation = 1\.01: must be at most 1"),
+        ({"stop_s": float("nan")}, "must be a finite number"),
+        ({"duration_s": 1.0}, "unknown field .*Valid here: activation, segment, start_s, stop_s"),
+    ],
+)
+def test_a_bad_contraction_is_refused_in_one_sentence(contraction: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ConfigError, match=sentence) as caught:
+        load_config("riddle2023-rods", programmed({**ONE, **contraction}))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "sentence"),
+    [
+        ({"controller.kind": "program"}, r"^controller\.contractions must be given$"),
+        (programmed(ONE, ramp_s=-1.0), r"controller\.ramp_s = -1\.0: must be at least 0"),
+        (programmed(ONE, gate_time_constant_ms=300.0), "belongs to another kind. Valid here: contractions, kind"),
+        ({"controller.contractions": [ONE]}, "belongs to another kind"),
+        ({"controller.kind": "programme"}, "must be one of 'sns', 'program'"),
+        ({"controller.kind": "program", "controller.contractions": 3}, "must be a list"),
+    ],
+)
+def test_a_bad_program_is_refused(overrides: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ConfigError, match=sentence):
+        load_config("riddle2022-planar", overrides)
+
+
+def test_a_segment_must_exist_on_whatever_body() -> None:
+    with pytest.raises(ConfigError, match=r"segment 4, but the worm has segments 1 \.\. 3"):
+        ProgramController(program((4, 0.0, 1.0, 1.0)), 3, 3)
+    with pytest.raises(ConfigError, match=r"n_muscles = 5 .* give 3 \(rings\) or 6 \(half-rings\)"):
+        ProgramController(program(), 3, 5)
+    assert load_config("riddle2023-rods", {**programmed({**ONE, "segment": 4}), "body.mesh.n_segments": 4}).seed == 0
+
+
+def test_a_section_of_another_kind_keeps_nothing_of_the_preset_s(tmp_path: Path) -> None:
+    expected = Program(contractions=(Contraction(segment=1, start_s=0.0, stop_s=0.6),))
+    assert load_config("riddle2023-rods", programmed(ONE)).controller == expected
+    text = "controller.contractions=[{segment=1, start_s=0.0, stop_s=0.6}]"
+    for order in ([text, "controller.kind=program"], ["controller.kind=program", text]):
+        assert load_config("riddle2023-rods", parse_assignments(order)).controller == expected
+    file = tmp_path / "squeeze.toml"
+    file.write_text(
+        'extends = "riddle2023"\n[controller]\nkind = "program"\n'
+        "[[controller.contractions]]\nsegment = 1\nstart_s = 0.0\nstop_s = 0.6\n",
+        encoding="utf-8",
+    )
+    config = load_config(file)
+    assert config.controller == expected
+    assert config.body == load_config("riddle2023").body
+    again = tmp_path / "again.toml"
+    again.write_text(f'extends = "{file.as_posix()}"\n[controller]\nramp_s = 0.1\n', encoding="utf-8")
+    assert load_config(again).controller == expected.model_copy(update={"ramp_s": 0.1})
+    back = load_config({"extends": file.as_posix(), "controller": {"kind": "sns", "kick_nA": 2.0}})
+    assert back.controller == SnsController(kick_nA=2.0)
+
+
+def test_it_is_listed_saved_and_not_laid_beside_the_paper() -> None:
+    config = load_config("riddle2023-rods", programmed(ONE))
+    assert RunConfig.model_validate_json(config.model_dump_json()) == config
+    assert any("{segment = 1, start_s = 0, stop_s = 0.6, activation = 1}" in line for line in field_lines(config))
+    assert published(load_config("riddle2023-rods")) != {}
+    assert published(config) == {}
+
+
+def planar(duration_s: float) -> RunConfig:
+    two = {"segment": 3, "start_s": 0.1, "stop_s": 0.25, "activation": 0.5}
+    return load_config(
+        "riddle2022-planar", {**programmed(ONE | {"stop_s": 0.2}, two, ramp_s=0.05), "duration_s": duration_s}
+    )
+
+
+def test_a_planar_worm_does_what_the_program_says(tmp_path: Path) -> None:
+    run = simulate(planar(0.5), tmp_path, progress=False)
+    assert run.data.attrs["controller"] == "program of contractions"
+    time, activation = run.data["time"].values, run.data["activation"].values
+    config = run.config
+    assert isinstance(config.controller, Program)
+    # The sample at t holds the activation of the step that ended there.
+    begun = time[1:] - config.clock.control_timestep_s
+    np.testing.assert_allclose(activation[1:], program_activation(config.controller, 3, begun), atol=1e-9)
+    heights = run.data["ring_length"].values
+    assert heights[:, 1] == pytest.approx(0.11)
+    assert 0.07 < heights[:, 2].min() < 0.105
+
+
+def joined_equal(first: Run, second: Run, whole: Run) -> None:
+    for name, variable in whole.data.variables.items():
+        if {"time", "frame"} & set(variable.dims) and name != "wall_time":
+            parts = [part.data[name].values for part in (first, second)]
+            np.testing.assert_array_equal(np.concatenate(parts), variable.values, err_msg=str(name))
+
+
+def test_a_continued_planar_run_equals_the_whole_bit_for_bit(tmp_path: Path) -> None:
+    # The cut lies within both contractions, one of them on its way down.
+    first = simulate(planar(0.22), tmp_path / "1", progress=False)
+    second = simulate(planar(0.5), tmp_path / "2", resume=first, progress=False)
+    joined_equal(first, second, simulate(planar(0.5), tmp_path / "3", progress=False))
+
+
+def rods(duration_s: float) -> RunConfig:
+    coarse = {"body.mesh.elements_per_side": 1, "body.rings.layout": "halves", "clock.control_timestep_s": 0.005}
+    return load_config(
+        "riddle2023-rods",
+        {**coarse, **programmed({"segment": 2, "start_s": 0.05, "stop_s": 0.3}), "duration_s": duration_s},
+    )
+
+
+def test_a_worm_of_rods_contracts_its_ring_and_can_be_continued(tmp_path: Path) -> None:
+    whole = simulate(rods(0.4), tmp_path / "3", progress=False)
+    rings = whole.data["ring_length"].values.reshape(-1, 3, 2).sum(axis=2)
+    assert rings[-1, 1] < 0.8 * rings[0, 1]
+    assert np.abs(rings[:10] / rings[0] - 1).max() < 0.02
+    np.testing.assert_array_equal(whole.data["activation"].values[:, 2], whole.data["activation"].values[:, 3])
+    first = simulate(rods(0.2), tmp_path / "1", progress=False)
+    joined_equal(first, simulate(rods(0.4), tmp_path / "2", resume=first, progress=False), whole)

@@ -1,0 +1,331 @@
+"""The paper's figures 1, 5, 6 and 9: what is drawn is what the plant, the engine and the network say."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from xml.etree import ElementTree
+
+import imageio.v3
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
+from annelid.config import Rings, WormBody, load_config
+from annelid.errors import ConfigError
+from annelid.nervous import Network
+from annelid.nervous.neurons import Neuron, persistent_sodium
+from annelid.nervous.peristalsis import peristalsis_network
+from annelid.nervous.synapses import GapJunction, Synapse
+from annelid.view.figures import muscle_surface, network_diagram, planar_models, robot_lengths
+
+
+def assert_two_good_files(png: Path) -> None:
+    assert png.suffix == ".png"
+    ElementTree.parse(png.with_suffix(".svg"))
+    pixels = imageio.v3.imread(png)[:, :, :3]
+    white = np.all(pixels == 255, axis=2)
+    assert white.shape[1] > 1000
+    assert 0.3 < white.mean() < 0.97
+    # Nothing is cut off at the edges.
+    assert white[[0, -1]].all()
+    assert white[:, [0, -1]].all()
+
+
+def lengths_of_pieces(outline: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(outline, axis=1), axis=2)
+
+
+# Figure 1
+
+
+@pytest.fixture(scope="module")
+def posture() -> tuple[np.ndarray, np.ndarray]:
+    return planar_models.contracted_posture(load_config("riddle2022-planar"), 1)
+
+
+def test_the_plants_posture_obeys_the_rhombus(posture: tuple[np.ndarray, np.ndarray]) -> None:
+    height, length = posture
+    assert height == pytest.approx([0.11, 0.065, 0.11], abs=1e-6)
+    assert height**2 + length**2 == pytest.approx(4 * 0.073**2, rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [1, 3, 6])
+def test_rigid_rhombi_keep_their_sides_and_join(n: int) -> None:
+    height = np.random.default_rng(n).uniform(0.065, 0.11, n)
+    outline = planar_models.rigid_outline(height, np.sqrt(4 * 0.073**2 - height**2))
+    assert lengths_of_pieces(outline) == pytest.approx(0.073)
+    assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
+    assert outline[:, 1, 1] == pytest.approx(height / 2)
+    assert np.all(outline[:, [0, -1], 1] == 0)
+
+
+@pytest.mark.parametrize("n", [1, 3, 6])
+def test_bent_sides_keep_their_halves_and_go_straight_through_joints(n: int) -> None:
+    height = np.random.default_rng(n).uniform(0.075, 0.11, n)
+    outline = planar_models.bent_outline(height, 0.073)
+    assert lengths_of_pieces(outline) == pytest.approx(0.073 / 2)
+    assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
+    assert outline[:, 2, 1] == pytest.approx(height / 2)
+    before, after = outline[:-1, -1] - outline[:-1, -2], outline[1:, 1] - outline[1:, 0]
+    assert before == pytest.approx(after * [1, -1])
+
+
+def test_equal_heights_bend_no_side() -> None:
+    height = np.full(4, 0.09)
+    bent = planar_models.bent_outline(height, 0.073)
+    assert bent[:, ::2] == pytest.approx(planar_models.rigid_outline(height, np.sqrt(4 * 0.073**2 - height**2)))
+
+
+def test_sides_too_short_to_follow_are_refused() -> None:
+    with pytest.raises(ConfigError, match="neighbouring heights"):
+        planar_models.bent_outline(np.array([0.14, 0.02, 0.14]), 0.073)
+
+
+def test_joints_draw_neighbours_along() -> None:
+    height, side = np.array([0.11, 0.11, 0.065, 0.11, 0.11]), 0.073
+    free = planar_models.coupled_heights(height, side, 2, 0.0)
+    soft, stiff = (planar_models.coupled_heights(height, side, 2, coupling) for coupling in (0.5, 1e7))
+    assert free == pytest.approx(height)
+    assert stiff == pytest.approx(0.065, rel=1e-5)
+    assert soft == pytest.approx(soft[::-1])
+    assert soft[2] == pytest.approx(0.065)
+    assert 0.065 < soft[1] < soft[0] < 0.11
+
+
+def test_a_free_joint_is_in_balance() -> None:
+    height, side, coupling = np.array([0.11, 0.1, 0.065]), 0.073, 0.7
+    own, angle = (np.arcsin(h / (2 * side)) for h in (height, planar_models.coupled_heights(height, side, 2, coupling)))
+    assert angle[1] - own[1] == pytest.approx(coupling * (angle[0] + angle[2] - 2 * angle[1]))
+
+
+def test_symbols_of_springs_span_what_they_should() -> None:
+    start, end = np.array([1.0, 2.0]), np.array([4.0, 6.0])
+    path = planar_models.zigzag(start, end, 0.3)
+    assert path[[0, -1]] == pytest.approx(np.array([start, end]))
+    off = (path - start) @ np.array([-0.8, 0.6])
+    assert (off.min(), off.max()) == pytest.approx((-0.3, 0.3))
+    turned = planar_models.spiral(start, 0.5, turns=3.0)
+    assert np.linalg.norm(turned - start, axis=1).max() == pytest.approx(0.5)
+    assert turned[-1] == pytest.approx([1.5, 2.0])
+
+
+def test_figure_1(tmp_path: Path) -> None:
+    assert_two_good_files(planar_models.figure_1_planar_models(load_config("riddle2022-planar"), tmp_path / "figure_1"))
+
+
+def test_figure_1_needs_a_planar_body(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="planar body"):
+        planar_models.figure_1_planar_models(load_config("riddle2023-rods"), tmp_path / "figure_1")
+
+
+# Figure 5
+
+
+@pytest.fixture(scope="module")
+def rings() -> Rings:
+    body = load_config("riddle2023").body
+    assert isinstance(body, WormBody)
+    return body.rings
+
+
+@pytest.mark.parametrize("activation", [0.0, 0.4, 1.0])
+def test_the_engine_follows_the_documented_formula(rings: Rings, activation: float) -> None:
+    length, velocity = np.meshgrid(np.linspace(0.3, 2.0, 171), np.linspace(-2.0, 2.0, 81))
+    engine = muscle_surface.engine_flv(length, velocity, rings, activation)
+    assert muscle_surface.closed_form_flv(length, velocity, rings, activation) == pytest.approx(engine, abs=1e-9)
+
+
+def test_the_formula_holds_for_other_muscles_too(rings: Rings) -> None:
+    other = rings.model_copy(
+        update={"minimum_length": 0.4, "maximum_length": 1.9, "lengthening_peak": 1.0, "maximum_velocity": 0.7}
+    )
+    length, velocity = np.meshgrid(np.linspace(0.3, 2.0, 86), np.linspace(-1.0, 1.0, 41))
+    engine = muscle_surface.engine_flv(length, velocity, other)
+    assert muscle_surface.closed_form_flv(length, velocity, other) == pytest.approx(engine, abs=1e-9)
+
+
+def test_the_muscle_at_its_landmarks(rings: Rings) -> None:
+    def force(length: float, velocity: float, activation: float = 1.0) -> float:
+        return float(muscle_surface.engine_flv(length, velocity, rings, activation))
+
+    assert force(1.0, 0.0) == pytest.approx(1.0)
+    assert force(1.0, -rings.maximum_velocity) == 0.0
+    assert force(1.0, 10.0) == pytest.approx(rings.lengthening_peak)
+    assert force(rings.minimum_length, 0.0) == 0.0
+    assert force(rings.maximum_length, 0.0, 0.0) == pytest.approx(1.5 * rings.passive_peak)
+
+
+def test_scaled_lengths_are_the_engines(rings: Rings) -> None:
+    import mujoco
+
+    low, high = rings.length_ranges(3)[0]
+    model = mujoco.MjModel.from_xml_string(f"""
+        <mujoco><worldbody><site name="a"/><body pos="1 0 0"><joint type="slide" axis="1 0 0"/>
+        <geom size=".1"/><site name="b"/></body></worldbody>
+        <tendon><spatial name="t"><site site="a"/><site site="b"/></spatial></tendon>
+        <actuator><muscle tendon="t" force="7" lengthrange="{low} {high}" lmin="{rings.minimum_length}"/></actuator>
+        </mujoco>""")
+    data = mujoco.MjData(model)
+    for length, speed in ((0.4, 0.0), (0.7, -0.3), (1.2, 0.2)):
+        data.qpos[:], data.qvel[:], data.act[:] = length - 1.0, speed, 1.0
+        mujoco.mj_forward(model, data)
+        optimal = (high - low) / 0.3
+        scaled = muscle_surface.scaled_length(length, (low, high))
+        expected = 7.0 * muscle_surface.engine_flv(scaled, speed / optimal, rings)
+        assert -data.actuator_force[0] == pytest.approx(float(expected), abs=1e-9)
+
+
+def test_figure_5_and_its_caption(rings: Rings, tmp_path: Path) -> None:
+    assert_two_good_files(muscle_surface.figure_5_muscle_surface(rings, tmp_path / "figure_5"))
+    assert muscle_surface.largest_difference(rings) < 1e-9
+    text = muscle_surface.caption(rings)
+    assert "1.57-1.77 m" in text
+    # Where rings contracted against about 2.5 N come to rest in the paper's worm: 0.33-0.43 of 0.96 m.
+    assert "0.32-0.41 m" in text
+
+
+# Figure 6
+
+
+def own_network() -> Network:
+    """Everything a network can have: both synapses, both gap junctions, twins, a self-connection, a shifted rest."""
+    network = Network("own")
+    sodium = Neuron(channels=(persistent_sodium(1.0),))
+    for name, neuron in {
+        "motor": Neuron(rest_mV=-60.0),
+        "left": sodium,
+        "right": sodium,
+        "command": Neuron(),
+        "sensor": Neuron(),
+    }.items():
+        network.add_neuron(name, neuron)
+    network.add_synapse("left", "right", Synapse(1.0, -40.0))
+    network.add_synapse("right", "left", Synapse(1.0, -40.0))
+    network.add_synapse("left", "motor", Synapse(1.0, -20.0))
+    network.add_synapse("sensor", "command", Synapse(0.3, 194.0))
+    network.add_synapse("sensor", "command", Synapse(0.2, -40.0))
+    network.add_synapse("sensor", "sensor", Synapse(0.2, 100.0))
+    network.add_gap_junction("command", "left", GapJunction(0.5))
+    network.add_gap_junction("command", "motor", GapJunction(0.5, rectified=True))
+    network.add_input("touch", ("sensor", "command"))
+    network.add_output("drive", "motor")
+    return network
+
+
+def long_columns() -> Network:
+    """Five neurons a segment in two segments, with two connections back."""
+    network = Network("columns")
+    for segment in (1, 2):
+        for role in "abcde":
+            network.add_neuron(f"{role}_{segment}", Neuron())
+    for source, target in (("c_2", "a_1"), ("e_2", "d_1"), ("a_1", "c_1"), ("b_1", "b_2"), ("d_2", "d_2")):
+        network.add_synapse(source, target, Synapse(1.0, 100.0))
+    return network
+
+
+NETWORKS = {
+    "3 segments": peristalsis_network(3),
+    "4 segments": peristalsis_network(4),
+    "own": own_network(),
+    "columns": long_columns(),
+}
+
+
+@pytest.fixture(params=NETWORKS.values(), ids=list(NETWORKS))
+def network(request: pytest.FixtureRequest) -> Network:
+    return request.param
+
+
+def drawn_ids(network: Network) -> Counter[str]:
+    axes = Figure().add_subplot()
+    network_diagram.network_diagram(axes, network)
+    gids = (artist.get_gid() for artist in axes.get_children())
+    return Counter(gid for gid in gids if gid is not None)
+
+
+def test_every_part_of_a_network_is_drawn_exactly_once(network: Network) -> None:
+    links = enumerate(network.connections)
+    expected = [
+        *(f"neuron-{name}" for name in network.neurons),
+        *(f"{'gap' if isinstance(link.kind, GapJunction) else 'synapse'}-{index}" for index, link in links),
+        *(f"input-{name}-{neuron}" for name, neurons in network.inputs.items() for neuron in neurons),
+        *(f"output-{name}" for name in network.outputs),
+    ]
+    assert drawn_ids(network) == Counter(expected)
+
+
+def test_a_segment_has_seven_synapses() -> None:
+    lines = [sum(n for gid, n in drawn_ids(peristalsis_network(n)).items() if "synapse" in gid) for n in (3, 4)]
+    assert lines == [21, 28]
+
+
+def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: Network) -> None:
+    diagram = network_diagram.lay_out(network)
+    for link, route in zip(network.connections, diagram.routes, strict=True):
+        radii = [np.linalg.norm(route - place, axis=1) for place in diagram.places.values()]
+        nearest = {name: distance.min() for name, distance in zip(diagram.places, radii, strict=True)}
+        radius = np.linalg.norm(route[0] - diagram.places[link.source])
+        assert radius == pytest.approx(0.27, abs=0.03)
+        assert np.linalg.norm(route[-1] - diagram.places[link.target]) == pytest.approx(0.27, abs=0.03)
+        assert all(gap > 0.28 for name, gap in nearest.items() if name not in (link.source, link.target))
+
+
+def test_no_two_connections_share_a_path_and_no_two_neurons_a_place(network: Network) -> None:
+    diagram = network_diagram.lay_out(network)
+    middles = np.array([route[len(route) // 2] for route in diagram.routes])
+    for points in (middles, np.array(list(diagram.places.values()))):
+        gaps = np.linalg.norm(points[:, np.newaxis] - points, axis=2) + 10.0 * np.eye(len(points))
+        assert gaps.min() > 0.1
+
+
+def test_segments_are_columns_from_left_to_right() -> None:
+    diagram = network_diagram.lay_out(peristalsis_network(12))
+    assert list(diagram.columns) == list(range(1, 13))
+    x = np.array([[diagram.places[name][0] for name in names] for names in diagram.columns.values()])
+    assert np.all(x[:-1].max(axis=1) < x[1:].min(axis=1))
+    assert network_diagram.lay_out(own_network()).columns == {}
+
+
+def test_effects_come_from_reversal_and_rest() -> None:
+    network = own_network()
+    effects = [network_diagram.effect(network, link) for link in network.connections]
+    assert effects[:3] == ["inhibitory", "inhibitory", "excitatory"]
+    assert effects[-2:] == ["gap junction", "rectified gap junction"]
+
+
+def test_abbreviations_tell_names_apart() -> None:
+    assert network_diagram.abbreviations(["contraction_1", "control_1", "u_1", "contraction_2"]) == {
+        "contraction": "contra",
+        "control": "contro",
+        "u": "u",
+    }
+    assert network_diagram.abbreviations(["in", "inner"]) == {"in": "in", "inner": "inn"}
+
+
+@pytest.mark.parametrize("conductances", [False, True])
+def test_figure_6(network: Network, tmp_path: Path, conductances: bool) -> None:
+    png = network_diagram.figure_6_network_diagram(network, tmp_path / "figure_6", conductances=conductances)
+    assert_two_good_files(png)
+    ids = Counter(node.get("id") for node in ElementTree.parse(png.with_suffix(".svg")).iter() if node.get("id"))
+    for name in network.neurons:
+        assert ids[f"neuron-{name}"] == 1
+
+
+# Figure 9
+
+
+def test_the_robots_published_percentages_follow_from_its_elongations() -> None:
+    below = 100 * (1 - relative_to_first(ROBOT_ELONGATION_M))
+    assert below == pytest.approx([0.0, 37.8, 22.2, 2.75], abs=0.1)
+
+
+def test_figure_9_shows_robot_model_and_every_series(tmp_path: Path) -> None:
+    series = {"first helix": (0.0403, 0.0255, 0.0429), "mean of six": (0.0330, 0.0252, 0.0345)}
+    png = robot_lengths.figure_9_robot_lengths(series, tmp_path / "figure_9")
+    assert_two_good_files(png)
+    svg = png.with_suffix(".svg").read_text(encoding="utf-8")
+    for number in ("6.15", "3.82", "4.78", "5.98", "4.20", "2.55", "4.02", "4.03", "4.29", "3.30", "0.62", "0.76"):
+        assert f"<!-- {number} -->" in svg
+    assert "not the time series" in robot_lengths.CAPTION

@@ -1,0 +1,202 @@
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import imageio.v3
+import numpy as np
+import pytest
+
+from annelid.analysis.rhombi import actuated, rhombus_plane
+from annelid.body import build_spec, mesh_of
+from annelid.config import WormBody, load_config
+from annelid.errors import RenderingUnavailable, RunFileError
+from annelid.morphology import MeshGeometry
+from annelid.simulation.runfile import Run
+from annelid.view.camera import fitting_distance, picture_axes, picture_points
+from annelid.view.figures import renderings
+from annelid.view.figures.propagation import (
+    figure_2_caption,
+    figure_2_propagation,
+    figure_8_caption,
+    figure_8_propagation,
+    measure_propagation,
+)
+from annelid.view.figures.renderings import (
+    ISOMETRIC_DEG,
+    figure_4_caption,
+    figure_4_model,
+    recorded_posture,
+    rendering_works,
+    rest_posture,
+    rhombus_outline,
+    strand_points,
+)
+from annelid.view.scene import render_still
+
+LATE_S = 0.2
+needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
+
+
+@pytest.fixture
+def no_opengl(monkeypatch: pytest.MonkeyPatch) -> None:
+    def find_nothing() -> str:
+        raise RenderingUnavailable("no OpenGL back-end works here")
+
+    monkeypatch.setattr(renderings, "find_backend", find_nothing)
+
+
+def mesh(run: Run) -> MeshGeometry:
+    assert isinstance(run.config.body, WormBody)
+    return mesh_of(run.config.body.mesh)
+
+
+def check_files(png: Path, *, rendered: bool) -> None:
+    """Both files are there, the picture has ink on white, and the SVG embeds pixels only where they were rendered."""
+    assert png.suffix == ".png"
+    pixels = imageio.v3.imread(png)[..., :3]
+    assert 0.02 < (pixels < 200).any(axis=-1).mean() < 0.6
+    drawing = png.with_suffix(".svg").read_text(encoding="utf-8")
+    assert ("<image" in drawing) == rendered
+    assert drawing.count("<path") > 20
+
+
+@pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])
+def test_strand_points_at_rest_are_the_mesh(preset: str) -> None:
+    config = load_config(preset)
+    posture = rest_posture(config)
+    qpos = build_spec(config).compile().qpos0
+    np.testing.assert_allclose(strand_points(config, qpos, posture.geometry), posture.strands_m, atol=1e-6)
+
+
+def test_coordinates_of_another_body_are_refused() -> None:
+    config = load_config("riddle2023-rods")
+    with pytest.raises(RunFileError, match="postures of 7 coordinates"):
+        strand_points(config, np.zeros(7), rest_posture(config).geometry)
+
+
+def test_strands_of_a_recorded_posture_pass_through_the_pins(rods_run: Run) -> None:
+    posture = recorded_posture(rods_run, LATE_S)
+    geometry = posture.geometry
+    assert np.abs(posture.crossings_m - geometry.crossings_m).max() > 0.005, "it has moved"
+    for crossing, strands in enumerate(geometry.crossing_strands):
+        vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
+        for strand in strands:
+            np.testing.assert_allclose(posture.strands_m[strand, vertex], posture.crossings_m[crossing], atol=1e-6)
+
+
+def test_an_outline_visits_the_rhombus_corners_and_closes(rods_run: Run) -> None:
+    posture = recorded_posture(rods_run, LATE_S)
+    per_side = rods_run.config.body.mesh.elements_per_side  # type: ignore[union-attr]
+    for rhombus in (0, 17, len(posture.geometry.rhombi) - 1):
+        line = rhombus_outline(posture, rhombus)
+        assert len(line) == 4 * per_side + 1
+        np.testing.assert_array_equal(line[0], line[-1])
+        np.testing.assert_array_equal(line[:-1:per_side], posture.crossings_m[posture.geometry.rhombi[rhombus]])
+        steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+        assert steps.max() < 1.5 * steps.min(), "it follows the strands and does not jump"
+
+
+def test_picture_points_are_where_a_pinhole_camera_sees_them() -> None:
+    angles, aspect, distance = (52.0, -24.0), 1.6, 3.0
+    right, up, sight = picture_axes(*angles)
+    np.testing.assert_allclose(np.array([right, up, sight]) @ np.array([right, up, sight]).T, np.eye(3), atol=1e-12)
+    half_height = 3.0 * math.tan(math.radians(15.0))
+    seen = picture_points(
+        [np.zeros(3), half_height * up, aspect * half_height * right, sight], *angles, distance, aspect
+    )
+    np.testing.assert_allclose(seen, [[0.5, 0.5], [0.5, 0.0], [1.0, 0.5], [0.5, 0.5]], atol=1e-12)
+    cloud = np.random.default_rng(1).normal(size=(50, 3))
+    shares = picture_points(cloud, *angles, fitting_distance(cloud, *angles, aspect), aspect)
+    assert shares.min() > 0.0
+    assert shares.max() < 1.0
+
+
+@needs_gl
+def test_marks_lie_on_what_was_rendered() -> None:
+    config = load_config("riddle2023-rods")
+    still = render_still(config, ISOMETRIC_DEG, (800, 600))
+    posture = rest_posture(config)
+    outward = posture.crossings_m - [0.0, 0.0, posture.geometry.radius_m]
+    outward[:, 0] = 0.0
+    towards = outward @ -picture_axes(*ISOMETRIC_DEG)[2] / posture.geometry.radius_m
+    columns, rows = np.rint(still.places(posture.crossings_m[towards > 0.5])).astype(int).T
+    assert len(columns) > 15
+
+    def share_of_grey(shift: int) -> float:
+        colors = still.pixels[rows, columns + shift].astype(int)
+        return float(((np.ptp(colors, axis=1) < 40) & (colors.max(axis=1) < 180)).mean())
+
+    assert share_of_grey(0) == 1.0, "pins that face the camera"
+    assert max(share_of_grey(-9), share_of_grey(9)) < 0.3, "beside them"
+
+
+@needs_gl
+def test_a_still_is_on_white_and_its_rings_are_red_or_as_active() -> None:
+    config = load_config("riddle2023-rods")
+    n = config.body.n_segments
+
+    def red(activation: np.ndarray | None) -> int:
+        pixels = render_still(config, ISOMETRIC_DEG, (400, 300), activation=activation).pixels.astype(int)
+        assert (pixels[0] == 255).all()
+        return int(((pixels[..., 0] > 150) & (pixels[..., 1:].max(axis=-1) < 120)).sum())
+
+    assert red(np.zeros(n)) == 0
+    assert red(np.eye(n)[1]) > 50
+    assert red(None) > 50
+
+
+@needs_gl
+def test_figures_4_and_8_are_rendered(rods_run: Run, tmp_path: Path) -> None:
+    check_files(figure_4_model(rods_run, tmp_path / "figure_4"), rendered=True)
+    check_files(figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S), rendered=True)
+    for caption in (figure_4_caption(rods_run), figure_8_caption(rods_run, LATE_S)):
+        assert "rendered" in caption
+        assert "not rendered" not in caption
+
+
+def test_figures_4_and_8_are_drawn_without_opengl(rods_run: Run, tmp_path: Path, no_opengl: None) -> None:
+    check_files(figure_4_model(rods_run.config, tmp_path / "figure_4"), rendered=False)
+    check_files(figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S), rendered=False)
+    for caption in (figure_4_caption(rods_run), figure_8_caption(rods_run, LATE_S)):
+        assert "drawn" in caption
+        assert "not rendered" in caption
+
+
+def test_figure_2_is_drawn_and_its_rigid_rhombus_keeps_its_sides(
+    rods_run: Run, tmp_path: Path, no_opengl: None
+) -> None:
+    check_files(figure_2_propagation(rods_run, tmp_path / "figure_2", LATE_S), rendered=False)
+    caption = figure_2_caption(rods_run, LATE_S)
+    found = re.search(r"The row of ([\d.]+) cm becomes ([\d.]+) cm long in a\) and ([\d.]+) cm in b\)", caption)
+    assert found is not None
+    rest, alone, _ = (float(number) for number in found.groups())
+    assert alone > rest, "a narrower rhombus with rigid sides is longer"
+    assert "stand" not in caption, "pins of rods cannot part from their strands"
+
+
+def test_near_and_far_rhombi_are_unactuated_and_off_the_contracted_ring(rods_run: Run) -> None:
+    measured = measure_propagation(rods_run, LATE_S)
+    geometry = mesh(rods_run)
+    assert measured.segment == 0, "the paper's order starts with segment 1"
+    ring = set(geometry.rings[0].tolist())
+    for one in (measured.near, measured.far):
+        assert not actuated(geometry)[one.rhombus]
+        assert not ring & set(geometry.rhombi[one.rhombus].tolist())
+    assert abs(measured.near.distance_m) == pytest.approx(2 * (geometry.plane_x_m[1] - geometry.plane_x_m[0]))
+    reach = np.abs(geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[0]])
+    assert abs(measured.far.distance_m) == pytest.approx(reach.max())
+    assert measured.near.length_m[1] > 1.02 * measured.near.length_m[0]
+    assert abs(measured.far.length_m[1] / measured.far.length_m[0] - 1) < 0.02
+    assert "length 7.5 →" in str(measured.near)
+
+
+def test_planar_worms_and_times_outside_are_refused(planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
+    with pytest.raises(RunFileError, match="planar"):
+        figure_4_model(planar_run, tmp_path / "figure")
+    with pytest.raises(RunFileError, match="planar"):
+        figure_8_propagation(planar_run, tmp_path / "figure")
+    with pytest.raises(RunFileError, match=r"no posture at 1\.5 s"):
+        figure_2_propagation(rods_run, tmp_path / "figure")
+    assert not list(tmp_path.iterdir())

@@ -26,8 +26,9 @@ MAY_IMPORT = {
     "planar": {"config", "morphology"} | BASE,
     "simulation": {"config", "morphology", "arena", "body", "control", "planar", "nervous"} | BASE,
     "analysis": {"config", "morphology", "simulation"} | BASE,
-    "view": {"config", "morphology", "arena", "body", "simulation", "analysis"} | BASE,
-    "cli": {"config", "body", "simulation", "analysis", "view"} | BASE,
+    "view": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
+    "studies": {"config", "morphology", "nervous", "body", "simulation", "analysis", "view"} | BASE,
+    "cli": {"config", "body", "simulation", "analysis", "view", "studies"} | BASE,
 }
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}

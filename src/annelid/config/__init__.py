@@ -6,7 +6,7 @@ any field can be overridden by its dotted path (``body.mesh.n_segments=4``).
 """
 
 from annelid.config.checking import check_config, field_paths, fields_of
-from annelid.config.loading import load_config, parse_assignments, preset_names, preset_text
+from annelid.config.loading import load_config, parse_assignments, preset_names, preset_text, toml_value
 from annelid.config.models import (
     Arena,
     Chain,
@@ -56,4 +56,5 @@ __all__ = [
     "parse_assignments",
     "preset_names",
     "preset_text",
+    "toml_value",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import resources
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config.checking import check_config
-from annelid.config.models import RunConfig
+from annelid.config.models import RunConfig, Section
 from annelid.errors import ConfigError, suggest
 
 DEFAULT_BASE = "riddle2023-rods"
@@ -72,6 +73,24 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
             raise ConfigError(f"{assignment!r} is not of the form field=value, for example arena.friction=0.3")
         parsed[path] = _parse_value(text.strip())
     return parsed
+
+
+def toml_value(value: Any) -> str:
+    """Writes a value of a field as TOML, in the form that `parse_assignments` reads.
+
+    Args:
+        value: A number, a string, a truth value, a section, or lists and tables of these.
+    """
+    if isinstance(value, Section):
+        value = dict(value)
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{name} = {toml_value(item)}' for name, item in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml_value(item) for item in value)}]"
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return json.dumps(value)
 
 
 def _parse_value(text: str) -> Any:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarBody, Section, fields_of
+from annelid.config import PlanarBody, fields_of, toml_value
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -92,17 +91,9 @@ def field_lines(config: RunConfig) -> list[str]:
         value: Any = config
         for key in path.split("."):
             value = getattr(value, key)
-        setting = f"{path} = {_toml(value)}" if value is not None else f"{path} (not set)"
+        setting = f"{path} = {toml_value(value)}" if value is not None else f"{path} (not set)"
         lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
     return lines
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    if isinstance(value, Section):
-        return f"{{{', '.join(f'{name} = {_toml(item)}' for name, item in value)}}}"
-    return f"{value:g}" if isinstance(value, float) else json.dumps(value)
 
 
 def _cells(numbers: Summary, planar: bool) -> list[tuple[str, str, str]]:

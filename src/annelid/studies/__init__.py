@@ -1,0 +1,1 @@
+"""The paper, reproduced and examined: cases, examinations, claims and the report."""

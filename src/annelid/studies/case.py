@@ -1,0 +1,102 @@
+"""A case: one run of a study, told by its preset and what is changed in it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
+
+CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
+"""The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
+
+HOLD_S, REST_S = 0.8, 0.4
+"""In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
+
+# Samples and postures of a study's runs: enough for its numbers, a hundredth of the disk.
+_SPARSE = {"record.signals_interval_s": 0.01}
+
+# Milliseconds of one core for each evaluation of the dynamics, only to start the longest runs first.
+_COST_MS = {"chain": 3.8, "rods": 4.5, "planar": 0.05}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run of a study.
+
+    Attributes:
+        preset: The preset that it starts from.
+        changes: Fields that differ from it, by their dotted paths.
+    """
+
+    preset: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def config(self) -> RunConfig:
+        """The configuration; sparsely recorded unless the case says otherwise."""
+        config = load_config(self.preset, dict(self.changes))
+        if any(path.startswith("record.") for path in self.changes):
+            return config
+        return load_config(config.model_dump(), {**_SPARSE, "record.frames_interval_s": config.duration_s})
+
+    @property
+    def command(self) -> str:
+        """The command line that makes the same run."""
+        changes = {path: value for path, value in self.changes.items() if not path.startswith("record.")}
+        words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in changes.items()]
+        return " ".join(["annelid run", self.preset, *words])
+
+    @property
+    def cost_s(self) -> float:
+        """About how long the run takes on one core, s: for the order of the runs and the progress bar."""
+        body, clock = self.config.body, self.config.clock
+        evaluations = self.config.duration_s / clock.physics_timestep_s
+        if not isinstance(body, WormBody):
+            return evaluations * _COST_MS["planar"] / 1e3
+        formulation = body.formulation
+        chain = isinstance(formulation, Chain)
+        if isinstance(formulation, Chain) and formulation.integrator == "RK4":
+            evaluations *= 4
+        size = body.mesh.n_segments / 3 * body.mesh.elements_per_side / 3
+        return evaluations * size * _COST_MS["chain" if chain else "rods"] / 1e3
+
+    def but(self, changes: Mapping[str, Any]) -> Case:
+        """Returns the case with further changes."""
+        return Case(self.preset, {**self.changes, **changes})
+
+
+def chain(changes: Mapping[str, Any] | None = None) -> Case:
+    """The paper's worm at steps of 2 ms, at half the cost of the paper's 1 ms and with the same rhythm."""
+    return Case(CHAIN, {"clock.physics_timestep_s": 0.002, **(changes or {})})
+
+
+def rods(changes: Mapping[str, Any] | None = None) -> Case:
+    """The worm of tight rods."""
+    return Case(RODS, changes or {})
+
+
+def fast(changes: Mapping[str, Any] | None = None) -> Case:
+    """The worm of rods whose pins give as the paper's do."""
+    return Case(FAST, changes or {})
+
+
+def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: float = REST_S) -> dict[str, Any]:
+    """Returns the changes that make a run open-loop: each segment contracted in turn, the others at rest.
+
+    Args:
+        n_segments: Segments of the worm.
+        hold_s: How long each is contracted, s.
+        rest_s: How long all rest before the next, s.
+    """
+    contractions = [
+        {"segment": i + 1, "start_s": i * (hold_s + rest_s), "stop_s": i * (hold_s + rest_s) + hold_s}
+        for i in range(n_segments)
+    ]
+    return {
+        "controller": {"kind": "program", "contractions": contractions},
+        "duration_s": round(n_segments * (hold_s + rest_s) - rest_s, 9),
+    }

@@ -1,0 +1,72 @@
+"""An examination: a small reproducible study with its question, its runs, its figure and what it found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from annelid.studies.case import Case
+from annelid.studies.outcome import Outcome
+
+Effort = Literal["quick", "full"]
+"""Coarse and within minutes, or the whole."""
+
+
+class Results:
+    """The outcomes of an examination's cases."""
+
+    def __init__(self, outcomes: Mapping[str, Outcome], key: Callable[[Case], str]) -> None:
+        """Wraps outcomes that are kept under the key of their case."""
+        self._outcomes = outcomes
+        self._key = key
+
+    def __getitem__(self, case: Case) -> Outcome:
+        return self._outcomes[self._key(case)]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a report: words and numbers as they shall be printed."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What an examination found.
+
+    Attributes:
+        answer: The answer to its question in one to four sentences, with numbers; shown in bold at its top.
+        caption: What one sees in the figure.
+        table: The numbers.
+        remarks: Paragraphs for those who want to know more; may be empty.
+        numbers: Single results by name, for the claims.
+    """
+
+    answer: str
+    caption: str
+    table: Table
+    remarks: Sequence[str] = ()
+    numbers: Mapping[str, float | str | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Examination:
+    """A small study.
+
+    Attributes:
+        name: One word, for file names and ``annelid paper --only``.
+        title: Its heading.
+        question: What it asks, in one or two sentences.
+        cases: The runs that it needs at an effort.
+        examine: Draws its figure as ``<stem>.svg`` and ``<stem>.png`` and returns what it found.
+    """
+
+    name: str
+    title: str
+    question: str
+    cases: Callable[[Effort], Sequence[Case]]
+    examine: Callable[[Results, Effort, Path], Findings]

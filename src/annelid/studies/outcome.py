@@ -1,0 +1,129 @@
+"""What a study keeps of a run: its summary, the score of its rhythm, and readings at the end of each contraction."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from annelid.analysis import RhythmScore, Summary, rhythm_score, summary
+from annelid.config import Program
+from annelid.simulation.runfile import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Readings at the end of one open-loop contraction, the worm about at rest.
+
+    Attributes:
+        segment: The contracted segment, from 1.
+        elongation_mean_m: Mean elongation of every segment's springs, m, the contracted one's among them.
+        elongation_first_helix_m: The same of the spring on the first helix, m.
+        ring_length_m: Length of the contracted segment's ring, m.
+        pin_gap_m: Largest gap between two pinned strands, m; None where pins cannot part.
+        force_N: Force of the contracted segment's muscle, N.
+    """
+
+    segment: int
+    elongation_mean_m: tuple[float, ...]
+    elongation_first_helix_m: tuple[float, ...]
+    ring_length_m: float
+    pin_gap_m: float | None
+    force_N: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a study keeps of a run.
+
+    Attributes:
+        path: Folder of the run.
+        summary: Its numbers.
+        rhythm: The score of its rhythm.
+        holds: Readings of its open-loop contractions, in the order of the program; empty in closed loop.
+        message: Why it ended before its time; empty if it did not.
+    """
+
+    path: Path
+    summary: Summary
+    rhythm: RhythmScore
+    holds: tuple[Hold, ...]
+    message: str
+
+
+def outcome(run: Run) -> Outcome:
+    """Reads a run's outcome."""
+    return Outcome(run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message)
+
+
+def write_outcome(read: Outcome, path: Path, reader: str) -> None:
+    """Writes an outcome as JSON, with the mark of the code that read it."""
+    content = {
+        "reader": reader,
+        "summary": read.summary.to_dict(),
+        "rhythm": asdict(read.rhythm),
+        "holds": [asdict(hold) for hold in read.holds],
+        "message": read.message,
+    }
+    path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
+
+
+def read_outcome(path: Path, reader: str) -> Outcome:
+    """Reads an outcome that `write_outcome` wrote.
+
+    Raises:
+        ValueError: The file is damaged, or other code read the run than ``reader``.
+        OSError: There is no such file.
+    """
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    if content.get("reader") != reader:
+        raise ValueError(f"{path} was read by other code")
+    try:
+        rhythm: dict[str, Any] = {**content["rhythm"], "order": tuple(content["rhythm"]["order"])}
+        holds: list[dict[str, Any]] = [
+            {name: tuple(value) if isinstance(value, list) else value for name, value in hold.items()}
+            for hold in content["holds"]
+        ]
+        return Outcome(
+            path.parent,
+            Summary(**content["summary"]),
+            RhythmScore(**rhythm),
+            tuple(Hold(**hold) for hold in holds),
+            content["message"],
+        )
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"{path} is no outcome: {error}") from None
+
+
+def _holds(run: Run) -> tuple[Hold, ...]:
+    program = run.config.controller
+    data = run.data
+    if not isinstance(program, Program) or not data.sizes.get("time"):
+        return ()
+    times = data["time"].values
+    n_segments = run.config.body.n_segments
+    above_rest = data["stretch_length"].values - data["stretch_rest_length"].values
+    ring = data["ring_length"].values.reshape(len(times), n_segments, -1).sum(axis=2)
+    force = data["muscle_force"].values.reshape(len(times), n_segments, -1).mean(axis=2)
+    holds = []
+    for contraction in program.contractions:
+        within = np.flatnonzero(times <= contraction.stop_s + 1e-9)
+        if times[-1] < contraction.stop_s - 2 * float(np.diff(times).max(initial=0.0)):
+            continue
+        last, segment = within[-1], contraction.segment - 1
+        gap = float(data["pin_gap"].values[last]) if "pin_gap" in data else None
+        holds.append(
+            Hold(
+                contraction.segment,
+                tuple(above_rest[last].mean(axis=1).tolist()),
+                tuple(above_rest[last, :, 0].tolist()),
+                float(ring[last, segment]),
+                gap,
+                # The activation ends with the step that leads to the last sample; the force is of the one before.
+                float(force[max(last - 1, 0), segment]),
+            )
+        )
+    return tuple(holds)

@@ -44,6 +44,27 @@ def test_the_paper_s_formulation_starts_as_in_the_paper(tmp_path: Path) -> None:
     assert 0.005 < result.pin_gap_max_m < 0.045
 
 
+def test_the_fast_worm_walks_as_the_paper_s(tmp_path: Path) -> None:
+    """A cheap representative of the slow comparison below: the paper's order, period and elongations."""
+    run, result = crawl("riddle2023-fast", tmp_path)
+    assert_wave(result, 3, 2.635, 0.05)
+    assert result.elongation_first_helix_pp_m == pytest.approx([0.0420, 0.0255, 0.0402], rel=0.15)
+    assert "pin_gap" in run.data
+    assert "edge_strain" in run.data
+
+
+@pytest.mark.slow
+def test_the_fast_worm_matches_the_paper_s_formulation(tmp_path: Path) -> None:
+    """Order and period as the chain's, elongations within 10 % of it in both readings."""
+    _, chain = crawl("riddle2023", tmp_path / "chain")
+    _, fast = crawl("riddle2023-fast", tmp_path / "fast")
+    assert fast.order == chain.order
+    assert fast.onsets_s == pytest.approx(chain.onsets_s, abs=0.03)
+    assert fast.period_s == pytest.approx(chain.period_s, rel=0.01)
+    assert fast.elongation_first_helix_pp_m == pytest.approx(chain.elongation_first_helix_pp_m, rel=0.1)
+    assert fast.elongation_mean_max_m == pytest.approx(chain.elongation_mean_max_m, rel=0.1)
+
+
 @pytest.mark.slow
 def test_the_paper_s_numbers(tmp_path: Path) -> None:
     """Section 3 of the paper: 4.20, 2.55, 4.02 cm; segment 2 is 39.4 % below segment 1; forces up to 2.5 N."""

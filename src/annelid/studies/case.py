@@ -12,6 +12,7 @@ from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
 
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
+PLANAR = "riddle2022-planar"
 
 HOLD_S, REST_S = 0.8, 0.4
 """In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""

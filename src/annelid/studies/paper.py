@@ -1,0 +1,319 @@
+"""The paper, reproduced: runs everything, draws everything, and gathers the report."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from annelid.analysis.paper import published
+from annelid.config import WormBody, load_config
+from annelid.errors import ConfigError, suggest
+from annelid.nervous import PeristalsisParameters, peristalsis_network
+from annelid.simulation.runfile import Run
+from annelid.studies.case import CHAIN, FAST, PLANAR, RODS, Case
+from annelid.studies.claims import Evidence, claim_cases, paper_claims
+from annelid.studies.contents import Claim, Examined, Figure, Report
+from annelid.studies.examination import Effort, Examination, Results, Table
+from annelid.studies.examinations import EXAMINATIONS
+from annelid.studies.outcome import Outcome
+from annelid.studies.store import Store, case_key, code_fingerprint
+from annelid.view.output import whole_file
+
+Progress = Callable[[str, int, int, float], object]
+"""Called with what is being done, the number of runs (or pictures) done, their total, and the share of the work."""
+
+MAIN = Case(CHAIN)
+VARIANTS = {
+    "riddle2023": MAIN,
+    "one ball joint an element": Case(CHAIN, {"body.formulation.joint": "ball"}),
+    "contacts as in the authors' file": Case(
+        CHAIN, {"arena.contact_time_constant_s": 0.01, "arena.contact_impedance": [0.95, 0.99, 0.0001]}
+    ),
+    "riddle2023-fast": Case(FAST),
+    "riddle2023-rods": Case(RODS),
+}
+"""The worms of the main table."""
+_QUICK = ("riddle2023", "riddle2023-fast", "riddle2023-rods")
+
+
+def reproduce(
+    folder: Path,
+    effort: Effort = "full",
+    *,
+    only: Sequence[str] | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Reruns everything the paper shows or claims, as far as it has not been run into the folder before.
+
+    Args:
+        folder: The report's folder: runs go to ``runs``, pictures to ``figures``.
+        effort: ``"quick"`` for coarser maps and fewer runs, ``"full"`` for all.
+        only: Names of the examinations wanted, with the main numbers but without figures and claims; None for the
+            whole.
+        jobs: Processes, by default one a core.
+        progress: Called as the work goes on.
+
+    Returns:
+        The report, whose pictures are drawn.
+
+    Raises:
+        ConfigError: An examination has no such name.
+    """
+    chosen = _chosen(only)
+    variants = {label: case for label, case in VARIANTS.items() if effort == "full" or label in _QUICK}
+    cases = [*variants.values(), *(case for examination in chosen for case in examination.cases(effort))]
+    if only is None:
+        cases += claim_cases(effort)
+    store = Store(folder / "runs")
+    outcomes = store.compute(cases, jobs=jobs, progress=progress and _stage(progress, "running worms"))
+    results = Results(outcomes, case_key)
+    pictures = folder / "figures"
+    pictures.mkdir(parents=True, exist_ok=True)
+    n_pictures = len(chosen) + (0 if only else len(FIGURES))
+    drawing = _stage(progress or (lambda *_: None), "drawing")
+
+    examined = []
+    for index, examination in enumerate(chosen):
+        drawing(index, n_pictures, index / n_pictures)
+        stem = pictures / examination.name
+        findings = examination.examine(results, effort, stem)
+        examined.append(Examined(examination, findings, stem.with_suffix(".png")))
+    figures: list[Figure] = []
+    claims: list[Claim] = []
+    if only is None:
+        main = store.run(MAIN)
+        for index, number in enumerate(FIGURES, start=len(chosen)):
+            drawing(index, n_pictures, index / n_pictures)
+            figures.append(_figure(number, main, outcomes[case_key(MAIN)], variants, results, pictures))
+        claims = paper_claims(Evidence(store, results, effort, {e.examination.name: e.findings for e in examined}))
+    drawing(n_pictures, n_pictures, 1.0)
+    return Report(
+        effort=effort,
+        summary=_summary(results[MAIN], examined, claims),
+        main_table=_main_table(variants, results),
+        figures=figures,
+        claims=claims,
+        examinations=examined,
+        provenance=_provenance(outcomes),
+    )
+
+
+def _chosen(only: Sequence[str] | None) -> list[Examination]:
+    by_name = {examination.name: examination for examination in EXAMINATIONS}
+    for name in only or ():
+        if name not in by_name:
+            raise ConfigError(f"there is no examination {name!r}: {suggest(name, by_name)}")
+    return [examination for examination in EXAMINATIONS if only is None or examination.name in only]
+
+
+def _stage(progress: Progress, stage: str) -> Callable[[int, int, float], object]:
+    return lambda done, total, share: progress(stage, done, total, share)
+
+
+def _figure_1(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.planar_models import CAPTION, figure_1_planar_models
+
+    figure_1_planar_models(load_config(PLANAR), stem)
+    return CAPTION
+
+
+def _figure_2(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.propagation import figure_2_caption, figure_2_propagation
+
+    figure_2_propagation(run, stem)
+    return figure_2_caption(run)
+
+
+def _figure_4(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.renderings import figure_4_caption, figure_4_model
+
+    figure_4_model(run.config, stem)
+    return figure_4_caption(run.config)
+
+
+def _figure_5(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.muscle_surface import caption, figure_5_muscle_surface
+
+    assert isinstance(run.config.body, WormBody)
+    figure_5_muscle_surface(run.config.body.rings, stem, run.config.body.n_segments)
+    return caption(run.config.body.rings, run.config.body.n_segments)
+
+
+def _figure_6(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.network_diagram import CAPTION, figure_6_network_diagram
+
+    figure_6_network_diagram(peristalsis_network(run.config.body.n_segments, PeristalsisParameters()), stem)
+    return CAPTION
+
+
+def _figure_7(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.plots import figure7
+
+    figure7(run, stem.with_suffix(".svg"))
+    figure7(run, stem.with_suffix(".png"))
+    return (
+        "The paper's run, reproduced: membrane potentials of the half-centres, the phases in which each segment's "
+        "muscle is active, and the lengths of the stretch sensors. The wave runs 1-2-3. A segment lengthens while "
+        "its contraction neuron is excited; its neighbours lengthen slightly at the same time. The thick lines are "
+        "the means of a segment's six springs, which the controller reads; the thin ones are the springs on the first "
+        "helix, whose peak to peak comes nearest to the paper's numbers."
+    )
+
+
+def _figure_8(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.propagation import figure_8_caption, figure_8_propagation
+
+    figure_8_propagation(run, stem)
+    return figure_8_caption(run)
+
+
+def _figure_9(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
+    from annelid.view.figures.robot_lengths import CAPTION, figure_9_robot_lengths
+
+    figure_9_robot_lengths(series, stem)
+    return CAPTION
+
+
+FIGURES: Mapping[int, tuple[str, Callable[[Run, Path, Mapping[str, Sequence[float]]], str]]] = {
+    1: ("The planar models", _figure_1),
+    2: ("Contraction with and without propagation of deformation", _figure_2),
+    4: ("The model", _figure_4),
+    5: ("Force, length and velocity of the muscle", _figure_5),
+    6: ("The control network", _figure_6),
+    7: ("Potentials and stretch lengths", _figure_7),
+    8: ("Propagation of deformation at 1500 ms", _figure_8),
+    9: ("The robot's elongations beside ours", _figure_9),
+}
+"""Number: title, and what draws it and returns its caption. Figure 3 is a photograph of the robot."""
+
+
+def _figure(
+    number: int, main: Run, outcome: Outcome, variants: Mapping[str, Case], results: Results, folder: Path
+) -> Figure:
+    """Draws a figure, unless it lies there from the same code and the same runs."""
+    title, draw = FIGURES[number]
+    stem = folder / f"figure_{number}"
+    series = {label: _measured(results[case].summary.elongation_mean_max_m) for label, case in variants.items()}
+    series = {f"{label}, mean of six": series[label] for label in _QUICK}
+    series = {"riddle2023, first helix": _measured(outcome.summary.elongation_first_helix_pp_m), **series}
+    mark = hashlib.sha256(json.dumps([code_fingerprint(), case_key(MAIN), series]).encode()).hexdigest()
+    note = stem.with_suffix(".json")
+    picture = stem.with_suffix(".png")
+    try:
+        kept = json.loads(note.read_text(encoding="utf-8"))
+        if kept["mark"] == mark and picture.exists() and stem.with_suffix(".svg").exists():
+            return Figure(number, title, picture, kept["caption"])
+    except (OSError, ValueError, KeyError):
+        pass
+    caption = draw(main, stem, series)
+    with whole_file(note) as draft:
+        draft.write_text(json.dumps({"mark": mark, "caption": caption}), encoding="utf-8")
+    return Figure(number, title, picture, caption)
+
+
+def _measured(values: Sequence[float | None] | None) -> tuple[float, ...]:
+    return tuple(float("nan") if value is None else value for value in values or ())
+
+
+def _main_table(variants: Mapping[str, Case], results: Results) -> Table:
+    theirs = published(MAIN.config)
+
+    def row(label: str, paper: str, ours: Callable[[Outcome], str]) -> list[str]:
+        return [label, paper, *(ours(results[case]) for case in variants.values())]
+
+    def centimetres(values: Sequence[float | None] | None) -> str:
+        return " / ".join(f"{100 * value:.2f}" for value in _measured(values))
+
+    def percent(value: float | None) -> str:
+        return "-" if value is None else f"{100 * value:.1f}"
+
+    def order(outcome: Outcome) -> str:
+        return "-".join(str(segment) for segment in outcome.rhythm.order)
+
+    def optional(value: float | None, digits: int, factor: float = 1.0) -> str:
+        return "-" if value is None else f"{factor * value:.{digits}f}"
+
+    elongation = theirs["elongation_first_helix_pp_m"].value
+    deficit, difference = theirs["middle_deficit"].value, theirs["end_difference"].value
+    assert isinstance(elongation, tuple)
+    assert isinstance(deficit, float)
+    assert isinstance(difference, float)
+    return Table(
+        ["quantity", "paper", *variants],
+        [
+            row("order of onsets", "1-2-3", order),
+            row("period (s)", "about 2.6 (Fig. 7)", lambda o: optional(o.rhythm.period_s, 3)),
+            row(
+                "elongation, first helix, peak to peak (cm)",
+                centimetres(elongation),
+                lambda o: centimetres(o.summary.elongation_first_helix_pp_m),
+            ),
+            row("elongation, mean of six, maximum (cm)", "", lambda o: centimetres(o.summary.elongation_mean_max_m)),
+            row("segment 2 below segment 1 (%)", percent(deficit), lambda o: percent(o.summary.middle_deficit)),
+            row("the same, mean of six (%)", "", lambda o: percent(o.summary.middle_deficit_mean)),
+            row("segment 3 below segment 1 (%)", percent(difference), lambda o: percent(o.summary.end_difference)),
+            row(
+                "force while contracted, median (N)",
+                "up to 2.5",
+                lambda o: optional(o.summary.contraction_force_median_N, 2),
+            ),
+            row("largest pin gap (mm)", "", lambda o: optional(o.summary.pin_gap_max_m, 1, 1e3)),
+            row("travel in 5 s (mm)", "negligible", lambda o: optional(o.summary.travel_m, 0, 1e3)),
+            row("computing time (s)", "210", lambda o: _seconds(o)),
+        ],
+    )
+
+
+def _seconds(outcome: Outcome) -> str:
+    factor, duration = outcome.summary.real_time_factor, outcome.summary.duration_s
+    return "-" if not factor or duration is None else f"{duration / factor:.0f}"
+
+
+def _summary(main: Outcome, examined: Sequence[Examined], claims: Sequence[Claim]) -> list[str]:
+    elongation = " / ".join(f"{100 * value:.2f}" for value in _measured(main.summary.elongation_first_helix_pp_m))
+    deficit = 100 * (main.summary.middle_deficit or float("nan"))
+    period = main.rhythm.period_s
+    paragraphs = [
+        f"The paper's worm, rebuilt in its own formulation and driven by its own network, gives a rhythm that is "
+        f"{main.rhythm.verdict or 'not settled'}: segments begin in the order {'-'.join(map(str, main.rhythm.order))}"
+        + (f", one cycle every {period:.3f} s" if period else "")
+        + f". They elongate by {elongation} cm (paper: 4.20 / 2.55 / 4.02 cm; spring on the first helix, peak to "
+        f"peak), segment 2 by {deficit:.1f} % less than segment 1 (paper: 39.4 %)."
+    ]
+    if claims:
+        tally = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in _VERDICTS}
+        counted = ", ".join(
+            f"{n} {words}" for (verdict, words), n in zip(_VERDICTS.items(), tally.values(), strict=True) if n
+        )
+        paragraphs.append(f"Of the {len(claims)} claims of the paper that are examined here: {counted}.")
+    paragraphs += [f"**{each.examination.title}.** {each.findings.answer}" for each in examined]
+    return paragraphs
+
+
+_VERDICTS = {
+    "holds": "hold",
+    "holds within": "hold within a stated margin",
+    "does not hold": "do not hold",
+    "not testable here": "cannot be tested here",
+}
+
+
+def _provenance(outcomes: Mapping[str, Outcome]) -> dict[str, str]:
+    spent = [
+        outcome.summary.duration_s / outcome.summary.real_time_factor
+        for outcome in outcomes.values()
+        if outcome.summary.duration_s and outcome.summary.real_time_factor
+    ]
+    return {
+        "annelid": version("annelid"),
+        "MuJoCo (mujoco-core)": version("mujoco-core"),
+        "numpy": version("numpy"),
+        "Python": platform.python_version(),
+        "runs": str(len(outcomes)),
+        "computing time of the runs on one core": f"{sum(spent) / 60:.0f} min",
+    }

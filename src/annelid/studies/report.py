@@ -1,0 +1,200 @@
+"""The report as Markdown and as one HTML file, and the page of claims for the repository."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import get_args
+from urllib.parse import quote
+
+from annelid.studies.contents import Claim, Examined, Figure, Report, Verdict
+from annelid.studies.markdown import code, emphasis, plain_table, slug, strong, table, words
+from annelid.studies.page import page
+from annelid.view.output import whole_file
+
+TITLE = "The paper, reproduced and examined"
+PAPER = "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control"
+MARKDOWN_NAME, HTML_NAME = "report.md", "report.html"
+CLAIMS_COMMAND = "annelid paper -o report --claims docs/paper.md"
+"""The command that regenerates the page of claims in the repository."""
+
+
+def write_report(report: Report, folder: Path) -> Path:
+    """Writes ``report.md``, which refers to its pictures, and ``report.html``, which holds them.
+
+    Args:
+        report: What to write.
+        folder: Where to write it; made where missing.
+
+    Returns:
+        Path of the HTML file.
+
+    Raises:
+        RunFileError: A file cannot be written.
+        OSError: The folder cannot be made, or a picture cannot be read.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    head, sections = _head(report), _sections(report, folder)
+    contents, content = _contents(sections), "\n\n".join(sections)
+    _write(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
+    _write(folder / HTML_NAME, page(TITLE, contents, f"{head}\n\n{content}\n", folder))
+    return folder / HTML_NAME
+
+
+def claims_page(report: Report) -> str:
+    """Returns the Markdown of the repository's page of claims.
+
+    Args:
+        report: A whole report.
+    """
+    intro = (
+        f"What the paper, {emphasis(PAPER)} (Riddle et al. 2023), shows and claims, beside what annelid measures. "
+        f"Every number of ours comes from a run; this page is written by {code(CLAIMS_COMMAND)}, together with the "
+        f"whole report: its figures and its examinations."
+    )
+    blocks = ["# The paper's claims", intro, *_paragraphs(report.summary), _provenance(report), *_main_numbers(report)]
+    return "\n\n".join([*blocks, *_claims(report.claims)]) + "\n"
+
+
+def _write(path: Path, text: str) -> None:
+    with whole_file(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+
+
+def _head(report: Report) -> str:
+    intro = f"Every figure and claim of {emphasis(PAPER)} (Riddle et al. 2023) from our own runs."
+    return "\n\n".join([f"# {TITLE}", f"{intro} {_provenance(report)}"])
+
+
+def _sections(report: Report, folder: Path) -> list[str]:
+    """Returns the blocks of the report below its head, each a heading or what follows one."""
+    return [
+        "## Summary",
+        *_paragraphs(report.summary),
+        *_main_numbers(report),
+        *_claims(report.claims),
+        *_figures(report.figures, folder),
+        *_examinations(report.examinations, folder),
+        *_how_to_reproduce(report),
+    ]
+
+
+def _contents(blocks: Iterable[str]) -> str:
+    lines = []
+    for block in blocks:
+        marks, _, heading = block.partition(" ")
+        if marks in ("##", "###"):
+            shown = heading.replace("\\", "")
+            lines.append(f"{'  ' * (len(marks) - 2)}- [{heading}](#{slug(shown)})")
+    return "\n".join(lines)
+
+
+def _provenance(report: Report) -> str:
+    effort = "Quick report, with coarser maps than the full one" if report.effort == "quick" else "Full report"
+    facts = [effort, *(f"{words(label)} {words(value)}" for label, value in report.provenance.items())]
+    return " · ".join(facts)
+
+
+def _paragraphs(texts: Iterable[str]) -> list[str]:
+    return [words(text) for text in texts if text.strip()]
+
+
+def _main_numbers(report: Report) -> list[str]:
+    return ["## Main numbers", plain_table(report.main_table)]
+
+
+def _claims(claims: Sequence[Claim]) -> list[str]:
+    if not claims:
+        return []
+    blocks = ["## Claims", _tally(claims)]
+    topics = dict.fromkeys(claim.topic for claim in claims)
+    first = 1
+    for topic in topics:
+        numbered = list(enumerate((claim for claim in claims if claim.topic == topic), first))
+        rows = [
+            [str(n), words(claim.claim), strong(_verdict(claim)), words(claim.paper), words(claim.ours)]
+            for n, claim in numbered
+        ]
+        notes = [f"{n}. {_note(claim, indent=' ' * (len(str(n)) + 2))}" for n, claim in numbered]
+        blocks += [f"### {_heading(topic)}", table(["#", "Claim", "Verdict", "Paper", "Ours"], rows), "\n".join(notes)]
+        first += len(numbered)
+    return blocks
+
+
+def _tally(claims: Sequence[Claim]) -> str:
+    number = Counter(claim.verdict for claim in claims)
+    phrases: dict[Verdict, tuple[str, str]] = {
+        "holds": ("holds", "hold"),
+        "holds within": ("holds within the margin given", "hold within the margin given"),
+        "does not hold": ("does not hold", "do not hold"),
+        "not testable here": ("cannot be tested here", "cannot be tested here"),
+    }
+    parts = [f"{number[v]} {phrases[v][number[v] != 1]}" for v in get_args(Verdict) if number[v]]
+    listed = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return f"Of {len(claims)} claims, {listed}."
+
+
+def _verdict(claim: Claim) -> str:
+    return f"{claim.verdict} {claim.within}".strip()
+
+
+def _note(claim: Claim, indent: str) -> str:
+    place = f"{emphasis(claim.place)}:" if claim.place.strip() else ""
+    said = " ".join(part for part in (place, words(claim.evidence)) if part)
+    commands = [code(line) for line in claim.command.splitlines() if line.strip()]
+    return f"\\\n{indent}".join([said, *commands] if said else commands)
+
+
+def _heading(text: str) -> str:
+    return words(text[:1].upper() + text[1:])
+
+
+def _figures(figures: Sequence[Figure], folder: Path) -> list[str]:
+    if not figures:
+        return []
+    blocks = ["## Figures of the paper"]
+    for figure in figures:
+        name = f"Figure {figure.number}"
+        caption = f"**{name}.** {words(figure.caption)}"
+        blocks += [f"### {name}: {words(figure.title)}", _picture(figure.picture, figure.title, folder), caption]
+    return blocks
+
+
+def _examinations(examinations: Sequence[Examined], folder: Path) -> list[str]:
+    if not examinations:
+        return []
+    blocks = ["## Examinations"]
+    for examined in examinations:
+        asked, found = examined.examination, examined.findings
+        picture = _picture(examined.picture, asked.title, folder)
+        answer = [strong(found.answer), picture, emphasis(found.caption), plain_table(found.table)]
+        blocks += [f"### {_heading(asked.title)}", words(asked.question), *answer, *_paragraphs(found.remarks)]
+    return [block for block in blocks if block]
+
+
+def _picture(picture: Path, title: str, folder: Path) -> str:
+    relative = Path(os.path.relpath(picture, folder)).as_posix()
+    return f"![{words(title)}]({quote(relative)})"
+
+
+def _how_to_reproduce(report: Report) -> list[str]:
+    quick = " --quick" if report.effort == "quick" else ""
+    commands = [
+        ("this report", f"annelid paper -o report{quick}"),
+        *((words(each.examination.title), _only(each, quick)) for each in report.examinations),
+        ("the page of claims in the repository", CLAIMS_COMMAND),
+    ]
+    told = (
+        "Each claim names the command that makes its number; `annelid show RUN` then prints it. Every run of this "
+        "report is kept in `runs`, every figure as PNG and SVG in `figures`. A second call computes only what is "
+        "missing or has changed."
+    )
+    versions = table(["What", "Value"], [[words(name), words(value)] for name, value in report.provenance.items()])
+    rows = [[what, code(command)] for what, command in commands]
+    return ["## How to reproduce", told, table(["To make", "Command"], rows), versions]
+
+
+def _only(examined: Examined, quick: str) -> str:
+    return f"annelid paper -o report{quick} --only {examined.examination.name}"

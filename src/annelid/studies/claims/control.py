@@ -1,0 +1,60 @@
+"""Sensing and control: the network and how it is wired to the body."""
+
+from __future__ import annotations
+
+from annelid.studies.case import FAST, RODS, Case
+from annelid.studies.claims.evidence import (
+    MAIN,
+    PLANAR_CASES,
+    Evidence,
+    holds_if,
+    order_of,
+)
+from annelid.studies.contents import Claim
+from annelid.studies.outcome import Outcome
+
+
+def control_claims(evidence: Evidence, outcome: Outcome) -> list[Claim]:
+    """Judges the claims about sensing and the network."""
+    planar = evidence.results[PLANAR_CASES[300]]
+    tight, quick = evidence.results[Case(RODS)], evidence.results[Case(FAST)]
+    periods = [o.rhythm.period_s or float("nan") for o in (planar, outcome, quick, tight)]
+    ordered = all(o.rhythm.verdict == "ordered" and o.rhythm.direction == 1 for o in (planar, outcome, quick, tight))
+    steady = evidence.number("gate", "verdict_steady_chain")
+    return [
+        Claim(
+            "Sensing and control",
+            "The network of the 2D worm drives the 3D worm with little to no change.",
+            "sections 2.3, 5",
+            holds_if(ordered),
+            "little to no change",
+            f"ordered 1-2-3 on four bodies, periods {', '.join(f'{period:.3f}' for period in periods)} s",
+            "Neurons, synapses and conductances are the same on the planar worm, the paper's chain, its fast form and "
+            "the tight rods. What had to change lies around the network: the map from potentials to activation (Eq. "
+            "2), the sensors' tolerance (0.1 mm to 10 mm), a hold of the first sensor for 0.2 s"
+            + (f", and the start of the sodium gates (started at rest the chain is {steady})." if steady else "."),
+            f"{PLANAR_CASES[300].command}; {MAIN.command}",
+        ),
+        Claim(
+            "Sensing and control",
+            "The sodium current is Hodgkin and Huxley's fast transient current.",
+            "section 2.3",
+            "does not hold",
+            "fast transient",
+            "persistent sodium current with a slow gate",
+            "The equations have instantaneous activation and a gate of up to 300 ms, which sets the period. The name "
+            "changes nothing in the results.",
+            "annelid presets riddle2023",
+        ),
+        Claim(
+            "Sensing and control",
+            "Half-centre neurons flip between excited and inhibited states, and the muscle follows the excited one.",
+            "section 2.3, Fig. 7",
+            holds_if(outcome.rhythm.verdict == "ordered"),
+            "Fig. 7",
+            f"onsets in the order {order_of(outcome)}",
+            "Figure 7 of this report: contraction and expansion neuron of a segment are never excited together, and "
+            "the activation steps with them.",
+            MAIN.command,
+        ),
+    ]

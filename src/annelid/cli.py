@@ -334,8 +334,10 @@ def paper(
             report = reproduce(output, "quick" if quick else "full", only=only or None, jobs=jobs, progress=progress)
             html = write_report(report, output)
     except KeyboardInterrupt:
-        words = ["annelid", "paper", "-o", str(output), *(["--quick"] if quick else [])]
-        again = shlex.join([*words, *(word for name in only or () for word in ("--only", name))])
+        options = [*(["--quick"] if quick else []), *(word for name in only or () for word in ("--only", name))]
+        options += ["--jobs", str(jobs)] if jobs else []
+        options += ["--claims", str(claims)] if claims else []
+        again = shlex.join(["annelid", "paper", "-o", str(output), *options])
         _complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
         raise typer.Exit(EXIT_INTERRUPTED) from None
     if claims is not None:

@@ -93,11 +93,11 @@ def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: flo
         hold_s: How long each is contracted, s.
         rest_s: How long all rest before the next, s.
     """
+    starts = [round(i * (hold_s + rest_s), 9) for i in range(n_segments)]
     contractions = [
-        {"segment": i + 1, "start_s": i * (hold_s + rest_s), "stop_s": i * (hold_s + rest_s) + hold_s}
-        for i in range(n_segments)
+        {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
     ]
     return {
         "controller": {"kind": "program", "contractions": contractions},
-        "duration_s": round(n_segments * (hold_s + rest_s) - rest_s, 9),
+        "duration_s": contractions[-1]["stop_s"],
     }

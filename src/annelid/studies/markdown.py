@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import count
 
 from annelid.studies.examination import Table
 
@@ -45,10 +46,10 @@ def cell(markdown: str) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Returns a table whose cells are Markdown already; columns of numbers are set flush right."""
+    """Returns a table whose cells are Markdown already; columns of numbers, but the first, are set flush right."""
     rows = [list(row) for row in rows]
     columns = list(zip(*rows, strict=True)) if rows else [() for _ in header]
-    rules = ["---:" if column and all(map(_is_number, column)) else "---" for column in columns]
+    rules = ["---:" if i and column and all(map(_is_number, column)) else "---" for i, column in enumerate(columns)]
     lines = [[cell(word) for word in header], rules, *([cell(word) for word in row] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
@@ -58,9 +59,14 @@ def plain_table(content: Table) -> str:
     return table([words(name) for name in content.header], [[words(word) for word in row] for row in content.rows])
 
 
-def slug(heading: str) -> str:
-    """Returns the anchor that GitHub gives a heading."""
-    return re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", heading.strip().lower()))
+def anchors(headings: Iterable[str]) -> list[str]:
+    """Returns the anchors that GitHub gives to headings, plain text: a repeated one is numbered."""
+    found: list[str] = []
+    for heading in headings:
+        slug = re.sub(r"\s", "-", re.sub(r"[^\w\s-]", "", heading.strip().lower()))
+        free = (name for n in count() if (name := f"{slug}-{n}" if n else slug) not in found)
+        found.append(next(free))
+    return found
 
 
 def _escape_opening(opening: re.Match[str]) -> str:

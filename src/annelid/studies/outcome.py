@@ -24,7 +24,7 @@ class Hold:
         elongation_first_helix_m: The same of the spring on the first helix, m.
         ring_length_m: Length of the contracted segment's ring, m.
         pin_gap_m: Largest gap between two pinned strands, m; None where pins cannot part.
-        force_N: Force of the contracted segment's muscle, N.
+        force_N: Force of the contracted segment's muscle, N; None for a worm without forces.
     """
 
     segment: int
@@ -32,7 +32,7 @@ class Hold:
     elongation_first_helix_m: tuple[float, ...]
     ring_length_m: float
     pin_gap_m: float | None
-    force_N: float
+    force_N: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def _holds(run: Run) -> tuple[Hold, ...]:
     n_segments = run.config.body.n_segments
     above_rest = data["stretch_length"].values - data["stretch_rest_length"].values
     ring = data["ring_length"].values.reshape(len(times), n_segments, -1).sum(axis=2)
-    force = data["muscle_force"].values.reshape(len(times), n_segments, -1).mean(axis=2)
+    force = _segment_means(data["muscle_force"].values, n_segments) if "muscle_force" in data else None
     holds = []
     for contraction in program.contractions:
         within = np.flatnonzero(times <= contraction.stop_s + 1e-9)
@@ -123,7 +123,11 @@ def _holds(run: Run) -> tuple[Hold, ...]:
                 float(ring[last, segment]),
                 gap,
                 # The activation ends with the step that leads to the last sample; the force is of the one before.
-                float(force[max(last - 1, 0), segment]),
+                None if force is None else float(force[max(last - 1, 0), segment]),
             )
         )
     return tuple(holds)
+
+
+def _segment_means(values: np.ndarray, n_segments: int) -> np.ndarray:
+    return values.reshape(len(values), n_segments, -1).mean(axis=2)

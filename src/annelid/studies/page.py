@@ -8,12 +8,19 @@ from html import escape
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
-from annelid.studies.markdown import slug
+from annelid.studies.markdown import anchors
+
+if TYPE_CHECKING:
+    from markdown_it.token import Token
 
 BADGES = {"holds within": "nearly", "holds": "holds", "does not hold": "fails", "not testable here": "open"}
 """The first words of a verdict, and the class of its badge; the first that fits counts."""
+
+# A cell of so few characters, such as an order 1-2-3, stays on one line.
+_SHORT = 12
 
 _SKELETON = """<!DOCTYPE html>
 <html lang="en">
@@ -26,6 +33,8 @@ _SKELETON = """<!DOCTYPE html>
 {style}</style>
 </head>
 <body>
+<header>
+{head}</header>
 <nav aria-label="Contents">
 {contents}</nav>
 <main>
@@ -42,7 +51,7 @@ _CELL = re.compile(r"<t[hd][^>]*>(.*?)</t[hd]>", re.DOTALL)
 _ITEM = re.compile(r"<li>(.*?)</li>", re.DOTALL)
 
 
-def page(title: str, contents: str, content: str, folder: Path) -> str:
+def page(title: str, head: str, contents: str, content: str, folder: Path) -> str:
     """Returns an HTML page.
 
     Beyond plain Markdown, a picture and the paragraph after it become a figure with its caption, and the items of
@@ -50,7 +59,8 @@ def page(title: str, contents: str, content: str, folder: Path) -> str:
 
     Args:
         title: Its title, plain text.
-        contents: Markdown of the list of contents.
+        head: Markdown of what stands first.
+        contents: Markdown of the list of contents, which links to the headings of the rest.
         content: Markdown of the rest.
         folder: Where the paths of pictures start; the pictures, PNG, are embedded.
 
@@ -58,9 +68,9 @@ def page(title: str, contents: str, content: str, folder: Path) -> str:
         OSError: A picture cannot be read.
     """
     style = (resources.files("annelid") / "studies" / "page.css").read_text(encoding="utf-8")
-    return _SKELETON.format(
-        title=escape(title), style=style, contents=_html(contents, folder), content=_html(content, folder)
-    )
+    parts = {"head": head, "contents": contents, "content": content}
+    html = {name: _html(markdown, folder) for name, markdown in parts.items()}
+    return _SKELETON.format(title=escape(title), style=style, **html)
 
 
 def _html(markdown: str, folder: Path) -> str:
@@ -68,16 +78,24 @@ def _html(markdown: str, folder: Path) -> str:
 
     reader = MarkdownIt("commonmark", {"html": False}).enable("table")
     tokens = reader.parse(markdown)
-    for opening, heading in pairwise(tokens):
-        if opening.type == "heading_open":
-            opening.attrSet("id", slug("".join(child.content for child in heading.children or ())))
-        for child in heading.children or ():
+    blocks = list(pairwise(tokens))
+    headings = [(opening, _text(inline)) for opening, inline in blocks if opening.type == "heading_open"]
+    for (opening, _), anchor in zip(headings, anchors(text for _, text in headings), strict=True):
+        opening.attrSet("id", anchor)
+    for opening, inline in blocks:
+        if opening.type == "td_open" and len(_text(inline)) <= _SHORT:
+            opening.attrSet("class", "short")
+        for child in inline.children or ():
             if child.type == "image":
                 child.attrSet("src", _data_uri(folder / unquote(str(child.attrGet("src")))))
     html: str = reader.renderer.render(tokens, reader.options, {})
     html = _PICTURE.sub(r"<figure>\n\1\n<figcaption>\2</figcaption>\n</figure>", html)
     html = _NUMBERED.sub(_with_notes, html)
     return re.sub(r"<table.*?</table>", r'<div class="table">\g<0></div>', html, flags=re.DOTALL)
+
+
+def _text(inline: Token) -> str:
+    return "".join(child.content for child in inline.children or ())
 
 
 def _data_uri(picture: Path) -> str:

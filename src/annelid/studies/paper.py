@@ -263,7 +263,7 @@ def _main_table(variants: Mapping[str, Case], results: Results) -> Table:
                 lambda o: optional(o.summary.contraction_force_median_N, 2),
             ),
             row("largest pin gap (mm)", "", lambda o: optional(o.summary.pin_gap_max_m, 1, 1e3)),
-            row("travel in 5 s (mm)", "negligible", lambda o: optional(o.summary.travel_m, 0, 1e3)),
+            row("travel forwards in 5 s (mm)", "negligible", lambda o: optional(o.summary.travel_m, 0, -1e3)),
             row("computing time (s)", "210", lambda o: _seconds(o)),
         ],
     )
@@ -291,7 +291,7 @@ def _summary(main: Outcome, examined: Sequence[Examined], claims: Sequence[Claim
             f"{n} {words}" for (verdict, words), n in zip(_VERDICTS.items(), tally.values(), strict=True) if n
         )
         paragraphs.append(f"Of the {len(claims)} claims of the paper that are examined here: {counted}.")
-    paragraphs += [f"**{each.examination.title}.** {each.findings.answer}" for each in examined]
+    paragraphs += [f"{each.examination.title}. {each.findings.answer}" for each in examined]
     return paragraphs
 
 

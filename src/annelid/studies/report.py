@@ -10,7 +10,7 @@ from typing import get_args
 from urllib.parse import quote
 
 from annelid.studies.contents import Claim, Examined, Figure, Report, Verdict
-from annelid.studies.markdown import code, emphasis, plain_table, slug, strong, table, words
+from annelid.studies.markdown import anchors, code, emphasis, plain_table, strong, table, words
 from annelid.studies.page import page
 from annelid.view.output import whole_file
 
@@ -39,7 +39,7 @@ def write_report(report: Report, folder: Path) -> Path:
     head, sections = _head(report), _sections(report, folder)
     contents, content = _contents(sections), "\n\n".join(sections)
     _write(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
-    _write(folder / HTML_NAME, page(TITLE, contents, f"{head}\n\n{content}\n", folder))
+    _write(folder / HTML_NAME, page(TITLE, head, contents, content, folder))
     return folder / HTML_NAME
 
 
@@ -82,13 +82,12 @@ def _sections(report: Report, folder: Path) -> list[str]:
 
 
 def _contents(blocks: Iterable[str]) -> str:
-    lines = []
-    for block in blocks:
-        marks, _, heading = block.partition(" ")
-        if marks in ("##", "###"):
-            shown = heading.replace("\\", "")
-            lines.append(f"{'  ' * (len(marks) - 2)}- [{heading}](#{slug(shown)})")
-    return "\n".join(lines)
+    headings = [
+        (len(marks), heading) for marks, _, heading in (block.partition(" ") for block in blocks) if set(marks) == {"#"}
+    ]
+    links = anchors(heading.replace("\\", "") for _, heading in headings)
+    rows = zip(headings, links, strict=True)
+    return "\n".join(f"{'  ' * (level - 2)}- [{heading}](#{link})" for (level, heading), link in rows)
 
 
 def _provenance(report: Report) -> str:
@@ -180,21 +179,15 @@ def _picture(picture: Path, title: str, folder: Path) -> str:
 
 
 def _how_to_reproduce(report: Report) -> list[str]:
-    quick = " --quick" if report.effort == "quick" else ""
-    commands = [
-        ("this report", f"annelid paper -o report{quick}"),
-        *((words(each.examination.title), _only(each, quick)) for each in report.examinations),
-        ("the page of claims in the repository", CLAIMS_COMMAND),
-    ]
+    whole = f"annelid paper -o report{' --quick' if report.effort == 'quick' else ''}"
+    parts = [(each.examination.title, f"{whole} --only {each.examination.name}") for each in report.examinations]
+    here = whole if report.claims else " ".join([whole, *(part.removeprefix(f"{whole} ") for _, part in parts)])
+    commands = [("this report", here), *parts, ("the page of claims in the repository", CLAIMS_COMMAND)]
     told = (
         "Each claim names the command that makes its number; `annelid show RUN` then prints it. Every run of this "
         "report is kept in `runs`, every figure as PNG and SVG in `figures`. A second call computes only what is "
         "missing or has changed."
     )
     versions = table(["What", "Value"], [[words(name), words(value)] for name, value in report.provenance.items()])
-    rows = [[what, code(command)] for what, command in commands]
+    rows = [[words(what), code(command)] for what, command in commands]
     return ["## How to reproduce", told, table(["To make", "Command"], rows), versions]
-
-
-def _only(examined: Examined, quick: str) -> str:
-    return f"annelid paper -o report{quick} --only {examined.examination.name}"

@@ -36,7 +36,7 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
     short = evidence.results[SHORT_MINIMUM]
     shortest = min((hold.ring_length_m for hold in short.holds), default=float("nan"))
     usual = min(hold.ring_length_m for hold in held)
-    overshoot = evidence.number("timestep", "velocity_over_limit_paper")
+    overshoot = evidence.number("timestep", "times_velocity_limit_chain_rk4_1ms")
     return [
         Claim(
             "Actuation",

@@ -20,7 +20,7 @@ def control_claims(evidence: Evidence, outcome: Outcome) -> list[Claim]:
     tight, quick = evidence.results[Case(RODS)], evidence.results[Case(FAST)]
     periods = [o.rhythm.period_s or float("nan") for o in (planar, outcome, quick, tight)]
     ordered = all(o.rhythm.verdict == "ordered" and o.rhythm.direction == 1 for o in (planar, outcome, quick, tight))
-    steady = evidence.number("gate", "verdict_steady_chain")
+    steady = evidence.first_number("gate", "verdict_{}_steady_euler")
     return [
         Claim(
             "Sensing and control",
@@ -32,7 +32,7 @@ def control_claims(evidence: Evidence, outcome: Outcome) -> list[Claim]:
             "Neurons, synapses and conductances are the same on the planar worm, the paper's chain, its fast form and "
             "the tight rods. What had to change lies around the network: the map from potentials to activation (Eq. "
             "2), the sensors' tolerance (0.1 mm to 10 mm), a hold of the first sensor for 0.2 s"
-            + (f", and the start of the sodium gates (started at rest the chain is {steady})." if steady else "."),
+            + f", and, for one worm, the start of the sodium gates (started at rest: {steady.worm} {steady.value}).",
             f"{PLANAR_CASES[300].command}; {MAIN.command}",
         ),
         Claim(

@@ -21,6 +21,10 @@ PLANAR_CASES = {
     100: Case(PLANAR, {"controller.gate_time_constant_ms": 100, "body.gain": 3.6}),
 }
 """The planar worm with the gate time constants (ms) and gains that go together."""
+WORMS = ("chain", "fast", "rods")
+"""Nearest to the paper's first."""
+NEGLIGIBLE = 0.01
+"""Travel in a cycle, in lengths of the body, below which we call it negligible."""
 PAPER_STEPS, PAPER_WALL_S = 5000, 210.0
 TUBE_AREA_M2, POLYETHYLENE_KG_PER_M3 = 1.7e-5, 940.0
 
@@ -44,6 +48,30 @@ class Evidence:
     def number(self, examination: str, name: str) -> Any:
         """A single result of an examination; None where this effort did not measure it."""
         return self.findings[examination].numbers.get(name)
+
+    def first_number(self, examination: str, name: str) -> Found:
+        """A single result of the worm nearest to the paper's for which an examination has one.
+
+        Args:
+            examination: Its name.
+            name: The number's name with ``{}`` in the place of the worm's.
+
+        Raises:
+            KeyError: It has that number of no worm.
+        """
+        for worm in WORMS:
+            value = self.number(examination, name.format(worm))
+            if value is not None:
+                return Found(worm, value)
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A number of an examination and the worm that it is of."""
+
+    worm: str
+    value: Any
 
 
 def longer_worm(n_segments: int, worm: str) -> Case:

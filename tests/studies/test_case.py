@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import shlex
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.config import Program, RunConfig, load_config, parse_assignments
+from annelid.studies.case import CHAIN, PLANAR, RODS, Case, chain, fast, one_after_the_other, rods
+
+
+def typed(command: str) -> RunConfig:
+    """What a shell and the command line make of a command."""
+    program, run, preset, *words = shlex.split(command)
+    assert (program, run) == ("annelid", "run")
+    assert words[::2] == ["--set"] * (len(words) // 2)
+    return load_config(preset, parse_assignments(words[1::2]))
+
+
+def assert_same_run(case: Case) -> None:
+    assert typed(case.command).model_dump(exclude={"record"}) == case.config.model_dump(exclude={"record"})
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    friction=st.floats(0.01, 2.0),
+    noise=st.floats(0.0, 0.01),
+    seed=st.integers(0, 2**31),
+    tension_only=st.booleans(),
+    gate_start=st.sampled_from(["steady", "toolbox"]),
+)
+def test_a_command_makes_the_run_of_its_case(
+    friction: float, noise: float, seed: int, tension_only: bool, gate_start: str
+) -> None:
+    changes = {
+        "arena.friction": friction,
+        "sensor.noise_m": noise,
+        "seed": seed,
+        "controller.gate_start": gate_start,
+        "body.springs.tension_only": tension_only,
+    }
+    for case in (rods(changes), fast(changes), chain(changes)):
+        assert_same_run(case)
+
+
+milliseconds = st.integers(1, 2000).map(lambda n: n * 5 / 1000)
+positive = st.floats(1e-3, 10.0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(hold_s=milliseconds, rest_s=milliseconds, n_segments=st.integers(3, 6))
+def test_open_loop_commands_make_the_run_of_their_case(hold_s: float, rest_s: float, n_segments: int) -> None:
+    case = rods({"body.mesh.n_segments": n_segments, **one_after_the_other(n_segments, hold_s, rest_s)})
+    assert_same_run(case)
+    program = case.config.controller
+    assert isinstance(program, Program)
+    assert [contraction.segment for contraction in program.contractions] == list(range(1, n_segments + 1))
+    assert program.contractions[-1].stop_s == pytest.approx(case.config.duration_s, abs=2e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.tuples(st.integers(1, 3), st.floats(0.0, 5.0), positive, st.floats(0.01, 1.0)), max_size=4))
+def test_program_controllers_survive_the_shell(rows: list[tuple[int, float, float, float]]) -> None:
+    contractions = [
+        {"segment": segment, "start_s": start, "stop_s": start + length, "activation": level}
+        for segment, start, length, level in rows
+    ]
+    assert_same_run(Case(PLANAR, {"controller": {"kind": "program", "contractions": contractions}}))
+
+
+def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
+    case = rods({"duration_s": 5.0})
+    sparse, usual = case.config.record, load_config(RODS).record
+    assert sparse.signals_interval_s > usual.signals_interval_s
+    assert sparse.frames_interval_s > 10 * usual.frames_interval_s
+    own = case.but({"record.frames_interval_s": 0.1}).config.record
+    assert own.frames_interval_s == 0.1
+    assert own.signals_interval_s == usual.signals_interval_s
+
+
+def test_recording_is_no_part_of_a_command() -> None:
+    assert rods({"record.frames_interval_s": 0.1}).command == f"annelid run {RODS}"
+
+
+def test_further_changes_win() -> None:
+    case = rods({"seed": 1, "arena.friction": 0.3}).but({"seed": 2})
+    assert (case.config.seed, case.preset) == (2, RODS)
+    assert case.command == f"annelid run {RODS} --set seed=2 --set arena.friction=0.3"
+
+
+def test_the_chain_is_the_papers_at_twice_the_step() -> None:
+    ours, published = chain().config.model_dump(exclude={"record"}), load_config(CHAIN).model_dump(exclude={"record"})
+    assert ours.pop("clock")["physics_timestep_s"] == 2 * published.pop("clock")["physics_timestep_s"]
+    assert ours == published
+
+
+def test_costs_order_the_runs_by_their_work() -> None:
+    costs = [case.cost_s for case in (Case(PLANAR), rods(), chain(), Case(CHAIN))]
+    assert all(less < more for less, more in pairwise(costs))
+    assert rods({"duration_s": 10.0}).cost_s == pytest.approx(2 * rods({"duration_s": 5.0}).cost_s)

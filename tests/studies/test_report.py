@@ -1,0 +1,297 @@
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.errors import RunFileError
+from annelid.studies.contents import Claim, Examined, Figure, Report, Verdict
+from annelid.studies.examination import Examination, Findings, Table
+from annelid.studies.markdown import anchors, cell, code, words
+from annelid.studies.report import CLAIMS_COMMAND, claims_page, write_report
+from annelid.view.canvas import canvas, save_both
+
+COMMAND = """annelid run riddle2023 --set 'controller={kind = "program", ramp_s = 0.1}' --set arena.friction=0.3"""
+SPECIAL = "1 * 2 * 3 _a_ b_c `code|bar` <b>bold</b> |x| < 3 & [4](http://x) #5 ~6~ $7$ \\8 &lt; !"
+VERDICTS: list[Verdict] = ["holds", "holds within", "does not hold", "not testable here"]
+
+
+class Reading(HTMLParser):
+    """What a page says and is made of; fails where a tag is not closed in its turn."""
+
+    VOID = frozenset({"meta", "img", "br", "hr"})
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: dict[str, list[str]] = {}
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in self.VOID:
+            self.open.append(tag)
+            self.texts.setdefault(tag, []).append("")
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        assert tag in self.VOID
+        self.handle_starttag(tag, attrs)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        for tag in set(self.open):
+            self.texts[tag][-1] += data
+
+    def has(self, text: str) -> bool:
+        return " ".join(text.split()) in " ".join(self.texts["body"][0].split())
+
+    def attributes(self, tag: str, name: str) -> list[str]:
+        return [value for found, attrs in self.tags if found == tag and (value := attrs.get(name)) is not None]
+
+
+def claim(number: int) -> Claim:
+    topic = ["structure", "results", "structure", "future work"][number % 4]
+    verdict = VERDICTS[number % 4]
+    return Claim(
+        topic,
+        f"Claim {number} of the paper",
+        f"Sect. {number}",
+        verdict,
+        paper=f"{number}.25 cm",
+        ours=f"{number}.26 cm",
+        evidence=f"Evidence {number}: {SPECIAL}",
+        command="" if verdict == "not testable here" else f"{COMMAND} --set seed={number}",
+        within="4.5 %" if verdict == "holds within" else "",
+    )
+
+
+def examined(name: str, picture: Path) -> Examined:
+    asked = Examination(name, f"On {name}", f"What of {name}?", lambda _: (), lambda *_: findings)
+    table = Table([f"{name} | unit", "elongation, cm"], [[f"{name} a|b", "4.20"], [SPECIAL, "-1.5"]])
+    findings = Findings(f"Much of {name}: {SPECIAL}", f"One sees {name}.", table, [f"Remark on {name}."])
+    return Examined(asked, findings, picture)
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report's folder with two pictures."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "figures").mkdir()
+    for name in ("figure7", "pins of soft"):
+        with canvas(1.0, 2.0) as figure:
+            figure.subplots().plot([0, len(name)])
+            save_both(figure, folder / "figures" / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(pictures: Path) -> Report:
+    """A report on two pictures, ten claims and three examinations."""
+    first, second = pictures / "figures" / "figure7.png", pictures / "figures" / "pins of soft.png"
+    return Report(
+        "full",
+        ["It walks: 1-2-3.", "2. And yet it moves.", SPECIAL],
+        Table(["quantity", "paper", "ours"], [["period, s", "2.635", "2.629"]]),
+        [Figure(7, "Potentials & lengths", first, f"Potentials above. {SPECIAL}")],
+        [claim(number) for number in range(10)],
+        [examined(name, second) for name in ("pins", "springs", "friction")],
+        {"annelid": "0.3.0", "runs": "312"},
+    )
+
+
+@pytest.fixture(scope="module")
+def html(report: Report, pictures: Path) -> Reading:
+    return Reading(write_report(report, pictures).read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def rendered(html: Reading, pictures: Path) -> Reading:
+    """The report's Markdown, read by a plain reader of GitHub's tables."""
+    from markdown_it import MarkdownIt
+
+    text = (pictures / "report.md").read_text(encoding="utf-8")
+    return Reading(f"<body>{MarkdownIt('commonmark').enable('table').render(text)}</body>")
+
+
+@pytest.fixture(params=["html", "rendered"])
+def both(request: pytest.FixtureRequest) -> Reading:
+    return request.getfixturevalue(request.param)
+
+
+def test_both_files_hold_everything(both: Reading, report: Report) -> None:
+    for each in report.claims:
+        assert all(map(both.has, (each.claim, each.place, each.paper, each.ours, each.command)))
+        assert both.has(each.evidence.replace("`", ""))
+    for figure in report.figures:
+        assert both.has(f"Figure {figure.number}. {figure.caption}".replace("`", ""))
+    for one in report.examinations:
+        asked, found = one.examination, one.findings
+        assert all(map(both.has, (asked.title, asked.question, found.caption, *found.remarks)))
+        assert found.answer.replace("`", "") in both.texts["strong"]
+        assert all(both.has(word.replace("`", "")) for row in found.table.rows for word in row)
+    assert all(both.has(text.replace("`", "")) for text in report.summary)
+    assert all(map(both.has, ("2.635", "annelid 0.3.0", "runs 312")))
+
+
+def test_parts_stand_in_their_order(both: Reading) -> None:
+    headings = [heading for heading in both.texts["h2"] if heading != "Contents"]
+    parts = ["Summary", "Main numbers", "Claims", "Figures of the paper", "Examinations", "How to reproduce"]
+    assert headings == parts
+    assert both.texts["h1"] == ["The paper, reproduced and examined"]
+
+
+def test_claims_are_numbered_on_and_grouped_by_topic(both: Reading, report: Report) -> None:
+    assert both.texts["h3"][:3] == ["Structure", "Results", "Future work"]
+    text = both.texts["body"][0]
+    places = [text.index(f"{each.claim}") for each in report.claims]
+    by_topic = [*report.claims[0::4], *report.claims[2::4], *report.claims[1::4], *report.claims[3::4]]
+    by_topic[:5] = sorted(by_topic[:5], key=report.claims.index)
+    assert sorted(report.claims, key=lambda each: places[report.claims.index(each)]) == by_topic
+    assert both.has("Of 10 claims, 3 hold, 3 hold within the margin given, 2 do not hold and 2 cannot be tested here.")
+
+
+def test_each_claim_has_its_own_evidence(html: Reading, report: Report) -> None:
+    blocks = [block for block in html.texts["tbody"] if "of the paper" in block]
+    assert len(blocks) == 10
+    for block in blocks:
+        number = re.findall(r"Claim (\d+) of the paper", block)
+        assert f"{claim(int(number[0])).verdict} {claim(int(number[0])).within}".strip() in block
+        assert re.findall(r"Evidence (\d+):", block) == number
+        assert re.findall(r"seed=(\d+)", block) in ([], number)
+    assert html.attributes("tbody", "id") == [f"claim-{n}" for n in range(1, 11)]
+
+
+def test_verdicts_are_badges_with_words(html: Reading) -> None:
+    kinds = [value for value in html.attributes("strong", "class") if value.startswith("verdict ")]
+    assert sorted(kinds) == sorted(
+        ["verdict holds"] * 3 + ["verdict nearly"] * 3 + ["verdict fails"] * 2 + ["verdict open"] * 2
+    )
+
+
+def test_pictures_are_embedded_and_have_captions(html: Reading, rendered: Reading, pictures: Path) -> None:
+    prefix = "data:image/png;base64,"
+    sources = html.attributes("img", "src")
+    assert all(source.startswith(prefix) for source in sources)
+    names = ["figure7.png", *["pins of soft.png"] * 3]
+    assert [base64.b64decode(source.removeprefix(prefix)) for source in sources] == [
+        (pictures / "figures" / name).read_bytes() for name in names
+    ]
+    assert len(html.texts["figcaption"]) == len(html.texts["figure"]) == 4
+    assert rendered.attributes("img", "src") == ["figures/figure7.png", *["figures/pins%20of%20soft.png"] * 3]
+
+
+def test_the_page_needs_nothing_else(html: Reading, pictures: Path) -> None:
+    text = (pictures / "report.html").read_text(encoding="utf-8")
+    bare = re.sub(r"data:image/png;base64,[A-Za-z0-9+/=]+", "", text)
+    assert {tag for tag, _ in html.tags} & {"script", "link", "iframe", "object"} == set()
+    assert all(link.startswith("#") for link in html.attributes("a", "href"))
+    assert "url(" not in bare
+    assert "@import" not in bare
+    for name in ("report.html", "report.md"):
+        assert str(pictures) not in (pictures / name).read_text(encoding="utf-8")
+
+
+def test_contents_lead_to_every_part(both: Reading) -> None:
+    links = both.attributes("a", "href")
+    assert (
+        len(links)
+        == len(set(links))
+        == len([text for text in both.texts["h2"] if text != "Contents"]) + len(both.texts["h3"])
+    )
+
+
+def test_links_of_the_page_have_their_target(html: Reading) -> None:
+    targets = [name for tag in ("h2", "h3") for name in html.attributes(tag, "id")]
+    assert sorted(html.attributes("a", "href")) == sorted(f"#{name}" for name in targets)
+
+
+def test_a_part_of_the_report_has_no_empty_headings(report: Report, tmp_path: Path) -> None:
+    text = write_report(replace(report, figures=(), claims=(), examinations=()), tmp_path / "new").read_text("utf-8")
+    assert Reading(text).texts["h2"] == ["Summary", "Main numbers", "How to reproduce"]
+
+
+def test_a_part_of_the_report_tells_its_own_command(report: Report, tmp_path: Path) -> None:
+    part = replace(report, figures=(), claims=(), examinations=report.examinations[:2])
+    commands = Reading(write_report(part, tmp_path).read_text(encoding="utf-8")).texts["code"]
+    assert "annelid paper -o report --only pins --only springs" in commands
+    assert "annelid paper -o report" not in commands
+
+
+def test_a_quick_report_says_so_and_how_to_repeat_it(report: Report, pictures: Path, tmp_path: Path) -> None:
+    quick = Reading(write_report(replace(report, effort="quick"), tmp_path).read_text(encoding="utf-8"))
+    assert quick.has("Quick report")
+    assert quick.has("annelid paper -o report --quick --only pins")
+
+
+def test_the_page_of_claims(report: Report) -> None:
+    from markdown_it import MarkdownIt
+
+    text = claims_page(report)
+    page = Reading(f"<body>{MarkdownIt('commonmark').enable('table').render(text)}</body>")
+    assert CLAIMS_COMMAND in page.texts["code"]
+    for each in report.claims:
+        assert all(map(page.has, (each.claim, each.paper, each.ours, each.command)))
+        assert page.has(each.evidence.replace("`", ""))
+    assert [len(row) for row in table_rows(text)] == [3] * 3 + [5] * 16
+    assert page.has("Of 10 claims")
+    assert "![" not in text
+
+
+def table_rows(markdown: str) -> list[list[str]]:
+    lines = [line for line in markdown.splitlines() if line.startswith("|")]
+    return [re.split(r"(?<!\\)\|", line)[1:-1] for line in lines]
+
+
+def test_a_folder_that_cannot_be_written_is_refused(report: Report, tmp_path: Path) -> None:
+    (tmp_path / "report.md").mkdir()
+    with pytest.raises(RunFileError, match=r"report\.md"):
+        write_report(report, tmp_path)
+
+
+def read_back(markdown: str, tag: str = "body") -> list[str]:
+    """The words that a reader of GitHub's Markdown shows in the last such element."""
+    from markdown_it import MarkdownIt
+
+    reader = MarkdownIt("commonmark").enable(["table", "strikethrough"])
+    return Reading(f"<body>{reader.render(markdown)}</body>").texts[tag][-1].split()
+
+
+def in_table(markdown: str) -> str:
+    return f"| head |\n| --- |\n| {cell(markdown)} |"
+
+
+plain = st.text(st.sampled_from("ab1 *_[]()<>~$&;#!-+=.|\\:/'\"{}^%µ≈"), min_size=1).filter(str.strip)
+
+
+@given(plain)
+def test_any_text_reads_as_it_was_written(text: str) -> None:
+    assert read_back(words(text)) == text.split()
+    assert read_back(in_table(words(text)), "td") == text.split()
+
+
+@given(st.text(st.sampled_from("ab `|*<'\"\\"), min_size=1).filter(str.strip))
+def test_any_command_reads_as_it_was_typed(text: str) -> None:
+    assert read_back(code(text), "code") == text.split()
+    assert read_back(in_table(code(text)), "code") == text.split()
+
+
+def test_anchors_are_githubs() -> None:
+    headings = ["Figure 5: force, length & velocity", "Friction from 0.05 to 1.5", "Pins", "pins", "PINS"]
+    assert anchors(headings) == [
+        "figure-5-force-length--velocity",
+        "friction-from-005-to-15",
+        "pins",
+        "pins-1",
+        "pins-2",
+    ]

@@ -1,0 +1,119 @@
+"""The report as a whole: what is run, what is drawn, what is kept; and the judgement of numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from annelid.errors import ConfigError
+from annelid.studies import paper
+from annelid.studies.case import PLANAR, RODS, Case, one_after_the_other
+from annelid.studies.claims import claim_cases
+from annelid.studies.claims.evidence import nearness
+from annelid.studies.examination import Effort, Examination, Findings, Results, Table
+from annelid.studies.examinations import EXAMINATIONS
+
+SHORT = Case(PLANAR, {"duration_s": 0.2})
+SLOWER = Case(PLANAR, {"duration_s": 0.2, "controller.gate_time_constant_ms": 250})
+
+
+def examine(results: Results, effort: Effort, stem: Path) -> Findings:
+    stem.with_suffix(".png").write_bytes(b"drawn")
+    names = [results[case].summary.name for case in (SHORT, SLOWER)]
+    return Findings(f"Two runs of {names[0]}.", "Nothing.", Table(["run"], [[name] for name in names]))
+
+
+TINY = Examination("tiny", "Tiny", "Does it run?", lambda effort: [SHORT, SLOWER], examine)
+
+
+@pytest.fixture
+def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper, "EXAMINATIONS", (TINY,))
+    monkeypatch.setattr(paper, "MAIN", SHORT)
+    monkeypatch.setattr(paper, "VARIANTS", {"riddle2023": SHORT})
+    monkeypatch.setattr(paper, "published", lambda config: THEIRS)
+
+
+class _Value:
+    def __init__(self, value: object) -> None:
+        self.value = value
+
+
+THEIRS = {
+    "elongation_first_helix_pp_m": _Value((0.0420, 0.0255, 0.0402)),
+    "middle_deficit": _Value(0.394),
+    "end_difference": _Value(0.0445),
+}
+
+
+@pytest.mark.usefixtures("tiny")
+def test_one_examination_alone_makes_a_report_of_its_own(tmp_path: Path) -> None:
+    report = paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1)
+    assert [each.examination.name for each in report.examinations] == ["tiny"]
+    assert report.claims == []
+    assert report.figures == []
+    assert report.provenance["runs"] == "2"
+    assert (tmp_path / "figures" / "tiny.png").exists()
+    assert any("Two runs of riddle2022-planar" in paragraph for paragraph in report.summary)
+
+
+@pytest.mark.usefixtures("tiny")
+def test_a_second_call_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1)
+    monkeypatch.setattr("annelid.studies.store.ProcessPoolExecutor", None)
+    assert paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1).main_table == first.main_table
+
+
+@pytest.mark.usefixtures("tiny")
+def test_progress_tells_stage_and_ends_at_the_whole(tmp_path: Path) -> None:
+    told: list[tuple[str, int, int, float]] = []
+    paper.reproduce(tmp_path, only=["tiny"], jobs=1, progress=lambda *step: told.append(step))
+    assert told[0][0] == "running worms"
+    assert told[-1][1:] == (1, 1, 1.0)
+    assert all(0 <= share <= 1 for *_, share in told)
+
+
+def test_an_unknown_examination_is_named_with_the_valid_ones(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"no examination 'frictoin': did you mean 'friction'\? .*noise"):
+        paper.reproduce(tmp_path, only=["frictoin"])
+    assert not list(tmp_path.iterdir())
+
+
+def test_examinations_have_names_of_their_own() -> None:
+    names = [examination.name for examination in EXAMINATIONS]
+    assert len(names) == len(set(names)) == 9
+    assert all(name.isidentifier() for name in names)
+
+
+@pytest.mark.parametrize("effort", ["quick", "full"])
+def test_every_case_of_the_report_is_a_valid_configuration(effort: Effort) -> None:
+    cases = [*claim_cases(effort), *(case for examination in EXAMINATIONS for case in examination.cases(effort))]
+    assert all(case.config.duration_s > 0 for case in cases)
+    if effort == "quick":
+        assert sum(case.cost_s for case in cases) < 900
+    else:
+        assert sum(case.cost_s for case in cases) < 7000
+
+
+def test_the_open_loop_protocol_holds_each_segment_in_turn() -> None:
+    config = Case(RODS, one_after_the_other(3, 0.5, 0.25)).config
+    assert config.duration_s == 2.0
+    spans = [(c.segment, c.start_s, c.stop_s) for c in config.controller.contractions]  # type: ignore[union-attr]
+    assert spans == [(1, 0.0, 0.5), (2, 0.75, 1.25), (3, 1.5, 2.0)]
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "expected"),
+    [
+        (2.5, 2.5, ("holds", "")),
+        (2.51, 2.5, ("holds", "")),
+        (2.6, 2.5, ("holds within", "4.0 %")),
+        (2.4, 2.5, ("holds within", "4.0 %")),
+        (2.8, 2.5, ("does not hold", "")),
+    ],
+)
+def test_a_number_holds_within_a_stated_margin_up_to_a_tenth(
+    ours: float, theirs: float, expected: tuple[str, str]
+) -> None:
+    assert nearness(ours, theirs) == expected

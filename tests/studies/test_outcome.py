@@ -73,6 +73,7 @@ def test_holds_are_read_at_the_end_of_each_contraction(held: Run) -> None:
         assert max(range(3), key=hold.elongation_mean_m.__getitem__) + 1 == hold.segment
         assert hold.elongation_first_helix_m[hold.segment - 1] > 0.0
         assert hold.ring_length_m == pytest.approx(ring_length_at_end(held, hold.segment))
+        assert hold.force_N is not None
         assert 0.0 < hold.force_N <= largest
 
 

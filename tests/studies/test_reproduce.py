@@ -31,7 +31,8 @@ TINY = Examination("tiny", "Tiny", "Does it run?", lambda effort: [SHORT, SLOWER
 def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paper, "EXAMINATIONS", (TINY,))
     monkeypatch.setattr(paper, "MAIN", SHORT)
-    monkeypatch.setattr(paper, "VARIANTS", {"riddle2023": SHORT})
+    monkeypatch.setattr(paper, "VARIANTS", {PLANAR: SHORT})
+    monkeypatch.setattr(paper, "_QUICK", (PLANAR,))
     monkeypatch.setattr(paper, "published", lambda config: THEIRS)
 
 
@@ -55,7 +56,8 @@ def test_one_examination_alone_makes_a_report_of_its_own(tmp_path: Path) -> None
     assert report.figures == []
     assert report.provenance["runs"] == "2"
     assert (tmp_path / "figures" / "tiny.png").exists()
-    assert any("Two runs of riddle2022-planar" in paragraph for paragraph in report.summary)
+    assert report.examinations[0].findings.answer == "Two runs of riddle2022-planar."
+    assert "Three worms stand side by side" in report.summary[-1]
 
 
 @pytest.mark.usefixtures("tiny")

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
@@ -17,11 +16,11 @@ from annelid.simulation.runfile import Run
 from annelid.studies.case import CHAIN, FAST, PLANAR, RODS, Case
 from annelid.studies.claims import Evidence, claim_cases, paper_claims
 from annelid.studies.contents import Claim, Examined, Figure, Report
-from annelid.studies.examination import Effort, Examination, Results, Table
+from annelid.studies.examination import Effort, Examination, Findings, Results, Table
 from annelid.studies.examinations import EXAMINATIONS
+from annelid.studies.kept import kept
 from annelid.studies.outcome import Outcome
-from annelid.studies.store import Store, case_key, code_fingerprint
-from annelid.view.output import whole_file
+from annelid.studies.store import Store, case_key
 
 Progress = Callable[[str, int, int, float], object]
 """Called with what is being done, the number of runs (or pictures) done, their total, and the share of the work."""
@@ -80,21 +79,19 @@ def reproduce(
     examined = []
     for index, examination in enumerate(chosen):
         drawing(index, n_pictures, index / n_pictures)
-        stem = pictures / examination.name
-        findings = examination.examine(results, effort, stem)
-        examined.append(Examined(examination, findings, stem.with_suffix(".png")))
+        examined.append(_examined(examination, effort, results, pictures))
     figures: list[Figure] = []
     claims: list[Claim] = []
     if only is None:
         main = store.run(MAIN)
         for index, number in enumerate(FIGURES, start=len(chosen)):
             drawing(index, n_pictures, index / n_pictures)
-            figures.append(_figure(number, main, outcomes[case_key(MAIN)], variants, results, pictures))
+            figures.append(_figure(number, main, variants, results, pictures))
         claims = paper_claims(Evidence(store, results, effort, {e.examination.name: e.findings for e in examined}))
     drawing(n_pictures, n_pictures, 1.0)
     return Report(
         effort=effort,
-        summary=_summary(results[MAIN], examined, claims),
+        summary=_summary({label: results[case] for label, case in variants.items()}, claims),
         main_table=_main_table(variants, results),
         figures=figures,
         claims=claims,
@@ -192,32 +189,31 @@ FIGURES: Mapping[int, tuple[str, Callable[[Run, Path, Mapping[str, Sequence[floa
 """Number: title, and what draws it and returns its caption. Figure 3 is a photograph of the robot."""
 
 
-def _figure(
-    number: int, main: Run, outcome: Outcome, variants: Mapping[str, Case], results: Results, folder: Path
-) -> Figure:
-    """Draws a figure, unless it lies there from the same code and the same runs."""
+def _examined(examination: Examination, effort: Effort, results: Results, folder: Path) -> Examined:
+    stem = folder / examination.name
+    keys = sorted({case_key(case) for case in examination.cases(effort)})
+    found = kept(stem, [effort, keys], lambda: asdict(examination.examine(results, effort, stem)))
+    findings = Findings(**{**found, "table": Table(**found["table"])})
+    return Examined(examination, findings, stem.with_suffix(".png"))
+
+
+def _figure(number: int, main: Run, variants: Mapping[str, Case], results: Results, folder: Path) -> Figure:
     title, draw = FIGURES[number]
     stem = folder / f"figure_{number}"
-    series = {label: _measured(results[case].summary.elongation_mean_max_m) for label, case in variants.items()}
-    series = {f"{label}, mean of six": series[label] for label in _QUICK}
-    series = {"riddle2023, first helix": _measured(outcome.summary.elongation_first_helix_pp_m), **series}
-    mark = hashlib.sha256(json.dumps([code_fingerprint(), case_key(MAIN), series]).encode()).hexdigest()
-    note = stem.with_suffix(".json")
-    picture = stem.with_suffix(".png")
-    try:
-        kept = json.loads(note.read_text(encoding="utf-8"))
-        if kept["mark"] == mark and picture.exists() and stem.with_suffix(".svg").exists():
-            return Figure(number, title, picture, kept["caption"])
-    except (OSError, ValueError, KeyError):
-        pass
-    caption = draw(main, stem, series)
-    with whole_file(note) as draft:
-        draft.write_text(json.dumps({"mark": mark, "caption": caption}), encoding="utf-8")
-    return Figure(number, title, picture, caption)
+    first_helix = results[MAIN].summary.elongation_first_helix_pp_m
+    series = {f"{CHAIN}, first helix": _measured(first_helix)} | {
+        f"{label}, mean of six": _measured(results[variants[label]].summary.elongation_mean_max_m) for label in _QUICK
+    }
+    found = kept(stem, [case_key(MAIN), series], lambda: {"caption": draw(main, stem, series)})
+    return Figure(number, title, stem.with_suffix(".png"), found["caption"])
 
 
 def _measured(values: Sequence[float | None] | None) -> tuple[float, ...]:
     return tuple(float("nan") if value is None else value for value in values or ())
+
+
+def _centimetres(values: Sequence[float | None] | None) -> str:
+    return " / ".join(f"{100 * value:.2f}" for value in _measured(values))
 
 
 def _main_table(variants: Mapping[str, Case], results: Results) -> Table:
@@ -225,9 +221,6 @@ def _main_table(variants: Mapping[str, Case], results: Results) -> Table:
 
     def row(label: str, paper: str, ours: Callable[[Outcome], str]) -> list[str]:
         return [label, paper, *(ours(results[case]) for case in variants.values())]
-
-    def centimetres(values: Sequence[float | None] | None) -> str:
-        return " / ".join(f"{100 * value:.2f}" for value in _measured(values))
 
     def percent(value: float | None) -> str:
         return "-" if value is None else f"{100 * value:.1f}"
@@ -250,10 +243,10 @@ def _main_table(variants: Mapping[str, Case], results: Results) -> Table:
             row("period (s)", "about 2.6 (Fig. 7)", lambda o: optional(o.rhythm.period_s, 3)),
             row(
                 "elongation, first helix, peak to peak (cm)",
-                centimetres(elongation),
-                lambda o: centimetres(o.summary.elongation_first_helix_pp_m),
+                _centimetres(elongation),
+                lambda o: _centimetres(o.summary.elongation_first_helix_pp_m),
             ),
-            row("elongation, mean of six, maximum (cm)", "", lambda o: centimetres(o.summary.elongation_mean_max_m)),
+            row("elongation, mean of six, maximum (cm)", "", lambda o: _centimetres(o.summary.elongation_mean_max_m)),
             row("segment 2 below segment 1 (%)", percent(deficit), lambda o: percent(o.summary.middle_deficit)),
             row("the same, mean of six (%)", "", lambda o: percent(o.summary.middle_deficit_mean)),
             row("segment 3 below segment 1 (%)", percent(difference), lambda o: percent(o.summary.end_difference)),
@@ -274,16 +267,20 @@ def _seconds(outcome: Outcome) -> str:
     return "-" if not factor or duration is None else f"{duration / factor:.0f}"
 
 
-def _summary(main: Outcome, examined: Sequence[Examined], claims: Sequence[Claim]) -> list[str]:
-    elongation = " / ".join(f"{100 * value:.2f}" for value in _measured(main.summary.elongation_first_helix_pp_m))
+def _summary(variants: Mapping[str, Outcome], claims: Sequence[Claim]) -> list[str]:
+    main = variants[MAIN.config.name]
+    elongation = _measured(main.summary.elongation_first_helix_pp_m)
     deficit = 100 * (main.summary.middle_deficit or float("nan"))
     period = main.rhythm.period_s
+    theirs = published(MAIN.config)["elongation_first_helix_pp_m"].value
+    assert isinstance(theirs, tuple)
     paragraphs = [
-        f"The paper's worm, rebuilt in its own formulation and driven by its own network, gives a rhythm that is "
+        f"The paper's worm, rebuilt in its own formulation and driven by its own network, has a rhythm that is "
         f"{main.rhythm.verdict or 'not settled'}: segments begin in the order {'-'.join(map(str, main.rhythm.order))}"
         + (f", one cycle every {period:.3f} s" if period else "")
-        + f". They elongate by {elongation} cm (paper: 4.20 / 2.55 / 4.02 cm; spring on the first helix, peak to "
-        f"peak), segment 2 by {deficit:.1f} % less than segment 1 (paper: 39.4 %)."
+        + f". They elongate by {_centimetres(elongation)} cm (paper: {_centimetres(theirs)} cm; spring on the first "
+        f"helix, peak to peak), segment 2 by {deficit:.1f} % less than segment 1 (paper: 39.4 %).",
+        _what_still_differs(variants, theirs),
     ]
     if claims:
         tally = {verdict: sum(claim.verdict == verdict for claim in claims) for verdict in _VERDICTS}
@@ -291,8 +288,31 @@ def _summary(main: Outcome, examined: Sequence[Examined], claims: Sequence[Claim
             f"{n} {words}" for (verdict, words), n in zip(_VERDICTS.items(), tally.values(), strict=True) if n
         )
         paragraphs.append(f"Of the {len(claims)} claims of the paper that are examined here: {counted}.")
-    paragraphs += [f"{each.examination.title}. {each.findings.answer}" for each in examined]
+    paragraphs.append(
+        f"Three worms stand side by side in what follows: the paper's chain (preset {CHAIN}, in the examinations at "
+        f"steps of 2 ms), whose pins give; sprung rods ({FAST}), the same robot in seconds with pins of the same "
+        f"stiffness; and tight rods ({RODS}), whose pins hold."
+    )
     return paragraphs
+
+
+def _what_still_differs(variants: Mapping[str, Outcome], theirs: Sequence[float]) -> str:
+    """Names the segment farthest from the paper, and what the variants of the paper's own formulation make of it."""
+    read = {
+        label: _measured(outcome.summary.elongation_first_helix_pp_m)
+        for label, outcome in variants.items()
+        if label not in (FAST, RODS)
+    }
+    errors = [ours / paper - 1 for ours, paper in zip(read[MAIN.config.name], theirs, strict=True)]
+    worst = max(range(len(errors)), key=lambda segment: abs(errors[segment]))
+    text = (
+        f"What still differs most is segment {worst + 1}, {100 * errors[worst]:+.1f} % from the paper; the others are "
+        f"within {100 * max(abs(error) for i, error in enumerate(errors) if i != worst):.1f} %."
+    )
+    others = [
+        f"{100 * values[worst]:.2f} cm with {label}" for label, values in read.items() if label != MAIN.config.name
+    ]
+    return text + (f" It is {' and '.join(others)}." if others else "")
 
 
 _VERDICTS = {

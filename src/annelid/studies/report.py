@@ -54,7 +54,8 @@ def claims_page(report: Report) -> str:
         f"Every number of ours comes from a run; this page is written by {code(CLAIMS_COMMAND)}, together with the "
         f"whole report: its figures and its examinations."
     )
-    blocks = ["# The paper's claims", intro, *_paragraphs(report.summary), _provenance(report), *_main_numbers(report)]
+    blocks = ["# The paper's claims", intro, *_paragraphs(report.summary), *_headlines(report.examinations)]
+    blocks += [_provenance(report), *_main_numbers(report)]
     return "\n\n".join([*blocks, *_claims(report.claims)]) + "\n"
 
 
@@ -73,6 +74,7 @@ def _sections(report: Report, folder: Path) -> list[str]:
     return [
         "## Summary",
         *_paragraphs(report.summary),
+        *_headlines(report.examinations),
         *_main_numbers(report),
         *_claims(report.claims),
         *_figures(report.figures, folder),
@@ -98,6 +100,14 @@ def _provenance(report: Report) -> str:
 
 def _paragraphs(texts: Iterable[str]) -> list[str]:
     return [words(text) for text in texts if text.strip()]
+
+
+def _headlines(examinations: Sequence[Examined]) -> list[str]:
+    """A list of what each examination found."""
+    if not examinations:
+        return []
+    lines = [f"- {strong(each.examination.title + '.')} {words(each.findings.answer)}" for each in examinations]
+    return ["What the examinations found:", "\n".join(lines)]
 
 
 def _main_numbers(report: Report) -> list[str]:

@@ -47,7 +47,7 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
             f"engine and documented formula differ by at most {difference:.0e} F0",
             "The engine's own gain and bias are called over the whole surface and compared with the closed form of its "
             "documentation.",
-            "annelid paper (figure 5)",
+            "annelid paper",
         ),
         Claim(
             "Actuation",
@@ -81,7 +81,7 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
             "2.5 N",
             f"{spring_force[0]:.1f} to {spring_force[1]:.1f} N",
             "Arithmetic; the bending of the strands is not in it.",
-            "6 x 19.9 N/m x 0.02 to 0.03 m",
+            "python -c 'print(6 * 19.9 * 0.02, 6 * 19.9 * 0.03)'",
         ),
         Claim(
             "Actuation",

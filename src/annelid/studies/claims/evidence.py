@@ -9,6 +9,7 @@ from typing import Any
 from annelid.studies.case import CHAIN, FAST, PLANAR, RODS, Case, chain, fast, one_after_the_other, rods
 from annelid.studies.contents import Verdict
 from annelid.studies.examination import Effort, Findings, Results
+from annelid.studies.examinations.side_by_side import WORMS
 from annelid.studies.outcome import Outcome
 from annelid.studies.store import Store
 
@@ -21,8 +22,8 @@ PLANAR_CASES = {
     100: Case(PLANAR, {"controller.gate_time_constant_ms": 100, "body.gain": 3.6}),
 }
 """The planar worm with the gate time constants (ms) and gains that go together."""
-WORMS = ("chain", "fast", "rods")
-"""Nearest to the paper's first."""
+LABELS = {worm.name: worm.label for worm in WORMS}
+"""What the worms are called, nearest to the paper's first."""
 NEGLIGIBLE = 0.01
 """Travel in a cycle, in lengths of the body, below which we call it negligible."""
 PAPER_STEPS, PAPER_WALL_S = 5000, 210.0
@@ -59,10 +60,10 @@ class Evidence:
         Raises:
             KeyError: It has that number of no worm.
         """
-        for worm in WORMS:
+        for worm in LABELS:
             value = self.number(examination, name.format(worm))
             if value is not None:
-                return Found(worm, value)
+                return Found(LABELS[worm], value)
         raise KeyError(name)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from annelid.studies.claims.evidence import (
+    LABELS,
     PLANAR_CASES,
-    WORMS,
     Evidence,
     holds_if,
 )
@@ -45,12 +45,15 @@ def outlook_claims(evidence: Evidence) -> list[Claim]:
 
 
 def _noise_claim(noise: Mapping[str, Any]) -> Claim:
-    tested = {worm: float(noise[f"noise_tested_{worm}"]) for worm in WORMS}
-    handled = {worm: float(noise[f"noise_handled_{worm}"]) for worm in WORMS}
+    tested = {worm: float(noise[f"noise_tested_{worm}"]) for worm in LABELS}
+    handled = {worm: float(noise[f"noise_handled_{worm}"]) for worm in LABELS}
     judged = "chain" if tested["chain"] > 0 else "fast"
     listed = "; ".join(
-        f"{worm} {1e3 * handled[worm]:g} of {1e3 * tested[worm]:g} mm" for worm in WORMS if tested[worm] > 0
+        f"{1e3 * handled[worm]:g} of {1e3 * tested[worm]:g} mm ({label})"
+        for worm, label in LABELS.items()
+        if tested[worm] > 0
     )
+    windows = ", ".join(f"{noise[f'window_{worm}']} ({label})" for worm, label in LABELS.items())
     return Claim(
         "Future work",
         "Sensor noise can be accounted for by adjusting the sensors' threshold.",
@@ -59,8 +62,7 @@ def _noise_claim(noise: Mapping[str, Any]) -> Claim:
         "as simple as that, not validated",
         f"handled: {listed}",
         "Largest noise (standard deviation of every reading) under which some threshold keeps every seed in the wave "
-        f"1-2-3, of the largest tested. Without noise the rhythm stands at thresholds of {noise['window_chain']} "
-        f"(chain), {noise['window_fast']} (fast) and {noise['window_rods']} (rods).",
+        f"1-2-3, of the largest tested. Without noise the wave runs at thresholds of {windows}.",
         "annelid paper --only noise",
     )
 
@@ -68,7 +70,7 @@ def _noise_claim(noise: Mapping[str, Any]) -> Claim:
 def _friction_claim(friction: Mapping[str, Any]) -> Claim:
     travels = {
         (worm, float(name.split("_")[2])): float(value)
-        for worm in WORMS
+        for worm in LABELS
         for name, value in friction.items()
         if name.startswith("travel_friction_") and name.endswith(f"_{worm}_m")
     }
@@ -78,15 +80,15 @@ def _friction_claim(friction: Mapping[str, Any]) -> Claim:
         if str(friction[f"verdict_friction_{mu:g}_{worm}"]).startswith("1-2-3")
     }
     (worm, mu), gain = max(gains.items(), key=lambda item: item[1])
-    walking = ", ".join(f"{friction[f'frictions_that_walk_{worm}']} ({worm})" for worm in WORMS)
+    walking = ", ".join(f"{friction[f'frictions_that_walk_{worm}']} ({label})" for worm, label in LABELS.items())
     return Claim(
         "Future work",
         "The small speed is largely due to an unoptimised coefficient of friction.",
         "section 5",
         holds_if(gain > 2),
         "friction 1 is not optimal",
-        f"largest travel while walking in order: {1e3 * travels[worm, mu]:+.0f} mm in 5 s at friction {mu:g} ({worm}), "
-        f"{gain:.1f} times that at friction 1",
+        f"largest travel while walking in order: {1e3 * travels[worm, mu]:+.0f} mm in 5 s at friction {mu:g} "
+        f"({LABELS[worm]}), {gain:.1f} times that at friction 1",
         f"All other things as they are. Worms keep the order 1-2-3 at frictions {walking}.",
         "annelid paper --only friction",
     )

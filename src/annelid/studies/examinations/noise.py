@@ -13,7 +13,7 @@ import numpy as np
 
 from annelid.analysis import RhythmScore
 from annelid.config import WormBody
-from annelid.studies.case import Case
+from annelid.studies.case import CHAIN, Case
 from annelid.studies.examination import Effort, Examination, Findings, Results, Table
 from annelid.studies.examinations.side_by_side import (
     PAPERS,
@@ -24,6 +24,7 @@ from annelid.studies.examinations.side_by_side import (
     is_the_papers_wave,
     listed,
     rhythm_kind,
+    rhythm_words,
     span,
 )
 from annelid.view.canvas import canvas, save_both
@@ -82,9 +83,14 @@ MAPS: Mapping[Effort, Sequence[NoiseMap]] = {
 }
 
 
+AT_THE_PAPERS_STEP = {tolerance_m: Case(CHAIN, {"sensor.tolerance_m": tolerance_m}) for tolerance_m in (0.008, 0.012)}
+"""The chain at 1 ms, without noise, on both sides of the paper's tolerance."""
+
+
 def cases(effort: Effort) -> list[Case]:
     """Returns the runs of all maps."""
-    return [case for chart in MAPS[effort] for cell in chart.cells().values() for case in cell]
+    mapped = [case for chart in MAPS[effort] for cell in chart.cells().values() for case in cell]
+    return [*mapped, *AT_THE_PAPERS_STEP.values()] if effort == "full" else mapped
 
 
 def read_cells(chart: NoiseMap, results: Results) -> Cells:
@@ -181,7 +187,12 @@ def examine(results: Results, effort: Effort, stem: Path) -> Findings:
         ),
         caption=_caption(read),
         table=_table(read),
-        remarks=[_breadth_in_words(read), _handling_in_words(read), _sensor_in_words(read)],
+        remarks=[
+            _breadth_in_words(read),
+            _handling_in_words(read),
+            _sensor_in_words(read),
+            *([_step_in_words(results)] if effort == "full" else []),
+        ],
         numbers=numbers,
     )
 
@@ -299,6 +310,17 @@ def _sensor_in_words(read: Sequence[tuple[NoiseMap, Cells]]) -> str:
         f"sensor compares the mean of a segment's {n_springs} springs with the tolerance, so {MM * most:g} mm on each "
         f"spring are {MM * most / sqrt(n_springs):.1f} mm on what it compares. In cells where some runs walk and some "
         "do not, chance decides."
+    )
+
+
+def _step_in_words(results: Results) -> str:
+    said = [
+        f"at {MM * tolerance:g} mm {rhythm_words(results[case].rhythm)}"
+        for tolerance, case in AT_THE_PAPERS_STEP.items()
+    ]
+    return (
+        "The chain's map is of steps of 2 ms. At the paper's step of 1 ms and without noise its rhythm is "
+        f"{listed(said)}."
     )
 
 

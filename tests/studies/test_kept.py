@@ -1,0 +1,62 @@
+"""Pictures are kept while what they come from stays the same, and made anew otherwise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from annelid.studies.kept import kept
+
+
+class Maker:
+    """Draws an empty picture and counts how often."""
+
+    def __init__(self, stem: Path) -> None:
+        self.stem = stem
+        self.times = 0
+
+    def __call__(self) -> dict[str, Any]:
+        self.times += 1
+        for suffix in (".svg", ".png"):
+            self.stem.with_suffix(suffix).write_bytes(b"picture")
+        return {"caption": f"made {self.times} times"}
+
+
+@pytest.fixture
+def maker(tmp_path: Path) -> Maker:
+    return Maker(tmp_path / "picture")
+
+
+def test_the_same_is_made_once(maker: Maker) -> None:
+    first = kept(maker.stem, ["run", 1.5], maker)
+    assert kept(maker.stem, ["run", 1.5], maker) == first
+    assert maker.times == 1
+
+
+def test_another_run_makes_it_anew(maker: Maker) -> None:
+    kept(maker.stem, ["run"], maker)
+    assert kept(maker.stem, ["another run"], maker) == {"caption": "made 2 times"}
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png", ".json"])
+def test_a_missing_file_makes_it_anew(maker: Maker, suffix: str) -> None:
+    kept(maker.stem, ["run"], maker)
+    maker.stem.with_suffix(suffix).unlink()
+    kept(maker.stem, ["run"], maker)
+    assert maker.times == 2
+
+
+def test_a_damaged_note_makes_it_anew(maker: Maker) -> None:
+    kept(maker.stem, ["run"], maker)
+    maker.stem.with_suffix(".json").write_text('{"mark": ', encoding="utf-8")
+    kept(maker.stem, ["run"], maker)
+    assert maker.times == 2
+
+
+def test_changed_code_makes_it_anew(maker: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept(maker.stem, ["run"], maker)
+    monkeypatch.setattr("annelid.studies.kept.code_fingerprint", lambda: "other code")
+    kept(maker.stem, ["run"], maker)
+    assert maker.times == 2

@@ -275,11 +275,11 @@ def _table(held_runs: Sequence[Convergence], walks: Sequence[tuple[int, Outcome]
         (
             "worm",
             "elements a side",
-            "ring held, m",
-            "elongation held, cm",
-            "force held, N",
+            "ring held (m)",
+            "elongation held (cm)",
+            "force held (N)",
             "rhythm",
-            "elongation walking, cm",
+            "elongation walking (cm)",
         ),
         rows,
     )
@@ -293,19 +293,21 @@ def _draw(held_runs: Sequence[Convergence], walks: Sequence[tuple[int, Outcome]]
                 hollow = {"markerfacecolor": "white"} if found.worm is PAPERS else {}
                 look = {**_LOOKS[name], "linestyle": found.worm.line, "markersize": 5.0, **hollow}
                 left.plot(found.elements[:-1], 100.0 * difference, **look)
-        left.set(xscale="log", yscale="log", xlabel="elements per rhombus side", ylabel="difference from the finest, %")
+        left.set(
+            xscale="log", yscale="log", xlabel="elements per rhombus side", ylabel="difference from the finest (%)"
+        )
         _ticks(left, sorted({n for found in held_runs for n in found.elements[:-1]}))
         left.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        panel_title(left, "held contractions")
+        panel_title(left, "Held contractions")
         elongations = np.array([walked_elongation(outcome) for _, outcome in walks])
         counts = [n for n, _ in walks]
         draw_segments(right, counts, CM * elongations, marker=TIGHT.marker, linestyle=TIGHT.line)
         for (n, outcome), values in zip(walks, elongations, strict=True):
             if not is_the_papers_wave(outcome.rhythm):
                 right.plot([n] * len(values), CM * values, linestyle="none", marker="x", color="black", markersize=8.0)
-        right.set(xscale="log", xlabel="elements per rhombus side", ylabel="largest elongation, cm")
+        right.set(xscale="log", xlabel="elements per rhombus side", ylabel="largest elongation (cm)")
         _ticks(right, counts)
-        panel_title(right, f"walking, {TIGHT.label}")
+        panel_title(right, f"Walking, {TIGHT.label}")
         handles = [look_handle(name, linestyle="none", **look) for name, look in _LOOKS.items()]
         crossed = look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black")
         legend_below(figure, [*handles, crossed, *segment_handles(3)], columns=4)

@@ -20,6 +20,7 @@ from annelid.studies.examinations.side_by_side import (
     WORMS,
     Worm,
     all_in_cm,
+    capitalised,
     draw_rhythms,
     held_elongation,
     in_cm,
@@ -180,7 +181,7 @@ def _remarks(every: Sequence[_Series], solved: Sequence[tuple[float, float, floa
         pairs = list(zip(series.frictions, series.outcomes, strict=True))
         walk = [f"{f:g}" for f, o in pairs if is_the_papers_wave(o.rhythm)]
         fail = [f"{f:g} ({rhythm_words(o.rhythm)})" for f, o in pairs if not is_the_papers_wave(o.rhythm)]
-        sentence = f"{series.worm.label[0].upper()}{series.worm.label[1:]}: order 1-2-3 at friction {listed(walk)}"
+        sentence = f"{capitalised(series.worm.label)}: order 1-2-3 at friction {listed(walk)}"
         remarks.append(
             sentence + (f"; not at {listed(fail)}." if fail else "; no other was tried." if len(pairs) == 1 else ".")
         )

@@ -20,6 +20,7 @@ from annelid.studies.examinations.side_by_side import (
     PAPERS,
     SPRUNG,
     TIGHT,
+    capitalised,
     in_unit,
     is_the_papers_wave,
     kept,
@@ -217,7 +218,8 @@ def _table(beats: Beats) -> Table:
         for (start, scheme), beat in of_worm.items()
     ]
     return Table(
-        ("worm", "gate start", "update order", "rhythm", "period, s", "first onsets, s", "first contraction, s"), rows
+        ("worm", "gate start", "update order", "rhythm", "period (s)", "first onsets (s)", "first contraction (s)"),
+        rows,
     )
 
 
@@ -228,7 +230,7 @@ def _draw(beats: Beats, stem: Path) -> None:
             for row, pair in enumerate(ALL):
                 if pair in of_worm:
                     _draw_beat(axes, row, of_worm[pair])
-            panel_title(axes, LABELS[worm])
+            panel_title(axes, capitalised(LABELS[worm]))
             axes.set_xlim(0.0, _SHOWN_S)
             axes.set_ylim(len(ALL) - 0.4, -0.6)
             axes.set_yticks(range(len(ALL)), [f"{start}, {scheme}" for start, scheme in ALL])
@@ -237,7 +239,7 @@ def _draw(beats: Beats, stem: Path) -> None:
         for axes in panels[:, 0]:
             axes.set_ylabel("gate start, update order")
         for axes in panels[-1]:
-            axes.set_xlabel("time, s")
+            axes.set_xlabel("time (s)")
         legend_below(figure, segment_handles(3))
         save_both(figure, stem)
 

@@ -20,6 +20,7 @@ from annelid.studies.examinations.side_by_side import (
     SPRUNG,
     TIGHT,
     Worm,
+    capitalised,
     in_percent,
     is_the_papers_wave,
     listed,
@@ -293,7 +294,7 @@ def _handling_in_words(read: Sequence[tuple[NoiseMap, Cells]]) -> str:
                 words += f", where {MM * own:g} mm no longer serves"
             parts.append(words)
         if parts:
-            sentences.append(f"{chart.worm.label.capitalize()} (tolerance {MM * own:g} mm): {'; '.join(parts)}.")
+            sentences.append(f"{capitalised(chart.worm.label)} (tolerance {MM * own:g} mm): {'; '.join(parts)}.")
     return (
         "The paper supposes that noise is handled by changing the sensor's threshold. The tolerances that keep every "
         "run in order, by noise. " + " ".join(sentences)
@@ -362,15 +363,15 @@ def _table(read: Sequence[tuple[NoiseMap, Cells]]) -> Table:
     return Table(
         (
             "worm",
-            "noise, mm",
-            "all walk at, mm",
+            "noise (mm)",
+            "all walk at (mm)",
             "walk 1-2-3",
             "evenly",
             "other order",
             "disordered",
             "silent",
             "regularity of walks",
-            "their period, s",
+            "their period (s)",
         ),
         rows,
     )
@@ -385,9 +386,9 @@ def _draw(read: Sequence[tuple[NoiseMap, Cells]], stem: Path) -> None:
         panels = figure.subplots(1, len(read), sharey=True, squeeze=False)[0]
         for axes, (chart, cells) in zip(panels, read, strict=True):
             _draw_map(axes, cells, tolerances, noises)
-            panel_title(axes, chart.worm.label)
-        panels[0].set_ylabel("sensor noise, mm")
-        panels[len(read) // 2].set_xlabel("tolerance of the stretch sensors, mm")
+            panel_title(axes, capitalised(chart.worm.label))
+        panels[0].set_ylabel("sensor noise (mm)")
+        panels[len(read) // 2].set_xlabel("tolerance of the stretch sensors (mm)")
         seen = {majority(scores) for _, cells in read for scores in cells.values()}
         handles = [Patch(**look, label=_LEGEND[kind]) for kind, look in _FILLS.items() if kind in seen]
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))

@@ -19,6 +19,7 @@ from annelid.studies.examinations.side_by_side import (
     WORMS,
     Worm,
     all_in_cm,
+    capitalised,
     draw_rhythms,
     draw_segments,
     held_elongation,
@@ -205,7 +206,7 @@ def _draw(every: Sequence[_Series], stem: Path) -> None:
                 linestyle="--",
                 linewidth=1.0,
             )
-            panel_title(axes, series.worm.label[0].upper() + series.worm.label[1:])
+            panel_title(axes, capitalised(series.worm.label))
             axes.set_ylim(0.0, top)
         tops[0].set_ylabel("elongation (cm)")
         force, rhythms = panels["f"], panels["r"]

@@ -107,6 +107,11 @@ def kept(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
+def capitalised(text: str) -> str:
+    """Begins a text with a capital and leaves the rest as it is."""
+    return text[:1].upper() + text[1:]
+
+
 def in_unit(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
     """Formats a number after scaling it; a dash for None and NaN."""
     scaled = number(value) * scale

@@ -22,6 +22,7 @@ from annelid.studies.examinations.side_by_side import (
     TIGHT,
     Worm,
     all_in_cm,
+    capitalised,
     in_cm,
     in_percent,
     in_unit,
@@ -194,7 +195,7 @@ def _ms(step_s: float) -> str:
 def _walks_in_words(stepping: Stepping, row: Sequence[tuple[float, Outcome]]) -> str:
     good = [(step, outcome) for step, outcome in row if is_the_papers_wave(outcome.rhythm)]
     bad = [f"{_fate(outcome)} at {_ms(step)} ms" for step, outcome in row if not is_the_papers_wave(outcome.rhythm)]
-    label = stepping.label[0].upper() + stepping.label[1:]
+    label = capitalised(stepping.label)
     if not good:
         return f"{label}: no walk ({listed(bad)})."
     text = f"{label}: walks 1-2-3 at {listed([_ms(step) for step, _ in good])} ms"
@@ -244,7 +245,7 @@ def _settling_in_words(starts: Starts) -> str:
         lengths = listed([f"{in_unit(length)} m at {_ms(step)} ms" for step, length in ends])
         early = listed([f"{in_unit(start.at(EARLY_S))} m at {_ms(step)} ms" for step, start in row])
         sentences.append(
-            f"{stepping.label[0].upper()}{stepping.label[1:]}: ring of segment 1 {_ms(EARLY_S)} ms after the onset "
+            f"{capitalised(stepping.label)}: ring of segment 1 {_ms(EARLY_S)} ms after the onset "
             f"{early}; after {_ms(TRANSIENT_S)} ms {lengths}."
         )
     rk4 = next((row for stepping, row in starts if stepping is RK4), ())
@@ -332,9 +333,9 @@ def _table(walks: Walks) -> Table:
             "step, ms",
             "rhythm",
             "onsets",
-            "first helix peak to peak, cm",
-            "mean of six springs, cm",
-            "travel, cm",
+            "first helix peak to peak (cm)",
+            "mean of six springs (cm)",
+            "travel (cm)",
             "times real time",
         ),
         rows,
@@ -349,11 +350,11 @@ def _draw(walks: Walks, starts: Starts, stem: Path) -> None:
         for stepping, row in walks:
             _draw_walks(left, stepping, row)
         parameter_ticks(left, sorted({MS * step for _, row in walks for step, _ in row}))
-        left.set(xlabel="physics time step, ms", ylabel="elongation of segment 1, cm")
+        left.set(xlabel="physics time step (ms)", ylabel="elongation of segment 1 (cm)")
         left.set_ylim(bottom=0.0)
-        panel_title(left, "in closed loop")
+        panel_title(left, "In closed loop")
         _draw_starts(right, starts)
-        panel_title(right, "the first contraction's beginning")
+        panel_title(right, "Beginning of the first contraction")
         handles = [Line2D([], [], **_look(stepping), label=stepping.label) for stepping, _ in walks]
         crossed = Line2D(
             [], [], linestyle="none", marker="x", color="black", markersize=9.0, label="does not walk 1-2-3"
@@ -409,7 +410,7 @@ def _draw_starts(axes: Axes, starts: Starts) -> None:
     axes.plot(MS * times, limit, color="0.4", linewidth=1.0)
     axes.set_xlim(0.0, MS * TRANSIENT_S)
     axes.set_ylim(0.9 * low, 1.03 * float(first.ring_m[0]))
-    axes.set(xlabel="time after the onset, ms", ylabel="ring of segment 1, m")
+    axes.set(xlabel="time after the onset (ms)", ylabel="ring of segment 1 (m)")
 
 
 TIMESTEP = Examination(

@@ -16,6 +16,7 @@ from annelid.simulation import build_controller, build_plant
 
 CASES: tuple[tuple[str, dict[str, Any]], ...] = (
     ("riddle2023", {"duration_s": 0.5}),
+    ("riddle2023-fast", {"duration_s": 4.0}),
     ("riddle2023-rods", {"duration_s": 4.0, "clock.physics_timestep_s": 0.002, "record.frames_interval_s": 0.04}),
     ("riddle2023-rods", {"duration_s": 4.0}),
     ("riddle2023-rods", {"duration_s": 4.0, "clock.physics_timestep_s": 0.010, "record.signals_interval_s": 0.01}),

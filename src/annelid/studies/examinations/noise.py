@@ -86,12 +86,14 @@ MAPS: Mapping[Effort, Sequence[NoiseMap]] = {
 
 AT_THE_PAPERS_STEP = {tolerance_m: Case(CHAIN, {"sensor.tolerance_m": tolerance_m}) for tolerance_m in (0.008, 0.012)}
 """The chain at 1 ms, without noise, on both sides of the paper's tolerance."""
+NOISY_AT_THE_PAPERS_STEP = [Case(CHAIN, {"sensor.noise_m": 0.002, "seed": seed}) for seed in range(3)]
+"""The chain at 1 ms and its own tolerance, under the map's largest noise."""
 
 
 def cases(effort: Effort) -> list[Case]:
     """Returns the runs of all maps."""
     mapped = [case for chart in MAPS[effort] for cell in chart.cells().values() for case in cell]
-    return [*mapped, *AT_THE_PAPERS_STEP.values()] if effort == "full" else mapped
+    return [*mapped, *AT_THE_PAPERS_STEP.values(), *NOISY_AT_THE_PAPERS_STEP] if effort == "full" else mapped
 
 
 def read_cells(chart: NoiseMap, results: Results) -> Cells:
@@ -178,6 +180,9 @@ def examine(results: Results, effort: Effort, stem: Path) -> Findings:
         numbers[f"walking_share_{name}"] = share(compared[name])
         numbers[f"even_share_{name}"] = share(compared[name], is_even)
         numbers[f"runs_{name}"] = float(sum(map(len, cells.values())))
+    if effort == "full":
+        walking = [is_the_papers_wave(results[case].rhythm) for case in NOISY_AT_THE_PAPERS_STEP]
+        numbers["walking_share_noisy_papers_step"] = sum(walking) / len(walking)
     return Findings(
         answer=" ".join(
             [
@@ -319,9 +324,13 @@ def _step_in_words(results: Results) -> str:
         f"at {MM * tolerance:g} mm {rhythm_words(results[case].rhythm)}"
         for tolerance, case in AT_THE_PAPERS_STEP.items()
     ]
+    noisy = [results[case].rhythm for case in NOISY_AT_THE_PAPERS_STEP]
+    walking = sum(map(is_the_papers_wave, noisy))
+    noise_m = NOISY_AT_THE_PAPERS_STEP[0].config.sensor.noise_m
     return (
         "The chain's map is of steps of 2 ms. At the paper's step of 1 ms and without noise its rhythm is "
-        f"{listed(said)}."
+        f"{listed(said)}; with noise of {MM * noise_m:g} mm and the paper's tolerance, {walking} of {len(noisy)} runs "
+        "walk 1-2-3."
     )
 
 

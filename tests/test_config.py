@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from annelid.config import (
-    PlanarBody,
+    PlanarWorm,
     RunConfig,
     WormBody,
     field_paths,
@@ -37,7 +37,7 @@ def test_a_preset_states_every_field_that_its_worm_has(name: str) -> None:
     config = load_config(name)
     existing = leaves(config.model_dump(exclude_none=True))
     optional = {"body.springs.rest_length_m"}
-    planar = {path for path in existing if path.startswith("guard.")} if isinstance(config.body, PlanarBody) else set()
+    planar = {path for path in existing if path.startswith("guard.")} if isinstance(config.body, PlanarWorm) else set()
     assert existing - stated - optional - planar == set()
 
 

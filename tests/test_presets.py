@@ -85,6 +85,19 @@ def test_the_paper_s_formulation_is_the_reconstruction(path: str) -> None:
     assert value_at("riddle2023", path) == PAPER_S_FORMULATION[path]
 
 
+@pytest.mark.parametrize("preset", ["daltorio2013", "boxerbaum2012"])
+@pytest.mark.parametrize("path", [path for path in PUBLISHED if path.startswith("controller.")])
+def test_the_dynamic_planar_worms_have_the_published_network(preset: str, path: str) -> None:
+    assert value_at(preset, path) == PUBLISHED[path]
+
+
+@pytest.mark.parametrize("preset", ["daltorio2013", "boxerbaum2012"])
+def test_the_dynamic_planar_worms_have_the_size_of_the_kinematic_one(preset: str) -> None:
+    assert value_at(preset, "body.side_m") == PLANAR["body.side_m"]
+    assert value_at(preset, "body.height_relaxed_m") == PLANAR["body.height_max_m"]
+    assert value_at(preset, "sensor.tolerance_m") == PAPER_S_FORMULATION["sensor.tolerance_m"]
+
+
 @pytest.mark.parametrize("path", [*PLANAR, *(path for path in PUBLISHED if path.startswith("controller."))])
 def test_the_planar_worm_is_the_published_one(path: str) -> None:
     assert value_at("riddle2022-planar", path) == (PLANAR | PUBLISHED)[path]

@@ -63,7 +63,21 @@ def _sections_of(annotation: Any) -> list[type[Section]]:
     return found
 
 
-_KINDS = {"worm", "riddle2022", "rods", "chain", "sns", "program"}
+_KINDS = {
+    "worm",
+    "riddle2022",
+    "daltorio2013",
+    "boxerbaum2012",
+    "rods",
+    "chain",
+    "sns",
+    "program",
+    "sine",
+    "timed",
+    "shc",
+    "phase-chain",
+    "adaptive",
+}
 _WORDS = {
     "greater_than": "must be greater than {gt:g}",
     "greater_than_equal": "must be at least {ge:g}",

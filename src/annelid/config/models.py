@@ -234,11 +234,16 @@ class WormBody(Section):
         return self
 
 
-class PlanarBody(Section):
+class PlanarWorm(Section):
+    """What every planar worm has: its segments are rhombi in a row."""
+
+    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
+
+
+class PlanarBody(PlanarWorm):
     """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
 
     kind: Literal["riddle2022"] = "riddle2022"
-    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
     side_m: Positive = Field(default=0.073, description="side of a rhombus")
     height_min_m: Positive = Field(default=0.065, description="height when contracted")
     height_max_m: Positive = Field(default=0.11, description="height when relaxed")
@@ -253,7 +258,73 @@ class PlanarBody(Section):
         return self
 
 
-Body = Annotated[Annotated[WormBody, Tag("worm")] | Annotated[PlanarBody, Tag("riddle2022")], _kind_or("worm")]
+class DynamicPlanarWorm(PlanarWorm):
+    """What the planar worms with masses and forces share; no paper in hand states these constants.
+
+    They are those of a light robot of the size of Riddle 2022's: sides and heights are that worm's, spring and muscle
+    balance near its contracted height, the damper gives its time constant of about 0.1 s.
+    """
+
+    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    height_relaxed_m: Positive = Field(default=0.11, description="height at which the return spring is slack")
+    height_shortest_m: Positive = Field(default=0.055, description="height at which a muscle's force has fallen to 0")
+    joint_mass_kg: Positive = Field(default=0.05, description="mass of a joint on the axis")
+    vertex_mass_kg: Positive = Field(default=0.05, description="mass of an upper or a lower vertex")
+    spring_stiffness_N_per_m: Positive = Field(default=200.0, description="return spring along a segment")
+    muscle_force_N: NonNegative = Field(default=19.0, description="of a fully active muscle at the relaxed height")
+    height_damping_Ns_per_m: NonNegative = Field(
+        default=35.0, description="viscous resistance to a change of a segment's height"
+    )
+
+    @model_validator(mode="after")
+    def _heights_fit_the_rhombus(self) -> Self:
+        if not self.height_shortest_m < self.height_relaxed_m < 2 * self.side_m:
+            raise ValueError(
+                f"body.height_shortest_m = {self.height_shortest_m:g} and body.height_relaxed_m = "
+                f"{self.height_relaxed_m:g} must satisfy height_shortest_m < height_relaxed_m < 2 side_m = "
+                f"{2 * self.side_m:g}"
+            )
+        return self
+
+
+class Daltorio2013Body(DynamicPlanarWorm):
+    """The planar worm of Daltorio 2013: rigid-sided rhombi, torsional springs between them, and the walls of a pipe."""
+
+    kind: Literal["daltorio2013"] = "daltorio2013"
+    torsion_stiffness_Nm_per_rad: NonNegative = Field(
+        default=0.2, description="torsional springs between neighbouring segments"
+    )
+    torsion_damping_Nms_per_rad: NonNegative = Field(default=0.0, description="viscous resistance beside them")
+    pipe_diameter_m: Positive = Field(default=0.1, description="distance of the walls from one another")
+    wall_stiffness_N_per_m: Positive = Field(default=2000.0, description="force per indentation at one vertex")
+    wall_friction: NonNegative = Field(default=0.5, description="coefficient of Coulomb friction with the walls")
+
+    @model_validator(mode="after")
+    def _the_worm_can_leave_the_wall(self) -> Self:
+        if self.pipe_diameter_m <= self.height_shortest_m:
+            raise ValueError(
+                f"body.pipe_diameter_m = {self.pipe_diameter_m:g} must be greater than body.height_shortest_m = "
+                f"{self.height_shortest_m:g}"
+            )
+        return self
+
+
+class Boxerbaum2012Body(DynamicPlanarWorm):
+    """The planar worm of Boxerbaum 2012: rhombi whose sides bend in their middle, without ground."""
+
+    kind: Literal["boxerbaum2012"] = "boxerbaum2012"
+    middle_mass_kg: Positive = Field(default=0.02, description="mass of the middle of a side")
+    torsion_stiffness_Nm_per_rad: Positive = Field(default=0.2, description="torsional spring in the middle of a side")
+    torsion_damping_Nms_per_rad: NonNegative = Field(default=0.01, description="viscous resistance beside it")
+
+
+Body = Annotated[
+    Annotated[WormBody, Tag("worm")]
+    | Annotated[PlanarBody, Tag("riddle2022")]
+    | Annotated[Daltorio2013Body, Tag("daltorio2013")]
+    | Annotated[Boxerbaum2012Body, Tag("boxerbaum2012")],
+    _kind_or("worm"),
+]
 
 
 class Arena(Section):
@@ -343,8 +414,143 @@ class Program(Section):
     ramp_s: NonNegative = Field(default=0.0, description="time that a rise or fall between 0 and the full level takes")
 
 
+class SineWave(Section):
+    """Open loop: a sinusoidal wave from front to rear, segment 1 contracted at the start."""
+
+    kind: Literal["sine"] = "sine"
+    period_s: Positive = Field(default=2.625, description="time of one cycle; the paper's three segments take 2.625")
+    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=1.0, description="waves on the body at once; negative ones run forwards, 0 is no wave"
+    )
+    level: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="largest activation")
+
+
+class TimedWave(Section):
+    """Open loop: each segment contracts by a ramp, holds, and lets go by a ramp, one after another.
+
+    The authors' patterns: "3x1" is 1 s up, 1 s hold, 1 s down, the next segment 1 s later (the defaults); "2x2" is the
+    same with the next segment 2 s later and two waves at once (``interval_s = 2``, ``waves = 2``). Six segments repeat
+    either every 6 s.
+    """
+
+    kind: Literal["timed"] = "timed"
+    rise_s: NonNegative = Field(default=1.0, description="time to contract; 0 for a step")
+    hold_s: NonNegative = Field(default=1.0, description="time contracted")
+    fall_s: NonNegative = Field(default=1.0, description="time to let go; 0 for a step")
+    interval_s: Positive = Field(default=1.0, description="the next segment begins this much later")
+    waves: Annotated[int, Field(ge=1, le=100)] = Field(
+        default=1, description="waves on the body at once: the cycle is n_segments times interval_s over this"
+    )
+    level: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="activation while contracted")
+
+    @model_validator(mode="after")
+    def _it_contracts(self) -> Self:
+        if self.rise_s + self.hold_s + self.fall_s == 0:
+            raise ValueError("controller.rise_s, hold_s and fall_s are all 0: the segments would never contract")
+        return self
+
+
+class HeteroclinicChannel(Section):
+    """A stable heteroclinic channel (Horchler 2015, Daltorio 2013): one saddle a segment, visited in order.
+
+    A segment's activation is its node's activity. Alone it dwells at a node for about ``ln(1 / noise)`` or
+    ``ln(1 / bias)`` over the leaving rate ``growth_rate_per_s / saddle_value``; feedback from the body ends the dwell.
+    The literature gives no constants for this worm: with ours the bias alone makes a dwell of 0.88 s, the paper's
+    interval from segment to segment.
+    """
+
+    kind: Literal["shc"] = "shc"
+    growth_rate_per_s: Annotated[float, Field(gt=0, le=500)] = Field(
+        default=20.0, description="rate at which activities settle and decay; at most 0.5 over the control timestep"
+    )
+    saddle_value: Annotated[float, Field(gt=1, le=100)] = Field(
+        default=2.0, description="that rate over the rate at which a node is left"
+    )
+    noise: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=1e-6, description="standard deviation of the noise, per square root of a second"
+    )
+    bias_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=5e-4, description="constant input to every node; a larger one shortens the dwell"
+    )
+    feedback: Literal["none", "stretch", "contact"] = Field(
+        default="stretch",
+        description="what excites a node's successor: nothing, the present segment having lengthened by "
+        "stretch_cue_m, or the segment before it bearing contact_cue_N",
+    )
+    feedback_gain_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=0.1, description="input to the successor of an active node whose cue is on"
+    )
+    stretch_cue_m: NonNegative = Field(default=0.02, description="lengthening at which a segment has its shape")
+    contact_cue_N: NonNegative = Field(
+        default=0.2, description="size of the force of the ground with which a segment holds fast"
+    )
+
+    @model_validator(mode="after")
+    def _it_leaves_its_first_node(self) -> Self:
+        if self.noise == 0 and self.bias_per_s == 0 and (self.feedback == "none" or self.feedback_gain_per_s == 0):
+            raise ValueError(
+                "controller.noise, controller.bias_per_s and the feedback are all 0: the ring would rest at its first "
+                "node for ever"
+            )
+        return self
+
+
+class PhaseChain(Section):
+    """Phase oscillators under a descending drive (Ijspeert 2007): the salamander's constants, one segment each.
+
+    Activation is an oscillator's output over its largest, ``r (1 + cos theta) / (2 R(5))``.
+    """
+
+    kind: Literal["phase-chain"] = "phase-chain"
+    drive: Annotated[float, Field(ge=0, le=10)] = Field(
+        default=4.0, description="descending drive at the start: the body swims in 3 .. 5, is silent outside 1 .. 5"
+    )
+    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=0.0, description="change of the drive, which stays in 0 .. 10"
+    )
+    limbs: bool = Field(
+        default=False, description="true: limb oscillators force a standing wave below drive 3 (walking)"
+    )
+    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=1.0, description="waves on the body at once, by the phase bias; the salamander's swimming has 1"
+    )
+    coupling_per_s: Positive = Field(default=10.0, description="coupling of neighbours")
+    slowing: Positive = Field(default=1.0, description="times slower than the salamander, in all of its rates")
+
+
+class AdaptiveSns(Section):
+    """The synthetic nervous system with a descending neuron, whose activity sets the rate of all half-centres.
+
+    The activity that is asked for is ``drive + drive_slope_per_s time + stretch_gain_per_m stretch``, kept in 0 .. 1,
+    with the mean lengthening of all segments as stretch: a manual, a timed and a sensory drive. The descending neuron
+    follows it with its time constant.
+    """
+
+    kind: Literal["adaptive"] = "adaptive"
+    network: SnsController = SnsController()
+    drive: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="0: the slow rhythm of the half-centres alone; 1: about three times as fast"
+    )
+    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=0.0, description="change of the manual drive"
+    )
+    stretch_gain_per_m: Annotated[float, Field(ge=-1000, le=1000)] = Field(
+        default=0.0, description="drive per mean lengthening of the segments"
+    )
+    drive_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.05, description="time constant of the descending neuron"
+    )
+
+
 ControllerSection = Annotated[
-    Annotated[SnsController, Tag("sns")] | Annotated[Program, Tag("program")], _kind_or("sns")
+    Annotated[SnsController, Tag("sns")]
+    | Annotated[Program, Tag("program")]
+    | Annotated[SineWave, Tag("sine")]
+    | Annotated[TimedWave, Tag("timed")]
+    | Annotated[HeteroclinicChannel, Tag("shc")]
+    | Annotated[PhaseChain, Tag("phase-chain")]
+    | Annotated[AdaptiveSns, Tag("adaptive")],
+    _kind_or("sns"),
 ]
 
 
@@ -407,7 +613,7 @@ class RunConfig(Section):
 
     @model_validator(mode="after")
     def _no_ground_for_planar_worms(self) -> Self:
-        if isinstance(self.body, PlanarBody) and self.arena is not None:
+        if isinstance(self.body, PlanarWorm) and self.arena is not None:
             raise ValueError(f"arena has no effect on body.kind = {self.body.kind!r}, which touches no ground")
         return self
 
@@ -420,6 +626,16 @@ class RunConfig(Section):
                         f"controller.contractions.{i}.segment = {contraction.segment}: must be in "
                         f"1 .. {self.body.n_segments}, the segments of the body"
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _contact_needs_ground(self) -> Self:
+        contact = isinstance(self.controller, HeteroclinicChannel) and self.controller.feedback == "contact"
+        if contact and isinstance(self.body, PlanarBody | Boxerbaum2012Body):
+            raise ValueError(
+                f"controller.feedback = 'contact' has no effect on body.kind = {self.body.kind!r}, which touches no "
+                "ground: choose 'none' or 'stretch'"
+            )
         return self
 
     @model_validator(mode="after")

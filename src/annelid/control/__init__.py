@@ -1,8 +1,20 @@
 """Everything that turns sensation into activation."""
 
 from annelid.control.callable import CallableController
+from annelid.control.oscillators import AdaptiveController, HeteroclinicController, PhaseChainController
 from annelid.control.program import ProgramController
 from annelid.control.sns import SnsController
 from annelid.control.stretch_sensor import StretchSensor
+from annelid.control.waves import SineController, TimedController
 
-__all__ = ["CallableController", "ProgramController", "SnsController", "StretchSensor"]
+__all__ = [
+    "AdaptiveController",
+    "CallableController",
+    "HeteroclinicController",
+    "PhaseChainController",
+    "ProgramController",
+    "SineController",
+    "SnsController",
+    "StretchSensor",
+    "TimedController",
+]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from annelid import config as settings
 from annelid.control.stretch_sensor import StretchSensor
 from annelid.errors import ConfigError
-from annelid.nervous import PeristalsisParameters, neuron_names, peristalsis_network
+from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, neuron_names, peristalsis_network
 from annelid.protocols import Array, Recordable, Sensation, Signal, State
 
 _CONTRACTION, _EXPANSION, _NEURONS_A_SEGMENT = 0, 1, 4
@@ -65,6 +65,7 @@ class SnsController:
             timestep_ms=1e3 * control_timestep_s, scheme=config.scheme
         )
         self._sensor = StretchSensor(sensor, n_segments)
+        self._batches: dict[int, tuple[Stepper, NetworkState]] = {}
         self._inputs_nA = np.zeros(n_segments + 1)
         self.reset(0)
 
@@ -88,8 +89,38 @@ class SnsController:
         self._inputs_nA[-1] = self._config.kick_nA if self._n_steps == 0 else 0.0
         self._stepper.advance(self._state, self._inputs_nA)
         self._n_steps += 1
-        activation = self._segment_activation()
-        return activation if self._muscles_a_segment == 1 else activation.repeat(self._muscles_a_segment)
+        return self._activation(self._state.potential[0])
+
+    def step_copies(self, states: State, sensation: Sensation) -> tuple[State, Array]:
+        """Advances many copies by one control step at once, as `step` does one; changes nothing here.
+
+        Args:
+            states: As `get_state` returns them, the arrays but for the number of steps with one more axis in
+                front, ``n_copies`` long.
+            sensation: Lengths with the same axis in front, ``(n_copies, n_segments, n_sensors)``; one time for all.
+
+        Returns:
+            The states one step on, and their activation, ``(n_copies, n_muscles)``.
+        """
+        on = self._sensor.reading(
+            states["sensor_on"].astype(bool), sensation.stretch_m, sensation.rest_stretch_m, sensation.time_s
+        )
+        n_copies = len(on)
+        stepper, batch = self._batch(n_copies)
+        inputs = np.zeros((stepper.n_worms, self._n_segments + 1))
+        inputs[:n_copies, :-1] = self._config.sensor_current_nA * on
+        inputs[:, -1] = self._config.kick_nA if int(states["n_steps"]) == 0 else 0.0
+        batch.potential[:n_copies] = states["potential"][:, 0]
+        batch.gate[:n_copies] = states["gate"][:, 0]
+        stepper.advance(batch, inputs)
+        potential, gate = batch.potential[:n_copies].copy(), batch.gate[:n_copies].copy()
+        after: State = {
+            "potential": potential[:, np.newaxis],
+            "gate": gate[:, np.newaxis],
+            "sensor_on": on,
+            "n_steps": np.array(int(states["n_steps"]) + 1),
+        }
+        return after, self._activation(potential)
 
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""
@@ -165,10 +196,43 @@ class SnsController:
             f"{low:g} .. {high:g} mV: the control timestep of {self._stepper.timestep_ms:g} ms is too long"
         )
 
-    def _segment_activation(self) -> Array:
-        by_segment = self._state.potential[0].reshape(-1, _NEURONS_A_SEGMENT)
-        difference = by_segment[:, _CONTRACTION] - by_segment[:, _EXPANSION]
+    def pieces_copies(self, states: State) -> NDArray[np.bool_]:
+        """Tells in which piece of its piecewise smooth equations each of many copies is.
+
+        Synapses open between two potentials, and a linear activation saturates: there the equations have kinks.
+
+        Args:
+            states: As for `step_copies`.
+
+        Returns:
+            Shape ``(n_copies, n_pieces)``; between two of its changes the equations are smooth.
+        """
+        potential = states["potential"][:, 0].astype(np.float64)
+        arrays = self._stepper.arrays
+        opening = (potential[:, arrays.terminal_neuron] - arrays.terminal_threshold_mV) * arrays.terminal_slope_per_mV
+        pieces = [opening > 0.0, opening > 1.0]
+        if self._config.activation == "linear":
+            activation = self._activation(potential)
+            pieces += [activation > 0.0, activation < 1.0]
+        return np.concatenate(pieces, axis=1)
+
+    def _batch(self, n_copies: int) -> tuple[Stepper, NetworkState]:
+        """A stepper for at least this many copies, and room for their state."""
+        # Few widths of buffers serve any number of copies.
+        width = 1 << (n_copies - 1).bit_length()
+        if width not in self._batches:
+            own = self._stepper
+            stepper = Stepper(own.arrays, own.timestep_ms, own.scheme, width)
+            self._batches[width] = stepper, stepper.initial_state(self._config.gate_start)
+        return self._batches[width]
+
+    def _activation(self, potential: Array) -> Array:
+        """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""
+        by_segment = potential.reshape(*potential.shape[:-1], -1, _NEURONS_A_SEGMENT)
+        difference = by_segment[..., _CONTRACTION] - by_segment[..., _EXPANSION]
         if self._config.activation == "linear":
             reach = self._parameters.range_mV
-            return 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
-        return 1.0 / (1.0 + np.exp(-self._config.activation_slope_per_mV * difference))
+            activation = 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
+        else:
+            activation = 1.0 / (1.0 + np.exp(-self._config.activation_slope_per_mV * difference))
+        return activation if self._muscles_a_segment == 1 else activation.repeat(self._muscles_a_segment, axis=-1)

@@ -49,9 +49,26 @@ class StretchSensor:
             `on`: true for every segment whose mean length is at most the tolerance (with hysteresis, if it
             was on) beyond its mean rest length, ``(n_segments,)``; a new array.
         """
-        n_sensors = stretch_m.shape[1]
-        excess = (stretch_m - rest_stretch_m).sum(axis=1) / n_sensors
-        self.on = excess <= self._tolerance_m + self._hysteresis_m * self.on
-        if time_s < self._hold_until_s:
-            self.on[0] = False
+        self.on = self.reading(self.on, stretch_m, rest_stretch_m, time_s)
         return self.on.copy()
+
+    def reading(
+        self, before: NDArray[np.bool_], stretch_m: Array, rest_stretch_m: Array, time_s: float
+    ) -> NDArray[np.bool_]:
+        """Tells what `read` reads from lengths, without remembering it; any number of worms at once.
+
+        Args:
+            before: Which sensors were on at the reading before, ``(.., n_segments)``.
+            stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.
+            rest_stretch_m: Their lengths at rest, m, same shape.
+            time_s: Simulated time of the reading, s.
+
+        Returns:
+            Shape ``(.., n_segments)``.
+        """
+        n_sensors = stretch_m.shape[-1]
+        excess = (stretch_m - rest_stretch_m).sum(axis=-1) / n_sensors
+        on = excess <= self._tolerance_m + self._hysteresis_m * before
+        if time_s < self._hold_until_s:
+            on[..., 0] = False
+        return on

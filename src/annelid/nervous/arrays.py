@@ -2,8 +2,9 @@
 
 The right-hand side of every neuron is ``C dU/dt = I - G U``, where both the total conductance ``G`` and the
 current ``I`` at potential zero are linear in a *drive* vector: the open fractions of the presynaptic
-terminals, the open fractions of the channels, the rectified and plain potentials of gap junctions, the
-constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant matrix.
+terminals, the releases of spiking synapses, the open fractions of the channels, the rectified and plain
+potentials of gap junctions, the constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant
+matrix.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.nervous.neurons import Array, Channel, Gate
-from annelid.nervous.synapses import GapJunction, Synapse
+from annelid.nervous.synapses import GapJunction, Modulated, ModulatorySynapse, SpikingSynapse, Synapse
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
@@ -42,6 +43,18 @@ class NetworkArrays:
         channel_neuron: Neuron that bears each channel, ``(n_channels,)``.
         gates: The gates by slot and channel, slow slots first.
         n_slow: Number of slow slots.
+        firing_neuron: The neurons that spike, ``(n_firing,)``.
+        threshold_mV: Their resting thresholds, ``(n_firing,)``.
+        reset_mV: Their potentials after a spike, ``(n_firing,)``.
+        adaptation: Threshold gained per mV of depolarisation, ``(n_firing,)``.
+        adaptation_time_constant_ms: Shape ``(n_firing,)``.
+        rest_mV: Resting potentials of all neurons, ``(n_neurons,)``.
+        leak_conductance_uS: Leaks of all neurons, ``(n_neurons,)``.
+        release_source: For each distinct release, which of the firing neurons makes it, ``(n_releases,)``.
+        release_time_constant_ms: Shape ``(n_releases,)``.
+        release_increment: Shape ``(n_releases,)``.
+        modulated: Quantity and neuron of each modulation factor, ``n_modulated`` of them.
+        log_modulation: Logarithm of each factor when a terminal is open, ``(n_terminals, n_modulated)``.
         rectified_source: Higher side of each rectified gap junction, ``(n_rectified,)``.
         rectified_target: Its other side, same shape.
         has_gap_junctions: Whether the drive holds the plain potentials.
@@ -60,6 +73,18 @@ class NetworkArrays:
     channel_neuron: NDArray[np.intp]
     gates: tuple[tuple[Gate, ...], ...]
     n_slow: int
+    firing_neuron: NDArray[np.intp]
+    threshold_mV: Array
+    reset_mV: Array
+    adaptation: Array
+    adaptation_time_constant_ms: Array
+    rest_mV: Array
+    leak_conductance_uS: Array
+    release_source: NDArray[np.intp]
+    release_time_constant_ms: Array
+    release_increment: Array
+    modulated: tuple[tuple[Modulated, int], ...]
+    log_modulation: Array
     rectified_source: NDArray[np.intp]
     rectified_target: NDArray[np.intp]
     has_gap_junctions: bool
@@ -69,6 +94,7 @@ class NetworkArrays:
         """Returns where in the drive vector each kind of entry lies."""
         lengths = {
             "terminals": self.terminal_neuron.size,
+            "releases": self.release_source.size,
             "channels": self.channel_neuron.size,
             "rectified": self.rectified_source.size,
             "potentials": len(self.neurons) if self.has_gap_junctions else 0,
@@ -100,11 +126,24 @@ def build_arrays(network: Network) -> NetworkArrays:
     ]
     rectified = [junction for junction in junctions if junction[2].rectified]
     plain = [junction for junction in junctions if not junction[2].rectified]
-    terminals = sorted({(pre, s.threshold_mV, s.saturation_mV) for pre, _, s in synapses})
+    spiking = [
+        (index[c.source], index[c.target], c.kind) for c in network.connections if isinstance(c.kind, SpikingSynapse)
+    ]
+    modulatory = [
+        (index[c.source], index[c.target], c.kind) for c in network.connections if isinstance(c.kind, ModulatorySynapse)
+    ]
+    terminals = sorted({(pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory]})
+    releases = sorted({(pre, s.time_constant_ms, s.increment) for pre, _, s in spiking})
+    firing = {index[name]: neuron.firing for name, neuron in network.neurons.items() if neuron.firing is not None}
+    modulated: tuple[tuple[Modulated, int], ...] = tuple(sorted({(m.quantity, post) for _, post, m in modulatory}))
+    log_modulation = np.zeros((len(terminals), len(modulated)))
+    for pre, post, m in modulatory:
+        row = terminals.index((pre, m.threshold_mV, m.saturation_mV))
+        log_modulation[row, modulated.index((m.quantity, post))] += np.log(m.factor)
     channels = [(index[name], channel) for name, neuron in network.neurons.items() for channel in neuron.channels]
     gates, n_slow = _slots([channel for _, channel in channels])
 
-    sizes = (len(terminals), len(channels), len(rectified), n if plain else 0, 1, len(network.inputs))
+    sizes = (len(terminals), len(releases), len(channels), len(rectified), n if plain else 0, 1, len(network.inputs))
     starts = np.cumsum((0, *sizes))
     conductance = np.zeros((starts[-1], n))
     current = np.zeros((starts[-1], n))
@@ -113,21 +152,25 @@ def build_arrays(network: Network) -> NetworkArrays:
         row = terminals.index((pre, synapse.threshold_mV, synapse.saturation_mV))
         conductance[row, post] += synapse.conductance_uS
         current[row, post] += synapse.conductance_uS * synapse.reversal_mV
-    for row, (neuron, channel) in enumerate(channels, start=starts[1]):
+    for pre, post, synapse in spiking:
+        row = starts[1] + releases.index((pre, synapse.time_constant_ms, synapse.increment))
+        conductance[row, post] += synapse.conductance_uS
+        current[row, post] += synapse.conductance_uS * synapse.reversal_mV
+    for row, (neuron, channel) in enumerate(channels, start=starts[2]):
         conductance[row, neuron] = channel.conductance_uS
         current[row, neuron] = channel.conductance_uS * channel.reversal_mV
-    for row, (source, target, junction) in enumerate(rectified, start=starts[2]):
+    for row, (source, target, junction) in enumerate(rectified, start=starts[3]):
         current[row, target] += junction.conductance_uS
         current[row, source] -= junction.conductance_uS
-    one = starts[4]
+    one = starts[5]
     for source, target, junction in plain:
         for here, there in ((source, target), (target, source)):
-            current[starts[3] + there, here] += junction.conductance_uS
+            current[starts[4] + there, here] += junction.conductance_uS
             conductance[one, here] += junction.conductance_uS
     for i, neuron in enumerate(network.neurons.values()):
         conductance[one, i] += neuron.leak_conductance_uS
         current[one, i] += neuron.leak_conductance_uS * neuron.rest_mV + neuron.bias_nA
-    for row, targets in enumerate(network.inputs.values(), start=starts[5]):
+    for row, targets in enumerate(network.inputs.values(), start=starts[6]):
         for target in targets:
             current[row, index[target]] += 1.0
 
@@ -144,6 +187,18 @@ def build_arrays(network: Network) -> NetworkArrays:
         channel_neuron=_indices([neuron for neuron, _ in channels]),
         gates=gates,
         n_slow=n_slow,
+        firing_neuron=_indices(list(firing)),
+        threshold_mV=_frozen([f.threshold_mV for f in firing.values()]),
+        reset_mV=_frozen([f.reset_mV for f in firing.values()]),
+        adaptation=_frozen([f.adaptation for f in firing.values()]),
+        adaptation_time_constant_ms=_frozen([f.adaptation_time_constant_ms for f in firing.values()]),
+        rest_mV=_frozen([neuron.rest_mV for neuron in network.neurons.values()]),
+        leak_conductance_uS=_frozen([neuron.leak_conductance_uS for neuron in network.neurons.values()]),
+        release_source=_indices([list(firing).index(pre) for pre, _, _ in releases]),
+        release_time_constant_ms=_frozen([tau for _, tau, _ in releases]),
+        release_increment=_frozen([increment for _, _, increment in releases]),
+        modulated=modulated,
+        log_modulation=_frozen(log_modulation),
         rectified_source=_indices([source for source, _, _ in rectified]),
         rectified_target=_indices([target for _, target, _ in rectified]),
         has_gap_junctions=bool(plain),

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from annelid.errors import ConfigError, suggest
 from annelid.nervous.arrays import NetworkArrays, build_arrays
+from annelid.nervous.diagram import Diagram, draw_diagram, markdown_tables
 from annelid.nervous.neurons import Neuron
 from annelid.nervous.stepper import Scheme, Stepper
-from annelid.nervous.synapses import GapJunction, Synapse
+from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous.toml import read_network, write_network
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +22,7 @@ class Connection:
 
     source: str
     target: str
-    kind: Synapse | GapJunction
+    kind: ConnectionKind
 
 
 class Network:
@@ -79,12 +83,19 @@ class Network:
         self._neurons[name] = neuron
         self._initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
 
-    def add_synapse(self, source: str, target: str, synapse: Synapse) -> None:
-        """Adds a chemical synapse from one neuron onto another; several between the same two add up.
+    def add_synapse(self, source: str, target: str, synapse: Synapse | SpikingSynapse | ModulatorySynapse) -> None:
+        """Adds a graded, spiking or modulatory synapse from one neuron onto another.
+
+        The currents of several between the same two add up; factors of modulation multiply.
 
         Raises:
-            ConfigError: No neuron has one of the names; the sentence suggests the nearest.
+            ConfigError: No neuron has one of the names (the sentence suggests the nearest), or the source of a
+                spiking synapse does not spike.
         """
+        if isinstance(synapse, SpikingSynapse):
+            self._require_neuron(source)
+            if self._neurons[source].firing is None:
+                raise ConfigError(f"neuron {source!r} has no firing, and a spiking synapse needs a source that spikes")
         self._connect(source, target, synapse)
 
     def add_gap_junction(self, source: str, target: str, junction: GapJunction) -> None:
@@ -141,7 +152,42 @@ class Network:
         """
         return Stepper(self.arrays(), timestep_ms, scheme, n_worms)
 
-    def _connect(self, source: str, target: str, kind: Synapse | GapJunction) -> None:
+    def stable_timestep_ms(self) -> float:
+        """Returns the step above which an Euler step may overshoot and grow: the least ``2 C / G`` of all neurons.
+
+        G counts every synapse, channel and junction as fully open, and no modulation.
+
+        Raises:
+            ConfigError: The network has no neurons.
+        """
+        arrays = self.arrays()
+        total = arrays.weights[:, : len(arrays.neurons)].sum(axis=0)
+        total += np.abs(arrays.weights[arrays.drive_slices()["rectified"], len(arrays.neurons) :]).sum(axis=0)
+        return float(np.min(2.0 * arrays.capacitance_nF / np.maximum(total, np.finfo(float).tiny)))
+
+    def diagram(self) -> Diagram:
+        """Returns the network drawn: ``.graphviz`` (source text), ``.svg``, and ``.save(path)`` for either."""
+        return draw_diagram(self)
+
+    def table(self) -> str:
+        """Returns neurons, connections, inputs and outputs as Markdown tables."""
+        return markdown_tables(self)
+
+    def to_toml(self) -> str:
+        """Returns the network as TOML text, from which `from_toml` makes the same network to the last bit."""
+        return write_network(self)
+
+    @classmethod
+    def from_toml(cls, text: str) -> Network:
+        """Builds a network from TOML text as `to_toml` writes it; fields left out take their defaults.
+
+        Raises:
+            ConfigError: No valid TOML, an unknown or missing field, a value of the wrong type, or one that a neuron,
+                synapse or network refuses; the sentence names where.
+        """
+        return read_network(text, cls)
+
+    def _connect(self, source: str, target: str, kind: ConnectionKind) -> None:
         self._require_neuron(source)
         self._require_neuron(target)
         self._connections.append(Connection(source, target, kind))

@@ -1,4 +1,4 @@
-"""Non-spiking leaky neurons, with or without gated ion channels such as the persistent sodium channel.
+"""Leaky neurons, spiking or not, with or without gated ion channels such as the persistent sodium channel.
 
 Potentials in mV (relative to rest unless a neuron says otherwise), conductances in uS, currents in nA,
 capacitances in nF, times in ms: a consistent set, since uS mV = nA and nF mV / ms = nA.
@@ -90,8 +90,47 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
+class Firing:
+    """What makes a leaky integrator fire: a threshold, a reset, and a threshold that may adapt.
+
+    At the end of a step with ``U >= theta`` the neuron fires and U becomes the reset potential. The threshold follows
+    ``tau dtheta/dt = theta_0 - theta + adaptation (U - rest)``: a positive adaptation raises it with depolarisation,
+    so that a constant current fires ever more slowly, down to a steady rate. This is the spiking neuron of
+    SNS-Toolbox (Nourse et al. 2023), which resets to rest.
+
+    Under a constant current I without adaptation, ``U_inf = rest + I / Gm`` and the time between spikes is
+    ``C / Gm ln((U_inf - reset) / (U_inf - theta_0))``; below ``U_inf = theta_0`` the neuron is silent.
+
+    Attributes:
+        threshold_mV: theta_0, where the threshold starts and returns to.
+        reset_mV: Potential after a spike.
+        adaptation: Threshold gained per mV of lasting depolarisation; 0 for a fixed threshold.
+        adaptation_time_constant_ms: tau, time constant of the threshold.
+
+    Raises:
+        ConfigError: A reset at or above the threshold, or a time constant that is not positive.
+    """
+
+    threshold_mV: float = 1.0
+    reset_mV: float = 0.0
+    adaptation: float = 0.0
+    adaptation_time_constant_ms: float = 5.0
+
+    def __post_init__(self) -> None:
+        if not self.reset_mV < self.threshold_mV:
+            raise ConfigError(
+                f"a firing neuron's reset_mV must be below its threshold_mV = {self.threshold_mV}, not {self.reset_mV}"
+            )
+        if not self.adaptation_time_constant_ms > 0:
+            raise ConfigError(
+                "a firing neuron's adaptation_time_constant_ms must be positive, not "
+                f"{self.adaptation_time_constant_ms}"
+            )
+
+
+@dataclass(frozen=True, slots=True)
 class Neuron:
-    """A non-spiking leaky integrator, ``C dU/dt = -Gm (U - rest) + bias + synapses + channels + inputs``.
+    """A leaky integrator, ``C dU/dt = -Gm (U - rest) + bias + synapses + channels + inputs``.
 
     Attributes:
         capacitance_nF: Membrane capacitance C.
@@ -99,6 +138,7 @@ class Neuron:
         rest_mV: Potential that the leak pulls to.
         bias_nA: Constant current.
         channels: Gated ion channels.
+        firing: Threshold and reset of a spiking neuron; None for a non-spiking one.
 
     Raises:
         ConfigError: A capacitance that is not positive, or a negative leak.
@@ -109,6 +149,7 @@ class Neuron:
     rest_mV: float = 0.0
     bias_nA: float = 0.0
     channels: tuple[Channel, ...] = ()
+    firing: Firing | None = None
 
     def __post_init__(self) -> None:
         if not self.capacitance_nF > 0:

@@ -14,9 +14,9 @@ from functools import cached_property
 
 from annelid.errors import ConfigError
 from annelid.nervous import design
+from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Channel, Neuron, persistent_sodium
-from annelid.nervous.synapses import Synapse
+from annelid.nervous.neurons import Neuron
 
 ROLES = ("contraction", "expansion", "sensory", "relay")
 """The four neurons of a segment, in order: U1, U2, U3, U4 of the papers."""
@@ -55,46 +55,21 @@ class Conductances:
 
 
 @dataclass(frozen=True)
-class PeristalsisParameters:
-    """What the peristalsis network is designed from; the defaults are those of Riddle et al. 2022.
+class PeristalsisParameters(HalfCentre):
+    """What the peristalsis network is designed from: its half-centres, whose range and reversals serve all neurons.
 
-    Attributes:
-        capacitance_nF: Membrane capacitance C.
-        leak_conductance_uS: Leak conductance Gm.
-        range_mV: Operating range R.
-        bifurcation_mV: delta, where a fully inhibited half-centre neuron comes to rest.
-        offset_mV: How far beyond 0 and R a held half-centre lies.
-        inhibitory_reversal_mV: E_inh relative to rest.
-        excitatory_reversal_mV: E_ex relative to rest.
-        sodium_reversal_mV: E_Na relative to rest.
-        gate_slope_per_mV: Slope S of the sodium gates.
-        gate_time_constant_ms: tau_h,max, which sets the period.
+    The defaults are those of Riddle et al. 2022. Delta must be positive: a segment whose hold has ended contracts only
+    if its half-centre oscillates by itself.
 
     Raises:
         ConfigError: A parameter that is not positive, an inhibitory reversal that is not negative, or another
             reversal within the range that it has to drive a neuron through.
     """
 
-    capacitance_nF: float = 5.0
-    leak_conductance_uS: float = 1.0
-    range_mV: float = 20.0
-    bifurcation_mV: float = 0.01
-    offset_mV: float = 0.1
-    inhibitory_reversal_mV: float = -40.0
-    excitatory_reversal_mV: float = 194.0
-    sodium_reversal_mV: float = 110.0
-    gate_slope_per_mV: float = 0.05
-    gate_time_constant_ms: float = 300.0
-
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value, negative = getattr(self, field.name), field.name == "inhibitory_reversal_mV"
-            if not (value < 0 if negative else value > 0):
-                raise ConfigError(f"{field.name} must be {'negative' if negative else 'positive'}, not {value}")
-        held = self.range_mV + self.offset_mV
-        for name in ("excitatory_reversal_mV", "sodium_reversal_mV"):
-            if not getattr(self, name) > held:
-                raise ConfigError(f"{name} = {getattr(self, name)} must be above range_mV + offset_mV = {held:g}")
+        if not self.bifurcation_mV > 0:
+            raise ConfigError(f"bifurcation_mV must be positive, not {self.bifurcation_mV}")
+        super().__post_init__()
 
     @cached_property
     def conductances(self) -> Conductances:
@@ -105,33 +80,15 @@ class PeristalsisParameters:
         """
         leak, reach, offset = self.leak_conductance_uS, self.range_mV, self.offset_mV
         inhibitory, excitatory = self.inhibitory_reversal_mV, self.excitatory_reversal_mV
-        sodium = design.sodium_conductance(leak, reach, self._channel(1.0))
-        half_centre = design.half_centre_conductance(leak, self.bifurcation_mV, inhibitory, self._channel(sodium))
         relay_drive = design.relay_drive_conductance(leak, reach, offset, excitatory)
         return Conductances(
-            sodium=sodium,
-            half_centre=half_centre,
-            sensory_to_expansion=design.expansion_drive_conductance(
-                leak, reach, offset, half_centre, inhibitory, excitatory
-            ),
-            sensory_to_contraction=design.contraction_hold_conductance(leak, reach, offset, half_centre, inhibitory),
+            sodium=self.sodium_uS,
+            half_centre=self.inhibition_uS,
+            sensory_to_expansion=self.hold_up_uS,
+            sensory_to_contraction=self.hold_down_uS,
             expansion_to_relay=relay_drive,
             sensory_to_relay=design.relay_silencing_conductance(reach, offset, relay_drive, excitatory, inhibitory),
             relay_to_next_sensory=design.sensory_silencing_conductance(leak * reach, inhibitory),
-        )
-
-    @property
-    def sodium_channel(self) -> Channel:
-        """The persistent sodium channel of the half-centre's neurons."""
-        return self._channel(self.conductances.sodium)
-
-    def _channel(self, conductance_uS: float) -> Channel:
-        return persistent_sodium(
-            conductance_uS,
-            self.sodium_reversal_mV,
-            self.range_mV,
-            self.gate_slope_per_mV,
-            self.gate_time_constant_ms,
         )
 
 
@@ -161,34 +118,22 @@ def peristalsis_network(n_segments: int, parameters: PeristalsisParameters | Non
         raise ConfigError(f"n_segments must be at least 3, not {n_segments}")
     p = PeristalsisParameters() if parameters is None else parameters
     g = p.conductances
-    inhibitory, excitatory = p.inhibitory_reversal_mV, p.excitatory_reversal_mV
     leaky = Neuron(p.capacitance_nF, p.leak_conductance_uS)
-    half_centre = Neuron(p.capacitance_nF, p.leak_conductance_uS, channels=(p.sodium_channel,))
 
     network = Network(f"peristalsis of {n_segments} segments")
     for segment in range(1, n_segments + 1):
         first = segment == 1
         contraction, expansion, sensory, relay = (f"{role}_{segment}" for role in ROLES)
-        network.add_neuron(contraction, half_centre, p.range_mV if first else -p.offset_mV)
-        network.add_neuron(expansion, half_centre, 0.0 if first else p.range_mV + p.offset_mV)
+        held = (-p.offset_mV, p.range_mV + p.offset_mV)
+        add_half_centre(network, contraction, expansion, p, (p.range_mV, 0.0) if first else held)
         network.add_neuron(sensory, leaky, 0.0 if first else p.range_mV)
         network.add_neuron(relay, leaky, 0.0)
-        for source, target, conductance, reversal in (
-            (contraction, expansion, g.half_centre, inhibitory),
-            (expansion, contraction, g.half_centre, inhibitory),
-            (sensory, contraction, g.sensory_to_contraction, inhibitory),
-            (sensory, expansion, g.sensory_to_expansion, excitatory),
-            (sensory, relay, g.sensory_to_relay, inhibitory),
-            (expansion, relay, g.expansion_to_relay, excitatory),
-        ):
-            network.add_synapse(source, target, Synapse(conductance, reversal, 0.0, p.range_mV))
+        add_hold(network, sensory, down=contraction, up=expansion, half_centre=p)
+        network.add_synapse(sensory, relay, p.inhibitory(g.sensory_to_relay))
+        network.add_synapse(expansion, relay, p.excitatory(g.expansion_to_relay))
     for segment in range(1, n_segments + 1):
         following = segment % n_segments + 1
-        network.add_synapse(
-            f"relay_{segment}",
-            f"sensory_{following}",
-            Synapse(g.relay_to_next_sensory, inhibitory, 0.0, p.range_mV),
-        )
+        network.add_synapse(f"relay_{segment}", f"sensory_{following}", p.inhibitory(g.relay_to_next_sensory))
     for segment in range(1, n_segments + 1):
         network.add_input(f"stretch_{segment}", f"sensory_{segment}")
         network.add_output(f"contraction_{segment}", f"contraction_{segment}")

@@ -102,7 +102,7 @@ def export_network(network: Network) -> Any:
         MissingDependency: SNS-Toolbox or torch is not installed.
         ConfigError: Something the toolbox cannot say: two synapses between the same two neurons, an input
             into several neurons, a neuron without leak, or more than one instantaneous or two slow gates in
-            a channel; the sentence names it.
+            a channel, spiking neurons, or spiking or modulatory synapses; the sentence names it.
     """
     toolbox = _toolbox()
     _require_exportable(network)
@@ -131,8 +131,10 @@ def export_network(network: Network) -> Any:
                 e_lo=kind.threshold_mV,
                 e_hi=kind.saturation_mV,
             )
-        else:
+        elif isinstance(kind, GapJunction):
             synapse = toolbox.connections.ElectricalSynapse(kind.conductance_uS, rect=kind.rectified)
+        else:
+            continue
         exported.add_connection(synapse, connection.source, connection.target)
     for name, targets in network.inputs.items():
         exported.add_input(targets[0], name=name)
@@ -217,6 +219,8 @@ def _require_exportable(network: Network) -> None:
     if not network.neurons:
         raise ConfigError(f"network {network.name!r} has no neurons to export")
     for name, neuron in network.neurons.items():
+        if neuron.firing is not None:
+            raise ConfigError(f"neuron {name!r} spikes; only non-spiking networks can go over to SNS-Toolbox")
         if neuron.leak_conductance_uS == 0:
             raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
         for channel in neuron.channels:
@@ -228,6 +232,11 @@ def _require_exportable(network: Network) -> None:
     pairs = Counter()
     for connection in network.connections:
         kind = connection.kind
+        if not isinstance(kind, Synapse | GapJunction):
+            raise ConfigError(
+                f"{connection.source!r} and {connection.target!r} are joined by a {type(kind).__name__}; only graded "
+                "synapses and gap junctions can go over to SNS-Toolbox"
+            )
         symmetric = isinstance(kind, GapJunction) and not kind.rectified
         ends = (connection.source, connection.target)
         kind_of_pair = "synapse" if isinstance(kind, Synapse) else f"junction, rectified={kind.rectified}"

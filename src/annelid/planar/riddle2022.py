@@ -65,7 +65,7 @@ class Riddle2022Plant:
         self._height_m = np.full(self.n_segments, self._body.height_max_m)
         self._height_m[0] = self._body.height_min_m
         self._n_control_steps = 0
-        return self._sense()
+        return self.sense()
 
     def step(self, activation: Array) -> Sensation:
         """Advances by one control step.
@@ -76,12 +76,31 @@ class Riddle2022Plant:
         Returns:
             The sensation at its end.
         """
-        body = self._body
-        target = body.height_max_m - np.asarray(activation) * (body.height_max_m - body.height_min_m)
         self._n_control_steps += 1
-        for _ in range(self._ratio.physics_steps_due(self._n_control_steps)):
-            self._height_m += self._approach * (target - self._height_m)
-        return self._sense()
+        self._move(self._height_m, activation, self._n_control_steps)
+        return self.sense()
+
+    def sense(self) -> Sensation:
+        """Returns what the body feels at this instant."""
+        return self._sensation(self._height_m, self._n_control_steps)
+
+    def step_copies(self, states: State, activation: Array) -> State:
+        """Advances many copies by one control step at once, as `step` does one; changes nothing here.
+
+        Args:
+            states: As `get_state` returns them, the heights with one more axis in front, ``n_copies`` long.
+            activation: Shape ``(n_copies, n_segments)``.
+
+        Returns:
+            The states one step on.
+        """
+        height, n_control_steps = states["height"].astype(np.float64), int(states["n_control_steps"]) + 1
+        self._move(height, activation, n_control_steps)
+        return {"height": height, "n_control_steps": np.array(n_control_steps)}
+
+    def sense_copies(self, states: State) -> Sensation:
+        """Returns what many copies feel: every array with their axis in front, and one time for all."""
+        return self._sensation(states["height"].astype(np.float64), int(states["n_control_steps"]))
 
     def recordable(self) -> Recordable:
         """Names lengths, heights and the (absent) centre of mass."""
@@ -115,17 +134,24 @@ class Riddle2022Plant:
         self._height_m[...] = state["height"]
         self._n_control_steps = int(state["n_control_steps"])
 
+    def _move(self, height_m: Array, activation: Array, n_control_steps: int) -> None:
+        """Moves heights, ``(.., n_segments)``, in place by the physics steps that this control step completes."""
+        body = self._body
+        target = body.height_max_m - np.asarray(activation) * (body.height_max_m - body.height_min_m)
+        for _ in range(self._ratio.physics_steps_due(n_control_steps)):
+            height_m += self._approach * (target - height_m)
+
     def _length(self, height_m: Array) -> Array:
         return np.sqrt((2.0 * self._body.side_m) ** 2 - height_m * height_m)
 
-    def _sense(self) -> Sensation:
-        n = self.n_segments
+    def _sensation(self, height_m: Array, n_control_steps: int) -> Sensation:
+        copies = height_m.shape[:-1]
         return Sensation(
-            time_s=self._n_control_steps * self._ratio.control_timestep_s,
-            stretch_m=self._length(self._height_m)[:, np.newaxis],
-            rest_stretch_m=self._rest_length_m.copy(),
-            ring_length_m=self._height_m.copy(),
-            muscle_force_N=np.full(n, np.nan),
-            contact_force_N=np.zeros((n, 3)),
-            center_of_mass_m=np.full(3, np.nan),
+            time_s=n_control_steps * self._ratio.control_timestep_s,
+            stretch_m=self._length(height_m)[..., np.newaxis],
+            rest_stretch_m=self._rest_length_m + np.zeros((*copies, 1, 1)),
+            ring_length_m=height_m.copy(),
+            muscle_force_N=np.full(height_m.shape, np.nan),
+            contact_force_N=np.zeros((*height_m.shape, 3)),
+            center_of_mass_m=np.full((*copies, 3), np.nan),
         )

@@ -7,7 +7,18 @@ from typing import cast
 
 from numpy.typing import ArrayLike
 
-from annelid.config import PlanarBody, Program, RunConfig
+from annelid.config import (
+    Boxerbaum2012Body,
+    Daltorio2013Body,
+    HeteroclinicChannel,
+    PhaseChain,
+    PlanarBody,
+    Program,
+    RunConfig,
+    SineWave,
+    SnsController,
+    TimedWave,
+)
 from annelid.protocols import Controller, Plant, Sensation
 
 
@@ -21,6 +32,14 @@ def build_plant(config: RunConfig) -> Plant:
         from annelid.planar.riddle2022 import Riddle2022Plant
 
         return Riddle2022Plant(config.body, config.clock)
+    if isinstance(config.body, Daltorio2013Body):
+        from annelid.planar.daltorio2013 import Daltorio2013Plant
+
+        return Daltorio2013Plant(config.body, config.clock)
+    if isinstance(config.body, Boxerbaum2012Body):
+        from annelid.planar.boxerbaum2012 import Boxerbaum2012Plant
+
+        return Boxerbaum2012Plant(config.body, config.clock)
     from annelid.simulation.worm import WormPlant
 
     return WormPlant(config)
@@ -32,19 +51,27 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
-    if isinstance(config.controller, Program):
+    section, size = config.controller, (plant.n_segments, plant.n_muscles)
+    timestep_s = config.clock.control_timestep_s
+    if isinstance(section, SnsController):
+        from annelid.control.sns import SnsController as Controlled
+
+        return Controlled(section, config.sensor, *size, timestep_s)
+    if isinstance(section, Program):
         from annelid.control.program import ProgramController
 
-        return ProgramController(config.controller, plant.n_segments, plant.n_muscles)
-    from annelid.control.sns import SnsController
+        return ProgramController(section, *size)
+    if isinstance(section, SineWave | TimedWave):
+        from annelid.control.waves import SineController, TimedController
 
-    return SnsController(
-        config.controller,
-        config.sensor,
-        plant.n_segments,
-        plant.n_muscles,
-        config.clock.control_timestep_s,
-    )
+        return SineController(section, *size) if isinstance(section, SineWave) else TimedController(section, *size)
+    from annelid.control import oscillators
+
+    if isinstance(section, HeteroclinicChannel):
+        return oscillators.HeteroclinicController(section, *size, timestep_s)
+    if isinstance(section, PhaseChain):
+        return oscillators.PhaseChainController(section, *size, timestep_s)
+    return oscillators.AdaptiveController(section, config.sensor, *size, timestep_s)
 
 
 def as_controller(

@@ -1,4 +1,4 @@
-"""The planar worm, drawn with matplotlib from its recorded heights and lengths."""
+"""The planar worms, drawn with matplotlib from their recorded outlines, or from heights and lengths alone."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.config import Daltorio2013Body
 from annelid.errors import RunFileError
 from annelid.view.style import STYLE, activation_color
 
@@ -16,13 +17,15 @@ if TYPE_CHECKING:
 _DPI = 100
 _CM = 100.0
 _ROOM = 1.08
+_WALL = "0.75"
 
 
 class PlanarScene:
     """Pictures of a planar worm's run, used as a context manager like `WormScene`.
 
-    Each segment is a rhombus, from segment 1 on the left, coloured by its activation. The worm has no ground to
-    push against, so the pictures keep its middle in place.
+    Each segment is a rhombus, from segment 1 on the left, coloured by its activation. A worm that has forces is drawn
+    where it is, with its sides bent as they are and the walls of its pipe; a kinematic one has nothing to push
+    against, so the pictures keep its middle in place.
     """
 
     def __init__(self, run: Run, width: int, height: int) -> None:
@@ -37,8 +40,11 @@ class PlanarScene:
         self.times_s: NDArray[np.float64] = data["time"].values
         self._lengths = _CM * data["stretch_length"].values[:, :, 0]
         self._heights = _CM * data["ring_length"].values
+        self._outline = _CM * data["outline"].values if "outline" in data else None
         self._activation = data["activation"].values
         self._size = (width, height)
+        body = run.config.body
+        self._wall_height = _CM * body.pipe_diameter_m / 2 if isinstance(body, Daltorio2013Body) else None
 
     def __enter__(self) -> Self:
         import matplotlib
@@ -52,11 +58,14 @@ class PlanarScene:
             self._canvas = FigureCanvasAgg(figure)
             axes = figure.add_subplot()
             axes.set_aspect("equal")
-            axes.set_xlabel("along the body (cm)")
+            axes.set_xlabel("along the body (cm)" if self._outline is None else "x (cm)")
             axes.set_ylabel("height (cm)")
-            half_length = _ROOM * self._lengths.sum(axis=1).max() / 2
+            axes.set_xlim(*self._extent())
             half_height = _ROOM * self._heights.max() / 2
-            axes.set_xlim(-half_length, half_length)
+            if self._wall_height is not None:
+                half_height = max(half_height, 1.25 * self._wall_height)
+                axes.axhspan(self._wall_height, 2 * half_height, color=_WALL, linewidth=0, zorder=0)
+                axes.axhspan(-2 * half_height, -self._wall_height, color=_WALL, linewidth=0, zorder=0)
             axes.set_ylim(-half_height, half_height)
             self._title = axes.set_title(" ", animated=True)
             self._rhombi = [
@@ -87,7 +96,7 @@ class PlanarScene:
         Returns:
             Pixels, shape ``(height, width, 3)``.
         """
-        corners = rhombi(self._lengths[frame], self._heights[frame])
+        corners = self._corners(frame)
         for i, (patch, label) in enumerate(zip(self._rhombi, self._labels, strict=True)):
             patch.set_xy(corners[i])
             patch.set_facecolor(activation_color(float(self._activation[frame, i])))
@@ -97,6 +106,35 @@ class PlanarScene:
         for artist in (*self._rhombi, *self._labels, self._title):
             self._axes.draw_artist(artist)
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
+
+    def _corners(self, frame: int) -> NDArray[np.float64]:
+        if self._outline is None:
+            return rhombi(self._lengths[frame], self._heights[frame])
+        return bent_rhombi(self._outline[frame], len(self._rhombi))
+
+    def _extent(self) -> tuple[float, float]:
+        """Left and right limit of all pictures, cm."""
+        if self._outline is None:
+            half_length = _ROOM * float(self._lengths.sum(axis=1).max()) / 2
+            return -half_length, half_length
+        x = self._outline[:, :, 0]
+        margin = (_ROOM - 1) / 2 * float(np.ptp(x))
+        return float(x.min()) - margin, float(x.max()) + margin
+
+
+def bent_rhombi(outline: NDArray[np.float64], n_segments: int) -> NDArray[np.float64]:
+    """Closes each segment's part of the upper outline with its mirror image.
+
+    Args:
+        outline: Upper half of the worm, front tip to rear tip, shape ``(n_segments * n + 1, 2)``.
+        n_segments: Number of segments.
+
+    Returns:
+        Corners round each segment, shape ``(n_segments, 2 n, 2)``.
+    """
+    n = (len(outline) - 1) // n_segments
+    upper = outline[n * np.arange(n_segments)[:, np.newaxis] + np.arange(n + 1)]
+    return np.concatenate([upper, upper[:, -2:0:-1] * [1.0, -1.0]], axis=1)
 
 
 def rhombi(lengths: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -135,7 +135,7 @@ def _lengths(axes: Axes, run: Run, colors: list) -> None:
 def _segment_entries(colors: list) -> list[tuple]:
     """Legend entries of the segments, only the ends and the middle where there are many."""
     n = len(colors)
-    shown = range(n) if n <= 6 else (0, n // 2, n - 1)
+    shown = range(n) if n <= 4 else (0, n // 2, n - 1)
     return [(colors[i], "-", 3.0, f"segment {i + 1}") for i in shown]
 
 

@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import PlanarBody
+from annelid.config import PlanarWorm
 from annelid.errors import MissingDependency, RunFileError
 from annelid.view.output import whole_file, with_suffix
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560)}
-VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432)}
+FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1280, 320), "boxerbaum2012": (1280, 320)}
+VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
 """Width and height in pixels by the kind of body; a video's are multiples of 16, as its codec likes them."""
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
@@ -135,7 +135,7 @@ def render_video(
 
 
 def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> AbstractContextManager[Scene]:
-    if isinstance(run.config.body, PlanarBody):
+    if isinstance(run.config.body, PlanarWorm):
         from annelid.view.planar_scene import PlanarScene
 
         if camera is not None:

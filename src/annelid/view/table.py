@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarBody, fields_of, toml_value
+from annelid.config import PlanarWorm, fields_of, toml_value
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -63,7 +63,7 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
     table.add_column("this run", min_width=_NARROWEST_OURS, overflow="fold")
     if beside:
         table.add_column("published", overflow="fold")
-    for label, ours, field in _cells(numbers, planar=isinstance(config.body, PlanarBody)):
+    for label, ours, field in _cells(numbers, planar=isinstance(config.body, PlanarWorm)):
         theirs = _theirs(field, beside.get(field))
         if ours != UNKNOWN or theirs:
             table.add_row(label, ours, *([theirs] if beside else []))

@@ -7,11 +7,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.nervous import Connection, GapJunction, ModulatorySynapse, Network
 from annelid.view.canvas import WIDTH_IN, canvas, save_both
 from annelid.view.style import segment_colors
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-Effect = Literal["excitatory", "inhibitory", "gap junction", "rectified gap junction"]
+Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
 
 CAPTION = (
     "The network that controls the worm, drawn from the network object that the simulation steps: one column a "
@@ -31,58 +32,6 @@ CAPTION = (
 
 PAPER_SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
 """The paper's symbols of the four neurons of a segment, by the role in a neuron's name."""
-
-
-class Kind(Protocol):
-    """A synapse, which has a ``reversal_mV``, or a gap junction, which has not."""
-
-    @property
-    def conductance_uS(self) -> float:
-        """Largest conductance."""
-        ...
-
-
-class Link(Protocol):
-    """A connection between two named neurons."""
-
-    @property
-    def source(self) -> str:
-        """Name of the presynaptic neuron."""
-        ...
-
-    @property
-    def target(self) -> str:
-        """Name of the postsynaptic neuron."""
-        ...
-
-    @property
-    def kind(self) -> Kind:
-        """What connects them."""
-        ...
-
-
-class Wiring(Protocol):
-    """What the diagram needs to know; `annelid.Network` has it all."""
-
-    @property
-    def neurons(self) -> Mapping[str, Any]:
-        """The neurons by name."""
-        ...
-
-    @property
-    def connections(self) -> Sequence[Link]:
-        """The synapses and gap junctions."""
-        ...
-
-    @property
-    def inputs(self) -> Mapping[str, tuple[str, ...]]:
-        """The neurons that each input drives."""
-        ...
-
-    @property
-    def outputs(self) -> Mapping[str, str]:
-        """The neuron that each output reads."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -128,15 +77,17 @@ class Diagram:
     columns: dict[int, list[str]]
 
 
-def effect(network: Wiring, link: Link) -> Effect:
+def effect(network: Network, link: Connection) -> Effect:
     """Tells what a connection does: a synapse excites if its reversal potential lies above its target's rest."""
-    reversal_mV = getattr(link.kind, "reversal_mV", None)
-    if reversal_mV is None:
-        return "rectified gap junction" if getattr(link.kind, "rectified", False) else "gap junction"
-    return "excitatory" if reversal_mV > network.neurons[link.target].rest_mV else "inhibitory"
+    kind = link.kind
+    if isinstance(kind, ModulatorySynapse):
+        return "modulatory"
+    if isinstance(kind, GapJunction):
+        return "rectified gap junction" if kind.rectified else "gap junction"
+    return "excitatory" if kind.reversal_mV > network.neurons[link.target].rest_mV else "inhibitory"
 
 
-def lay_out(network: Wiring) -> Diagram:
+def lay_out(network: Network) -> Diagram:
     """Places neurons and leads connections around them.
 
     Names that all end in ``_<n>`` make one column for each n, its neurons row by row from the top in their order; other
@@ -157,7 +108,7 @@ def lay_out(network: Wiring) -> Diagram:
 
 
 def network_diagram(
-    axes: Axes, network: Wiring, symbols: Mapping[str, str] | None = None, *, conductances: bool = False
+    axes: Axes, network: Network, symbols: Mapping[str, str] | None = None, *, conductances: bool = False
 ) -> Diagram:
     """Draws any network into axes: each neuron, connection, input and output once.
 
@@ -186,7 +137,7 @@ def network_diagram(
         what = effect(network, link)
         gid = f"{'gap' if 'gap' in what else 'synapse'}-{index}"
         _draw_connection(axes, route, what, gid)
-        if conductances:
+        if conductances and not isinstance(link.kind, ModulatorySynapse):
             # A gap junction has its resistor in the middle.
             _write_conductance(axes, route, 0.2 if "gap" in what else 0.4, link.kind.conductance_uS)
     for stub in diagram.inputs:
@@ -212,7 +163,7 @@ def abbreviations(names: Iterable[str]) -> dict[str, str]:
 
 
 def figure_6_network_diagram(
-    network: Wiring, stem: Path, symbols: Mapping[str, str] = PAPER_SYMBOLS, *, conductances: bool = False
+    network: Network, stem: Path, symbols: Mapping[str, str] = PAPER_SYMBOLS, *, conductances: bool = False
 ) -> Path:
     """Draws a network with a key to its symbols.
 
@@ -259,6 +210,7 @@ _INHIBITORY, _EXCITATORY = segment_colors(2)
 _COLORS: dict[Effect, Any] = {
     "excitatory": _EXCITATORY,
     "inhibitory": _INHIBITORY,
+    "modulatory": "0.35",
     "gap junction": "0.35",
     "rectified gap junction": "0.35",
 }
@@ -299,7 +251,7 @@ def _on_circle(names: list[str]) -> dict[str, Array]:
     return {name: radius * np.array([np.cos(a), np.sin(a)]) for name, a in zip(names, angles, strict=True)}
 
 
-def _routes(network: Wiring, places: Mapping[str, Array], columns: Mapping[int, list[str]]) -> Iterable[Array]:
+def _routes(network: Network, places: Mapping[str, Array], columns: Mapping[int, list[str]]) -> Iterable[Array]:
     shared = Counter(frozenset((link.source, link.target)) for link in network.connections)
     taken: dict[frozenset[str], list[float]] = {}
     arrived: dict[str, list[float]] = {}
@@ -329,7 +281,7 @@ def _routes(network: Wiring, places: Mapping[str, Array], columns: Mapping[int, 
             yield paths[chosen]
 
 
-def _closes_the_ring(link: Link, places: Mapping[str, Array], columns: Mapping[int, list[str]]) -> bool:
+def _closes_the_ring(link: Connection, places: Mapping[str, Array], columns: Mapping[int, list[str]]) -> bool:
     """Whether a connection leads from the right end of a row in the last column to the left end of one in the first."""
     if len(columns) < 2:
         return False
@@ -397,7 +349,7 @@ def _self_loop(place: Array, outwards: float, number: int) -> Array:
     return loop[np.linalg.norm(loop - place, axis=1) >= _RADIUS]
 
 
-def _busy_directions(network: Wiring, places: Mapping[str, Array], routes: Sequence[Array]) -> dict[str, list[float]]:
+def _busy_directions(network: Network, places: Mapping[str, Array], routes: Sequence[Array]) -> dict[str, list[float]]:
     """Angles, seen from each neuron, at which there is a connection or a close neighbour."""
     busy: dict[str, list[float]] = {name: [] for name in places}
     for link, route in zip(network.connections, routes, strict=True):
@@ -501,7 +453,8 @@ def _draw_connection(axes: Axes, route: Array, what: Effect, gid: str | None = N
     forward = (tip - base) / np.hypot(*(tip - base)) if end_length else np.zeros(2)
     if gap:
         body = _with_resistor(body)
-    axes.plot(*body.T, color=color, linewidth=1.3, solid_joinstyle="miter", gid=gid, zorder=2)
+    dashes = "--" if what == "modulatory" else "-"
+    axes.plot(*body.T, dashes, color=color, linewidth=1.3, solid_joinstyle="miter", gid=gid, zorder=2)
     if what == "excitatory":
         base = tip - _TRIANGLE * forward
         across = 0.5 * _TRIANGLE * np.array([-forward[1], forward[0]])
@@ -510,6 +463,10 @@ def _draw_connection(axes: Axes, route: Array, what: Effect, gid: str | None = N
     elif what == "inhibitory":
         center = tip - _DOT * forward
         axes.add_patch(Circle((center[0], center[1]), _DOT, facecolor=color, edgecolor=color, zorder=3))
+    elif what == "modulatory":
+        middle, side = tip - _DOT * forward, _DOT * np.array([-forward[1], forward[0]])
+        corners = np.array([tip, middle + side, tip - 2.0 * _DOT * forward, middle - side])
+        axes.add_patch(Polygon(corners, facecolor="w", edgecolor=color, linewidth=1.2, zorder=3))
     elif what == "rectified gap junction":
         _draw_diode(axes, route, color)
 
@@ -569,14 +526,14 @@ def _write_beside(axes: Axes, stub: Stub) -> None:
     axes.text(x, y, stub.label, ha=across, va=along, fontsize=8, zorder=7)
 
 
-def _key(network: Wiring) -> list[str]:
+def _key(network: Network) -> list[str]:
     """What the key has to explain: only what the network has."""
     effects = {effect(network, link) for link in network.connections}
     gated = {bool(neuron.channels) for neuron in network.neurons.values()}
     present = {
         "neuron": False in gated,
         "neuron with gated channels": True in gated,
-        **{f"{what} synapse": what in effects for what in ("excitatory", "inhibitory")},
+        **{f"{what} synapse": what in effects for what in ("excitatory", "inhibitory", "modulatory")},
         **{what: what in effects for what in ("gap junction", "rectified gap junction")},
         "input current": bool(network.inputs),
         "output: potential read": bool(network.outputs),
@@ -584,7 +541,7 @@ def _key(network: Wiring) -> list[str]:
     return [entry for entry, there in present.items() if there]
 
 
-def _meanings(network: Wiring, symbols: Mapping[str, str]) -> list[str]:
+def _meanings(network: Network, symbols: Mapping[str, str]) -> list[str]:
     """Rows that say what is written into the neurons, where that is not their whole name."""
     short = abbreviations(network.neurons)
     pairs = [f"{symbols.get(role, short[role])}  {role}" for role in short if symbols.get(role, short[role]) != role]

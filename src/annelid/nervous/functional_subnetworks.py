@@ -1,0 +1,351 @@
+"""Functional subnetworks: small networks that add, subtract, multiply, divide, differentiate or integrate.
+
+After Szczecinski, Hunt and Quinn 2017, "A functional subnetwork approach to designing synthetic nervous systems that
+control legged robot locomotion". A signal is a potential between 0 and R. An input current I (nA) makes the potential
+``I / Gm`` (mV) of its neuron. With ``a = clip(U_pre / R, 0, 1)`` a neuron comes to rest at
+
+    U* = (sum_j g_j a_j E_j + I) / (Gm + sum_j g_j a_j),
+
+and each rule below solves this for the conductances at one corner of the range, where the operation is then exact; its
+docstring gives U* everywhere else. In division and multiplication the shunts bear a factor ``1 + g_1 / Gm`` that is
+often left out (for example by the modulation synapse of SNS-Toolbox): it makes the corner exact.
+
+Shunts make membranes fast: ask `Network.stable_timestep_ms` before choosing a step (0.4 ms for the default product).
+
+Every function adds to a given network under a prefix, or makes a network of its own, and returns it. Inputs and outputs
+are named as the neurons that they belong to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from annelid.errors import ConfigError
+from annelid.nervous.network import Network
+from annelid.nervous.neurons import Neuron
+from annelid.nervous.synapses import Synapse
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """How signals are carried: the membrane, the operating range and the reversal potentials, all relative to rest.
+
+    Attributes:
+        range_mV: Operating range R.
+        leak_conductance_uS: Leak conductance Gm.
+        capacitance_nF: Membrane capacitance C.
+        excitatory_mV: E_ex, above R.
+        inhibitory_mV: E_inh, below 0.
+
+    Raises:
+        ConfigError: A value with the wrong sign, or an excitatory reversal within the range.
+    """
+
+    range_mV: float = 20.0
+    leak_conductance_uS: float = 1.0
+    capacitance_nF: float = 5.0
+    excitatory_mV: float = 194.0
+    inhibitory_mV: float = -40.0
+
+    def __post_init__(self) -> None:
+        for name in ("range_mV", "leak_conductance_uS", "capacitance_nF"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive, not {getattr(self, name)}")
+        if not self.excitatory_mV > self.range_mV:
+            raise ConfigError(f"excitatory_mV must be above range_mV = {self.range_mV}, not {self.excitatory_mV}")
+        if not self.inhibitory_mV < 0:
+            raise ConfigError(f"inhibitory_mV must be negative, not {self.inhibitory_mV}")
+
+    @property
+    def neuron(self) -> Neuron:
+        """A leaky neuron with this membrane."""
+        return Neuron(self.capacitance_nF, self.leak_conductance_uS)
+
+    def synapse(self, conductance_uS: float, reversal_mV: float) -> Synapse:
+        """Returns a synapse that transmits between 0 and R."""
+        return Synapse(conductance_uS, reversal_mV, 0.0, self.range_mV)
+
+
+def transmission(gain: float = 1.0, signals: Signals | None = None) -> Synapse:
+    """Designs the synapse that transmits ``U_post = k U_pre``, which joins subnetworks to each other.
+
+    ``g = Gm k R / (E_ex - k R)``: exact at U_pre = 0 and R. In between ``U* = k U E / (E - k (R - U))``, too
+    much by ``k^2 U (R - U) / (E - k (R - U))``, at most about ``(k R)^2 / (4 E)``.
+
+    Args:
+        gain: k, so that k R stays below the excitatory reversal potential.
+        signals: How signals are carried.
+
+    Returns:
+        The synapse.
+
+    Raises:
+        ConfigError: A gain that is not positive, or too large for the reversal potential.
+    """
+    s = Signals() if signals is None else signals
+    greatest = s.excitatory_mV / s.range_mV
+    if not 0 < gain < greatest:
+        raise ConfigError(f"gain must be above 0 and below excitatory_mV / range_mV = {greatest:g}, not {gain}")
+    reach = gain * s.range_mV
+    return s.synapse(s.leak_conductance_uS * reach / (s.excitatory_mV - reach), s.excitatory_mV)
+
+
+def addition(
+    gains: Sequence[float] = (1.0, 1.0),
+    signals: Signals | None = None,
+    network: Network | None = None,
+    prefix: str = "",
+) -> Network:
+    """Builds ``U_sum = k_1 U_1 + k_2 U_2 + ..``, for sums within the range.
+
+    Every synapse is a transmission, ``g_j = Gm k_j R / (E_ex - k_j R)``. With equal gains and ``S = k sum U_j`` this
+    gives ``U* = E S / (E - k R + S)``: exact at 0 and where ``S = k R``, elsewhere off by ``S (k R - S) / (E - k R +
+    S)``, less the larger the reversal potential.
+
+    Neurons: ``term_1``, ``term_2``, .., ``sum``.
+
+    Args:
+        gains: k_j, one for each term.
+        signals: How signals are carried.
+        network: Where to add the subnetwork; default: a new network.
+        prefix: Put before every name.
+
+    Returns:
+        The network.
+
+    Raises:
+        ConfigError: No gains, a gain that `transmission` refuses, or a name that is taken.
+    """
+    s = Signals() if signals is None else signals
+    if not gains:
+        raise ConfigError("gains must have one entry for each term, and there is none")
+    terms = [f"term_{number}" for number in range(1, len(gains) + 1)]
+    synapses = [transmission(gain, s) for gain in gains]
+    target = _signal_neurons("addition", s, terms, "sum", network, prefix)
+    for term, synapse in zip(terms, synapses, strict=True):
+        target.add_synapse(prefix + term, f"{prefix}sum", synapse)
+    return target
+
+
+def subtraction(
+    gain: float = 1.0, signals: Signals | None = None, network: Network | None = None, prefix: str = ""
+) -> Network:
+    """Builds ``U_difference = k (U_plus - U_minus)``; a negative difference hyperpolarises.
+
+    ``g_plus`` is a transmission of gain k; ``g_minus = -g_plus E_ex / E_inh`` makes equal signals cancel
+    exactly. ``U* = g_plus E_ex (a_plus - a_minus) / (Gm + g_plus a_plus + g_minus a_minus)``: exact also at
+    U_plus = R, U_minus = 0, and too small in amount by up to the factor ``(1 + g_plus / Gm) / (1 + (g_plus + g_minus) /
+    Gm)`` otherwise, nearer to 1 the more negative E_inh.
+
+    Neurons: ``plus``, ``minus``, ``difference``.
+
+    Args:
+        gain: k.
+        signals: How signals are carried.
+        network: Where to add the subnetwork; default: a new network.
+        prefix: Put before every name.
+
+    Returns:
+        The network.
+
+    Raises:
+        ConfigError: A gain that `transmission` refuses, or a name that is taken.
+    """
+    s = Signals() if signals is None else signals
+    plus, minus = subtraction_synapses(gain, s)
+    target = _signal_neurons("subtraction", s, ("plus", "minus"), "difference", network, prefix)
+    target.add_synapse(f"{prefix}plus", f"{prefix}difference", plus)
+    target.add_synapse(f"{prefix}minus", f"{prefix}difference", minus)
+    return target
+
+
+def subtraction_synapses(gain: float = 1.0, signals: Signals | None = None) -> tuple[Synapse, Synapse]:
+    """Returns the excitatory and the inhibitory synapse of `subtraction`, and raises what it raises."""
+    s = Signals() if signals is None else signals
+    plus = transmission(gain, s)
+    return plus, s.synapse(-plus.conductance_uS * s.excitatory_mV / s.inhibitory_mV, s.inhibitory_mV)
+
+
+def division(
+    ratio: float = 0.1, signals: Signals | None = None, network: Network | None = None, prefix: str = ""
+) -> Network:
+    """Builds ``U_quotient = U_dividend / (1 + (1 / c - 1) U_divisor / R)``: a divisor at R leaves the share c.
+
+    The dividend is transmitted with gain 1 (g_1). The divisor's synapse has its reversal potential at rest, so it
+    only adds conductance: ``g_2 = (1 / c - 1) (Gm + g_1)``, from ``U* = c R`` with both at R. Then
+    ``U* = U_dividend / ((1 + gamma a_1) / (1 + gamma) + (1 / c - 1) a_2)``, ``gamma = g_1 / Gm``: exact for a dividend
+    at R whatever the divisor, and too large by at most the share ``gamma`` for smaller ones.
+
+    Neurons: ``dividend``, ``divisor``, ``quotient``.
+
+    Args:
+        ratio: c, between 0 and 1.
+        signals: How signals are carried.
+        network: Where to add the subnetwork; default: a new network.
+        prefix: Put before every name.
+
+    Returns:
+        The network.
+
+    Raises:
+        ConfigError: A ratio outside (0, 1), or a name that is taken.
+    """
+    s = Signals() if signals is None else signals
+    if not 0 < ratio < 1:
+        raise ConfigError(f"ratio must be above 0 and below 1, not {ratio}")
+    through = transmission(1.0, s)
+    shunt = s.synapse((1.0 / ratio - 1.0) * (s.leak_conductance_uS + through.conductance_uS), 0.0)
+    target = _signal_neurons("division", s, ("dividend", "divisor"), "quotient", network, prefix)
+    target.add_synapse(f"{prefix}dividend", f"{prefix}quotient", through)
+    target.add_synapse(f"{prefix}divisor", f"{prefix}quotient", shunt)
+    return target
+
+
+def multiplication(
+    residue_mV: float = 1.0, signals: Signals | None = None, network: Network | None = None, prefix: str = ""
+) -> Network:
+    """Builds ``U_product = U_1 U_2 / R`` by taking a division away.
+
+    An interneuron with a bias of ``Gm R`` shunts the product down to the residue r, where it would be 0; factor 2
+    inhibits the interneuron. With ``gamma = R / r - 1`` the shunt is ``gamma (Gm + g_1)`` to rest, as in `division`,
+    and the inhibition ``gamma Gm`` to ``-R / gamma`` (with r = R / 21: 20 uS and -1 mV). The interneuron rests
+    at ``R (1 - a_2) / (1 + gamma a_2)``, which makes the product linear in factor 2:
+    ``U* = U_1 (1 + gamma a_2) / (1 + gamma)`` for factor 1 at R. Its error is ``r a_1 (1 - a_2)``, beside that of the
+    transmission of factor 1, at most the share ``g_1 / Gm``.
+
+    Neurons: ``factor_1``, ``factor_2``, ``interneuron``, ``product``.
+
+    Args:
+        residue_mV: r, what is left of R times 0.
+        signals: How signals are carried.
+        network: Where to add the subnetwork; default: a new network.
+        prefix: Put before every name.
+
+    Returns:
+        The network.
+
+    Raises:
+        ConfigError: A residue that is not between 0 and R, or a name that is taken.
+    """
+    s = Signals() if signals is None else signals
+    if not 0 < residue_mV < s.range_mV:
+        raise ConfigError(f"residue_mV must be above 0 and below range_mV = {s.range_mV}, not {residue_mV}")
+    leak, reach = s.leak_conductance_uS, s.range_mV
+    gamma = reach / residue_mV - 1.0
+    through = transmission(1.0, s)
+    target = _signal_neurons("multiplication", s, ("factor_1", "factor_2"), "product", network, prefix)
+    target.add_neuron(f"{prefix}interneuron", Neuron(s.capacitance_nF, leak, bias_nA=leak * reach), reach)
+    target.add_synapse(f"{prefix}factor_1", f"{prefix}product", through)
+    target.add_synapse(f"{prefix}factor_2", f"{prefix}interneuron", s.synapse(gamma * leak, -reach / gamma))
+    shunt = s.synapse(gamma * (leak + through.conductance_uS), 0.0)
+    target.add_synapse(f"{prefix}interneuron", f"{prefix}product", shunt)
+    return target
+
+
+def differentiation(
+    gain_ms: float = 50.0,
+    fast_ms: float = 1.0,
+    amplification: float = 1.0,
+    signals: Signals | None = None,
+    network: Network | None = None,
+    prefix: str = "",
+) -> Network:
+    """Builds ``U_rate = k_d dU/dt``: the difference of a fast and a slow copy of the signal.
+
+    Both copies take the input current; their capacitances make them first-order lags of ``tau_fast`` and ``tau_slow =
+    tau_fast + k_d / k``. On a ramp they trail by their time constants, so ``U_fast - U_slow = (tau_slow - tau_fast)
+    dU/dt`` exactly; a `subtraction` of gain k follows, with its error. At the angular
+    frequency w the difference is ``w (tau_slow - tau_fast) / sqrt((1 + w^2 tau_fast^2) (1 + w^2 tau_slow^2))`` of the
+    signal: a differentiator below ``1 / tau_slow``, flat up to ``1 / tau_fast``.
+
+    Neurons: ``fast``, ``slow``, ``rate``; one input, ``signal``, drives the first two.
+
+    Args:
+        gain_ms: k_d.
+        fast_ms: tau_fast.
+        amplification: k, the gain of the subtraction; a larger one needs less delay for the same gain.
+        signals: How signals are carried.
+        network: Where to add the subnetwork; default: a new network.
+        prefix: Put before every name.
+
+    Returns:
+        The network.
+
+    Raises:
+        ConfigError: A time that is not positive, a gain that `transmission` refuses, or a name that is taken.
+    """
+    s = Signals() if signals is None else signals
+    for name, value in (("gain_ms", gain_ms), ("fast_ms", fast_ms)):
+        if not value > 0:
+            raise ConfigError(f"{name} must be positive, not {value}")
+    plus, minus = subtraction_synapses(amplification, s)
+    leak = s.leak_conductance_uS
+    target = Network("differentiation") if network is None else network
+    target.add_neuron(f"{prefix}fast", Neuron(fast_ms * leak, leak))
+    target.add_neuron(f"{prefix}slow", Neuron((fast_ms + gain_ms / amplification) * leak, leak))
+    target.add_neuron(f"{prefix}rate", s.neuron)
+    target.add_synapse(f"{prefix}fast", f"{prefix}rate", plus)
+    target.add_synapse(f"{prefix}slow", f"{prefix}rate", minus)
+    target.add_input(f"{prefix}signal", (f"{prefix}fast", f"{prefix}slow"))
+    target.add_output(f"{prefix}rate", f"{prefix}rate")
+    return target
+
+
+def integration(
+    rate_mV_per_nA_ms: float = 0.001, signals: Signals | None = None, network: Network | None = None, prefix: str = ""
+) -> Network:
+    """Builds ``dU_integral/dt = k_i I``: two neurons that hold whatever balance they are brought to.
+
+    Both have a bias ``Gm R`` and inhibit each other with ``g = -Gm R / E_inh``. Then,
+    within the range,
+
+        C dU_1/dt = Gm (R - U_1 - U_2) - g U_1 U_2 / R + I,  C dU_2/dt = Gm (R - U_1 - U_2) - g U_1 U_2 / R,
+
+    so every point of the curve ``R - U_1 - U_2 = (g / Gm) U_1 U_2 / R`` is an equilibrium, and ``U_1 - U_2`` integrates
+    ``I / C`` without error or leak. As U_1 goes from 0 to R, the difference goes from -R to R: with ``C = 1 / (2 k_i)``
+    the rate of U_1 is k_i I on average over the range, and ``2 (1 + eta U_1 / R) / (2 + eta (U_1 + U_2) / R)`` of that
+    at a point, ``eta = g / Gm``. At the ends of the range the integral stays. A current shifts both potentials by up to
+    ``I / (2 Gm)`` from the curve, so it must be small beside ``Gm R``.
+
+    Neurons: ``integral``, ``opposite``. The input ``signal`` (nA, of either sign) drives the first.
+
+    Args:
+        rate_mV_per_nA_ms: k_i.
+        signals: How signals are carried; its capacitance is not used.
+        network: Where to add the subnetwork; default: a new network.
+        prefix: Put before every name.
+
+    Returns:
+        The network, with an integral of 0.
+
+    Raises:
+        ConfigError: A rate that is not positive, or a name that is taken.
+    """
+    s = Signals() if signals is None else signals
+    if not rate_mV_per_nA_ms > 0:
+        raise ConfigError(f"rate_mV_per_nA_ms must be positive, not {rate_mV_per_nA_ms}")
+    leak, reach = s.leak_conductance_uS, s.range_mV
+    neuron = Neuron(0.5 / rate_mV_per_nA_ms, leak, bias_nA=leak * reach)
+    mutual = s.synapse(-leak * reach / s.inhibitory_mV, s.inhibitory_mV)
+    target = Network("integration") if network is None else network
+    target.add_neuron(f"{prefix}integral", neuron, 0.0)
+    target.add_neuron(f"{prefix}opposite", neuron, reach)
+    target.add_synapse(f"{prefix}integral", f"{prefix}opposite", mutual)
+    target.add_synapse(f"{prefix}opposite", f"{prefix}integral", mutual)
+    target.add_input(f"{prefix}signal", f"{prefix}integral")
+    target.add_output(f"{prefix}integral", f"{prefix}integral")
+    return target
+
+
+def _signal_neurons(
+    title: str, signals: Signals, inputs: Sequence[str], output: str, network: Network | None, prefix: str
+) -> Network:
+    """Adds the neurons that take part in a subnetwork, with an input into each first one and an output of the last."""
+    target = Network(title) if network is None else network
+    for name in (*inputs, output):
+        target.add_neuron(prefix + name, signals.neuron)
+    for name in inputs:
+        target.add_input(prefix + name, prefix + name)
+    target.add_output(prefix + output, prefix + output)
+    return target

@@ -1,0 +1,356 @@
+"""Half-centres: two neurons that inhibit each other and take turns, with their period as a thing to ask for.
+
+Each neuron bears a persistent sodium channel that keeps it at the operating range R once it is up, until the partner
+escapes from its inhibition. Whether it does is set by the bifurcation parameter delta (Szczecinski et al. 2017; Riddle
+et al. 2022), and how long it takes by the slow gate's time constant above all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.errors import ConfigError, suggest
+from annelid.nervous import design
+from annelid.nervous.network import Network
+from annelid.nervous.neurons import Array, Channel, Neuron, persistent_sodium
+from annelid.nervous.synapses import Synapse
+
+_TIMESTEP_MS = 1.0
+_CANDIDATES = 9
+_MAX_ROUNDS = 12
+# A neuron that has not escaped within this many gate time constants is taken to be held for good.
+_PATIENCE = 40.0
+
+
+@dataclass(frozen=True)
+class HalfCentre:
+    """What a half-centre is designed from; the defaults are those of Riddle et al. 2022.
+
+    Attributes:
+        capacitance_nF: Membrane capacitance C.
+        leak_conductance_uS: Leak conductance Gm.
+        range_mV: Operating range R.
+        bifurcation_mV: delta, where a fully inhibited neuron comes to rest: above 0 the half-centre oscillates by
+            itself, below 0 both of its states are stable.
+        offset_mV: How far below 0 and above R another neuron holds the half-centre (`add_hold`).
+        inhibitory_reversal_mV: E_inh relative to rest.
+        excitatory_reversal_mV: E_ex relative to rest.
+        sodium_reversal_mV: E_Na relative to rest.
+        gate_slope_per_mV: Slope S of the sodium gates.
+        gate_time_constant_ms: tau_h,max, which sets the period.
+
+    Raises:
+        ConfigError: A parameter that is not positive (of any sign: delta), an inhibitory reversal that is not
+            negative, or another reversal within the range that it has to drive a neuron through.
+    """
+
+    capacitance_nF: float = 5.0
+    leak_conductance_uS: float = 1.0
+    range_mV: float = 20.0
+    bifurcation_mV: float = 0.01
+    offset_mV: float = 0.1
+    inhibitory_reversal_mV: float = -40.0
+    excitatory_reversal_mV: float = 194.0
+    sodium_reversal_mV: float = 110.0
+    gate_slope_per_mV: float = 0.05
+    gate_time_constant_ms: float = 300.0
+
+    def __post_init__(self) -> None:
+        for field in fields(HalfCentre):
+            value, negative = getattr(self, field.name), field.name == "inhibitory_reversal_mV"
+            if field.name != "bifurcation_mV" and not (value < 0 if negative else value > 0):
+                raise ConfigError(f"{field.name} must be {'negative' if negative else 'positive'}, not {value}")
+        held = self.range_mV + self.offset_mV
+        for name in ("excitatory_reversal_mV", "sodium_reversal_mV"):
+            if not getattr(self, name) > held:
+                raise ConfigError(f"{name} = {getattr(self, name)} must be above range_mV + offset_mV = {held:g}")
+        if not self.bifurcation_mV > self.inhibitory_reversal_mV:
+            raise ConfigError(
+                f"bifurcation_mV = {self.bifurcation_mV} must be above inhibitory_reversal_mV = "
+                f"{self.inhibitory_reversal_mV}"
+            )
+
+    @property
+    def sodium_uS(self) -> float:
+        """G_Na, by `annelid.nervous.design.sodium_conductance`."""
+        return design.sodium_conductance(self.leak_conductance_uS, self.range_mV, self._channel(1.0))
+
+    @property
+    def inhibition_uS(self) -> float:
+        """g_CPG, by `annelid.nervous.design.half_centre_conductance`."""
+        return design.half_centre_conductance(
+            self.leak_conductance_uS, self.bifurcation_mV, self.inhibitory_reversal_mV, self.sodium_channel
+        )
+
+    @property
+    def hold_up_uS(self) -> float:
+        """Conductance that holds a neuron at R + offset, by `annelid.nervous.design.expansion_drive_conductance`."""
+        return design.expansion_drive_conductance(
+            self.leak_conductance_uS,
+            self.range_mV,
+            self.offset_mV,
+            self.inhibition_uS,
+            self.inhibitory_reversal_mV,
+            self.excitatory_reversal_mV,
+        )
+
+    @property
+    def hold_down_uS(self) -> float:
+        """Conductance that holds its partner down, by `annelid.nervous.design.contraction_hold_conductance`."""
+        return design.contraction_hold_conductance(
+            self.leak_conductance_uS, self.range_mV, self.offset_mV, self.inhibition_uS, self.inhibitory_reversal_mV
+        )
+
+    @property
+    def sodium_channel(self) -> Channel:
+        """The persistent sodium channel of both neurons."""
+        return self._channel(self.sodium_uS)
+
+    @property
+    def neuron(self) -> Neuron:
+        """Either of the two neurons."""
+        return Neuron(self.capacitance_nF, self.leak_conductance_uS, channels=(self.sodium_channel,))
+
+    def inhibitory(self, conductance_uS: float) -> Synapse:
+        """Returns an inhibitory synapse that transmits between 0 and R."""
+        return Synapse(conductance_uS, self.inhibitory_reversal_mV, 0.0, self.range_mV)
+
+    def excitatory(self, conductance_uS: float) -> Synapse:
+        """Returns an excitatory synapse that transmits between 0 and R."""
+        return Synapse(conductance_uS, self.excitatory_reversal_mV, 0.0, self.range_mV)
+
+    def _channel(self, conductance_uS: float) -> Channel:
+        return persistent_sodium(
+            conductance_uS,
+            self.sodium_reversal_mV,
+            self.range_mV,
+            self.gate_slope_per_mV,
+            self.gate_time_constant_ms,
+        )
+
+
+def add_half_centre(
+    network: Network,
+    first: str,
+    second: str,
+    half_centre: HalfCentre | None = None,
+    initial_mV: tuple[float, float] | None = None,
+) -> None:
+    """Adds two neurons that inhibit each other.
+
+    Args:
+        network: Where to add them.
+        first: Name of the neuron that starts up.
+        second: Name of the other.
+        half_centre: The design; default: that of Riddle et al. 2022.
+        initial_mV: Potentials at the start; default: R and 0.
+
+    Raises:
+        ConfigError: A name is taken, or the design gives a negative conductance.
+    """
+    p = HalfCentre() if half_centre is None else half_centre
+    up, down = (p.range_mV, 0.0) if initial_mV is None else initial_mV
+    network.add_neuron(first, p.neuron, up)
+    network.add_neuron(second, p.neuron, down)
+    network.add_synapse(first, second, p.inhibitory(p.inhibition_uS))
+    network.add_synapse(second, first, p.inhibitory(p.inhibition_uS))
+
+
+def add_hold(network: Network, holder: str, down: str, up: str, half_centre: HalfCentre | None = None) -> None:
+    """Lets a neuron hold a half-centre in one of its states: at R it brings one neuron down and the other up.
+
+    While it holds, they rest near ``-offset`` and ``R + offset``, beyond the reach of their oscillation, so that it
+    begins from the same state whenever the hold ends.
+
+    Args:
+        network: Where all three neurons are.
+        holder: The neuron that holds while it is up.
+        down: The neuron that is inhibited.
+        up: The neuron that is excited.
+        half_centre: The design; default: that of Riddle et al. 2022.
+
+    Raises:
+        ConfigError: No neuron has one of the names, or the design gives a negative conductance.
+    """
+    p = HalfCentre() if half_centre is None else half_centre
+    network.add_synapse(holder, down, p.inhibitory(p.hold_down_uS))
+    network.add_synapse(holder, up, p.excitatory(p.hold_up_uS))
+
+
+def half_centre_network(half_centre: HalfCentre | None = None) -> Network:
+    """Returns a network of one half-centre, neurons and outputs ``first`` and ``second``, each with an input."""
+    network = Network("half-centre")
+    add_half_centre(network, "first", "second", half_centre)
+    for name in ("first", "second"):
+        network.add_input(f"drive_{name}", name)
+        network.add_output(name, name)
+    return network
+
+
+def oscillation_periods(half_centres: Sequence[HalfCentre], duration_ms: float | None = None) -> Array:
+    """Measures the free-running periods of many half-centres at once, as one network in steps of 1 ms (Heun).
+
+    A period is the time between the last two instants at which the first neuron overtakes the second, interpolated
+    within the step; the first cycle is left out.
+
+    Args:
+        half_centres: The designs.
+        duration_ms: How long to wait at most for three such instants; default: 40 times the largest gate time
+            constant. The run ends as soon as all have had them.
+
+    Returns:
+        Periods, ms, ``(n,)``; infinite where there were fewer than three, hence for one that is held for good.
+
+    Raises:
+        ConfigError: A design gives a negative conductance, or there is none.
+    """
+    if not half_centres:
+        raise ConfigError("oscillation_periods needs at least one half-centre")
+    network = Network("half-centres")
+    for i, half_centre in enumerate(half_centres):
+        add_half_centre(network, f"first_{i}", f"second_{i}", half_centre)
+    if duration_ms is None:
+        duration_ms = _PATIENCE * max(p.gate_time_constant_ms for p in half_centres)
+    stepper = network.compile(_TIMESTEP_MS, "heun")
+    state = stepper.initial_state()
+    first, second = state.potential[0, ::2], state.potential[0, 1::2]
+    lead = first - second
+    instants: list[list[float]] = [[] for _ in half_centres]
+    for step in range(int(duration_ms / _TIMESTEP_MS)):
+        stepper.advance(state)
+        before, lead = lead, first - second
+        overtaken = (before < 0.0) & (lead >= 0.0)
+        if not overtaken.any():
+            continue
+        for i in np.flatnonzero(overtaken):
+            instants[i].append(_TIMESTEP_MS * (step + before[i] / (before[i] - lead[i])))
+        if all(len(times) >= 3 for times in instants):
+            break
+    return np.array([times[-1] - times[-2] if len(times) >= 3 else np.inf for times in instants])
+
+
+def half_centre_of_period(
+    period_ms: float,
+    half_centre: HalfCentre | None = None,
+    parameter: str = "gate_time_constant_ms",
+    bounds: tuple[float, float] | None = None,
+    tolerance: float = 1e-3,
+) -> HalfCentre:
+    """Finds the value of one parameter with which a half-centre oscillates at a wanted period.
+
+    Args:
+        period_ms: The wanted period.
+        half_centre: The design whose other parameters are kept; default: that of Riddle et al. 2022.
+        parameter: Which field of `HalfCentre` to vary.
+        bounds: Least and greatest value to try; default: a tenth and ten times the present one.
+        tolerance: Relative error of the period at which to stop.
+
+    Returns:
+        The design with that parameter.
+
+    Raises:
+        ConfigError: An unknown parameter, bounds that are not in order or of one sign, or a period that cannot be had
+            within them: the sentence tells the range that can.
+    """
+    base = HalfCentre() if half_centre is None else half_centre
+    names = [field.name for field in fields(HalfCentre)]
+    if parameter not in names:
+        raise ConfigError(f"unknown parameter {parameter!r} of a half-centre: {suggest(parameter, names)}")
+    if bounds is None:
+        present = getattr(base, parameter)
+        bounds = (min(0.1 * present, 10.0 * present), max(0.1 * present, 10.0 * present))
+
+    def periods_of(values: Array, duration_ms: float | None) -> Array:
+        periods = np.full(values.size, np.inf)
+        found: list[tuple[int, HalfCentre]] = []
+        for i, value in enumerate(values):
+            try:
+                candidate = replace(base, **{parameter: float(value)})
+                half_centre_network(candidate)
+            except ConfigError:
+                continue
+            found.append((i, candidate))
+        if found:
+            periods[[i for i, _ in found]] = oscillation_periods([design for _, design in found], duration_ms)
+        return periods
+
+    value = find_period(periods_of, period_ms, bounds, tolerance, parameter)
+    return replace(base, **{parameter: value})
+
+
+def find_period(
+    periods_of: Callable[[Array, float | None], Array],
+    period_ms: float,
+    bounds: tuple[float, float],
+    tolerance: float = 1e-3,
+    parameter: str = "parameter",
+) -> float:
+    """Finds the value of a parameter at which something oscillates with a wanted period.
+
+    Each round measures nine values at once, evenly spaced in the logarithm, and goes on between the two neighbours
+    that have the wanted period between them: a bracket shrinks eightfold a round, and the period need not be monotone.
+
+    Args:
+        periods_of: Takes values ``(n,)`` and the longest time to simulate, ms (None: as long as it takes), and
+            returns periods, ms, ``(n,)``, infinite where there is no oscillation within that time.
+        period_ms: The wanted period.
+        bounds: Least and greatest value, both positive or both negative.
+        tolerance: Relative error of the period at which to stop.
+        parameter: What to call the parameter in an error.
+
+    Returns:
+        The value.
+
+    Raises:
+        ConfigError: Bounds that are not in order or of one sign, a period or tolerance that is not positive, or a
+            period that is not attained: the sentence tells the range that is.
+    """
+    low, high = bounds
+    if not (low < high and low * high > 0):
+        raise ConfigError(f"the bounds of {parameter} must be in ascending order and of one sign, not {bounds}")
+    if not (period_ms > 0 and np.isfinite(period_ms) and tolerance > 0):
+        raise ConfigError(f"period_ms and tolerance must be positive, not {period_ms} and {tolerance}")
+    # Slower ones need not be waited for, unless nothing else tells them from silent ones.
+    patience: float | None = 5.0 * period_ms
+    values = np.geomspace(low, high, _CANDIDATES)
+    periods = periods_of(values, patience)
+    if not _brackets_surely(periods, period_ms):
+        patience = None
+        periods = periods_of(values, patience)
+    seen = periods[np.isfinite(periods)]
+    for _ in range(_MAX_ROUNDS):
+        errors = np.abs(periods / period_ms - 1.0)
+        best = int(np.argmin(errors))
+        if errors[best] <= tolerance:
+            return float(values[best])
+        brackets = _straddling(periods, period_ms)
+        if not brackets.size:
+            break
+        left = brackets[0]
+        values = np.geomspace(values[left], values[left + 1], _CANDIDATES)
+        periods = periods_of(values, patience)
+        seen = np.concatenate([seen, periods[np.isfinite(periods)]])
+    if not seen.size:
+        raise ConfigError(f"nothing oscillates with {parameter} from {low:g} to {high:g}")
+    raise ConfigError(
+        f"a period of {period_ms:g} ms cannot be had with {parameter} from {low:g} to {high:g}: the periods found "
+        f"there go from {seen.min():.4g} to {seen.max():.4g} ms"
+    )
+
+
+def _straddling(periods: Array, wanted: float) -> NDArray[np.intp]:
+    """Places i where the wanted period lies between periods i and i + 1: those between two finite ones first."""
+    above = periods > wanted
+    places = np.flatnonzero(above[:-1] != above[1:])
+    silent = ~np.isfinite(periods)
+    return places[np.argsort(silent[places] | silent[places + 1], kind="stable")]
+
+
+def _brackets_surely(periods: Array, wanted: float) -> bool:
+    finite = np.isfinite(periods)
+    places = _straddling(periods, wanted)
+    return bool((finite[places] & finite[places + 1]).any())

@@ -1,0 +1,124 @@
+"""The half-centre under a drive: frequency over the documented range, and its limit of slow motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.errors import ConfigError
+from annelid.nervous import (
+    PeristalsisParameters,
+    adaptive_half_centre,
+    adaptive_peristalsis_network,
+    drive_conductance_uS,
+    half_period_ms,
+    peristalsis_network,
+)
+
+PAPER = PeristalsisParameters()
+
+
+def periods_ms(parameters: PeristalsisParameters, drives: np.ndarray, timestep_ms: float, seconds: float):
+    """Mean and spread of the period of free half-centres side by side, each at its drive, ms."""
+    stepper = adaptive_half_centre(parameters).compile(timestep_ms, "heun", len(drives))
+    current = drives[:, np.newaxis] * parameters.leak_conductance_uS * parameters.range_mV
+    trace = stepper.run(np.broadcast_to(current, (round(1e3 * seconds / timestep_ms), *current.shape)))
+    difference = trace[..., 0] - trace[..., 1]
+    mean, spread = [], []
+    for u in difference.T:
+        before = np.flatnonzero((u[1:] > 0) & (u[:-1] <= 0))
+        rises = before - u[before] / (u[before + 1] - u[before])
+        intervals = np.diff(rises)[1:] * timestep_ms
+        assert intervals.size > 1
+        mean.append(intervals.mean())
+        spread.append(intervals.std())
+    return np.array(mean), np.array(spread)
+
+
+def test_frequency_rises_over_the_whole_documented_range_at_least_2_5_fold() -> None:
+    mean, spread = periods_ms(PAPER, np.linspace(0.0, 1.0, 21), 1.0, 8.0)
+    assert (np.diff(mean) < 0).all()
+    assert (spread < 1e-3 * mean).all()
+    assert mean[0] / mean[-1] >= 2.5
+    # As the module's docstring states.
+    assert 1e3 / mean[[0, -1]] == pytest.approx([0.62, 1.86], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        replace(PAPER, gate_time_constant_ms=150.0),
+        replace(PAPER, gate_time_constant_ms=600.0),
+        replace(PAPER, bifurcation_mV=0.003),
+        replace(PAPER, bifurcation_mV=0.05),
+        replace(PAPER, capacitance_nF=2.0),
+        replace(PAPER, capacitance_nF=8.0),
+        replace(PAPER, inhibitory_reversal_mV=-60.0),
+        replace(PAPER, excitatory_reversal_mV=100.0),
+    ],
+)
+def test_frequency_stays_monotone_when_the_constants_change(parameters: PeristalsisParameters) -> None:
+    mean, _ = periods_ms(parameters, np.linspace(0.0, 1.0, 8), 1.0, 16.0)
+    assert (np.diff(mean) < 0).all()
+    assert mean[0] / mean[-1] > 2.0
+
+
+def test_without_capacitance_the_period_is_that_of_slow_motion() -> None:
+    """The gap to the limit closes in proportion to a power of the capacitance; at 1 % of it, within 1.5 %."""
+    drives = np.array([0.2, 0.5, 1.0])
+    limit = np.array([2 * half_period_ms(float(d)) for d in drives])
+    gaps = []
+    for capacitance, timestep_ms in ((0.5, 0.25), (0.1, 0.05)):
+        mean, _ = periods_ms(replace(PAPER, capacitance_nF=capacitance), drives, timestep_ms, 2.6)
+        gaps.append(mean / limit - 1)
+    assert (np.abs(gaps[1]) < 0.015).all()
+    assert (np.abs(gaps[1]) < 0.5 * np.abs(gaps[0])).all()
+
+
+@settings(max_examples=8, deadline=None)
+@given(drive=st.floats(0.0, 0.95), scale=st.floats(0.2, 5.0))
+def test_slow_motion_scales_with_the_gate_and_quickens_with_the_drive(drive: float, scale: float) -> None:
+    here = half_period_ms(drive)
+    slower = replace(PAPER, gate_time_constant_ms=300.0 * scale)
+    assert half_period_ms(drive, slower) == pytest.approx(scale * here, rel=1e-6)
+    assert half_period_ms(drive + 0.05) < here
+
+
+def test_drive_1_takes_over_its_share_of_the_current_at_the_threshold() -> None:
+    g, d = PAPER.conductances, drive_conductance_uS(share=0.3)
+    channel = PAPER.sodium_channel
+    sodium = channel.conductance_uS * float(channel.instant_gates[0].steady(0.0)) * channel.reversal_mV
+
+    def gate_at_zero(drive_uS: float) -> float:
+        inhibition = g.half_centre * PAPER.inhibitory_reversal_mV
+        return -(inhibition + drive_uS * PAPER.excitatory_reversal_mV) / sodium
+
+    assert gate_at_zero(d) == pytest.approx(0.7 * gate_at_zero(0.0), rel=1e-12)
+
+
+def test_without_drive_the_network_is_the_peristalsis_network() -> None:
+    rng = np.random.default_rng(0)
+    inputs = np.repeat(rng.uniform(0, 20, (40, 4)), 25, axis=0)
+    plain = peristalsis_network(3).compile(1.0).run(inputs)
+    driven = adaptive_peristalsis_network(3).compile(1.0).run(np.c_[inputs, np.zeros(len(inputs))])
+    np.testing.assert_allclose(driven[:, 0, :-1], plain[:, 0], rtol=1e-12, atol=1e-12)
+    assert not driven[:, 0, -1].any()
+
+
+def test_the_descending_neuron_is_a_leaky_integrator_of_its_input() -> None:
+    stepper = adaptive_peristalsis_network(3, drive_time_constant_ms=50.0).compile(0.1)
+    inputs = np.zeros((1000, 5))
+    inputs[:, -1] = 12.0
+    potential = stepper.run(inputs)[:, 0, -1]
+    time = np.arange(1001) * 0.1
+    np.testing.assert_allclose(potential, 12.0 * (1 - np.exp(-time / 50.0)), atol=0.02)
+
+
+@pytest.mark.parametrize("drive", [-0.1, 1.1, float("nan")])
+def test_a_drive_outside_its_range_is_refused(drive: float) -> None:
+    with pytest.raises(ConfigError, match=r"drive must be in 0 \.\. 1"):
+        half_period_ms(drive)

@@ -1,0 +1,235 @@
+"""Networks as TOML, Markdown, Graphviz source and SVG."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.errors import ConfigError
+from annelid.nervous import (
+    Channel,
+    Firing,
+    GapJunction,
+    Gate,
+    ModulatorySynapse,
+    Network,
+    Neuron,
+    PeristalsisParameters,
+    SpikingSynapse,
+    Synapse,
+    peristalsis_network,
+)
+
+any_float = st.floats(allow_nan=False, allow_infinity=False)
+positive = st.floats(1e-300, 1e300)
+conductance = st.floats(0, 1e300)
+gate = st.builds(Gate, any_float, any_float, positive, any_float, st.none() | positive)
+channel = st.builds(Channel, conductance, any_float, st.lists(gate, max_size=3).map(tuple))
+firing = st.builds(
+    lambda reset, above, m, tau: Firing(above, reset, m, tau), st.floats(-9, 0), st.floats(1, 9), any_float, positive
+)
+neuron = st.builds(
+    Neuron, positive, conductance, any_float, any_float, st.lists(channel, max_size=2).map(tuple), st.none() | firing
+)
+ends = st.floats(-50, 0), st.floats(1, 50)
+kind = st.one_of(
+    st.builds(Synapse, conductance, any_float, *ends),
+    st.builds(GapJunction, conductance, st.booleans()),
+    st.builds(SpikingSynapse, conductance, any_float, positive, st.floats(0.01, 1)),
+    st.builds(ModulatorySynapse, st.sampled_from(["leak", "channels", "membrane", "gates"]), positive, *ends),
+)
+# All characters that text can hold, quotes, line ends and delete among them.
+words = st.text(st.characters(exclude_categories=["Cs"]) | st.sampled_from('"\\\n\r\t\x00\x7f|#='), max_size=8)
+
+
+@st.composite
+def networks(draw) -> Network:
+    network = Network(draw(words))
+    names = draw(st.lists(words, max_size=4, unique=True))
+    for name in names:
+        network.add_neuron(name, draw(neuron), draw(any_float))
+    if names:
+        name = st.sampled_from(names)
+        for source, target, what in draw(st.lists(st.tuples(name, name, kind), max_size=5)):
+            if isinstance(what, GapJunction):
+                network.add_gap_junction(source, target, what)
+            elif not isinstance(what, SpikingSynapse) or network.neurons[source].firing is not None:
+                network.add_synapse(source, target, what)
+        for entry in draw(st.lists(words, max_size=2, unique=True)):
+            network.add_input(entry, draw(st.lists(name, max_size=3)))
+        for entry in draw(st.lists(words, max_size=2, unique=True)):
+            network.add_output(entry, draw(name))
+    return network
+
+
+def contents(network: Network):
+    return (
+        network.name,
+        list(network.neurons.items()),
+        list(network.initial_mV.items()),
+        network.connections,
+        list(network.inputs.items()),
+        list(network.outputs.items()),
+    )
+
+
+@settings(deadline=None, max_examples=150)
+@given(network=networks())
+def test_toml_round_trip_is_exact(network):
+    text = network.to_toml()
+    again = Network.from_toml(text)
+    assert contents(again) == contents(network)
+    assert again.to_toml() == text
+
+
+def test_peristalsis_network_survives_with_every_bit():
+    network = peristalsis_network(6, PeristalsisParameters(bifurcation_mV=0.1 / 3.0))
+    assert contents(Network.from_toml(network.to_toml())) == contents(network)
+
+
+def test_fields_left_out_take_their_defaults_and_whole_numbers_are_numbers():
+    network = Network.from_toml(
+        """
+        [[neuron]]
+        name = "a"
+        rest_mV = -60
+        [[neuron.channels]]
+        conductance_uS = 1
+        reversal_mV = 110
+
+        [[connection]]
+        source = "a"
+        target = "a"
+        kind = "gap_junction"
+        conductance_uS = 0.5
+        """
+    )
+    assert network.neurons["a"] == Neuron(rest_mV=-60.0, channels=(Channel(1.0, 110.0),))
+    assert network.initial_mV["a"] == -60.0
+    assert network.connections[0].kind == GapJunction(0.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name = ", "not valid TOML"),
+        ("nam = 'x'", "unknown field 'nam': did you mean 'name'"),
+        ("name = 3", "name must be a string"),
+        ("neuron = 3", r"neuron must be an array of tables, \[\[neuron\]\]"),
+        ("neuron = [3]", "neuron 1 must be a table"),
+        ("[[neuron]]\nrest_mV = 1.0", "neuron 1: name is missing"),
+        ("[[neuron]]\nname = 'a'\nrest = 1.0", r"neuron 1 \('a'\): unknown field 'rest': did you mean 'rest_mV'"),
+        ("[[neuron]]\nname = 'a'\nrest_mV = true", "rest_mV must be a number, not True"),
+        ("[[neuron]]\nname = 'a'\ncapacitance_nF = -1", r"neuron 1 \('a'\): .*capacitance_nF must be positive"),
+        ("[[neuron]]\nname = 'a'\nchannels = 1", "channels must be an array of tables"),
+        ("[[neuron]]\nname = 'a'\nfiring = 1", "firing must be a table"),
+        ("[[neuron]]\nname = 'a'\n[[neuron.channels]]\nreversal_mV = 1", "conductance_uS is missing"),
+        ("[[neuron]]\nname = 'a'\n[[neuron]]\nname = 'a'", "'a' exists already"),
+        ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'synaps'", "did you mean 'synapse'"),
+        ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'synapse'", "conductance_uS is missing"),
+        ("[[input]]\nname = 'i'\ntargets = 'a'", "targets must be a list of names"),
+        ("[[input]]\nname = 'i'\ntargets = ['b']", "unknown neuron 'b'"),
+        ("[[output]]\nname = 'o'", "output 1 .'o'.: source is missing"),
+        ("[[output]]\nname = 'o'\nsource = 'a'\nunit = 'mV'", "unknown field 'unit'"),
+        (
+            "[[neuron]]\nname = 'a'\n[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'gap_junction'\n"
+            "conductance_uS = 1.0\nrectified = 1",
+            "rectified must be true or false",
+        ),
+    ],
+)
+def test_faulty_texts_are_refused(text, message):
+    with pytest.raises(ConfigError, match=message):
+        Network.from_toml(text)
+
+
+def small_network() -> Network:
+    network = Network("a & b <small>")
+    network.add_neuron("up", Neuron(channels=(Channel(1.0, 110.0, (Gate(0.1, time_constant_ms=300.0),)),)))
+    network.add_neuron("down|side", Neuron(firing=Firing(5.0, adaptation=0.5)))
+    network.add_neuron('say "x"', Neuron(rest_mV=-60.0))
+    network.add_synapse("up", "down|side", Synapse(0.5, 194.0))
+    network.add_synapse("down|side", "up", SpikingSynapse(0.25, -40.0))
+    network.add_synapse('say "x"', "up", ModulatorySynapse("gates", 3.0))
+    network.add_synapse("up", 'say "x"', Synapse(0.125, -50.0))
+    network.add_gap_junction("up", 'say "x"', GapJunction(0.75, rectified=True))
+    network.add_gap_junction("down|side", 'say "x"', GapJunction(0.75))
+    network.add_synapse("up", "up", Synapse(0.1, -40.0))
+    network.add_input("stimulus", ["up", "down|side"])
+    network.add_output("read", "up")
+    return network
+
+
+def test_graphviz_source_names_every_neuron_and_connection():
+    source = small_network().diagram().graphviz
+    assert source.startswith('digraph "a & b <small>" {')
+    assert source.count("{") == source.count("}")
+    assert r'n2 [label="say \"x\"", shape=circle, peripheries=1];' in source
+    assert "shape=octagon" in source
+    arrows = re.findall(r'n(\d) -> n(\d) \[label="([^"]*)".*arrowhead=(\w+)', source)
+    assert arrows == [
+        ("0", "1", "0.5 uS", "empty"),
+        ("1", "0", "0.25 uS", "dot"),
+        ("2", "0", "gates × 3", "box"),
+        # Above the target's rest of -60 mV: it excites.
+        ("0", "2", "0.125 uS", "empty"),
+        ("0", "2", "0.75 uS", "diamond"),
+        ("1", "2", "0.75 uS", "none"),
+        ("0", "0", "0.1 uS", "dot"),
+    ]
+    assert source.count("i0 -> ") == 2
+    assert "n0 -> o0" in source
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@settings(deadline=None, max_examples=60)
+@given(network=networks())
+def test_svg_is_well_formed_and_holds_everything_within_its_frame(network):
+    root = ElementTree.fromstring(network.diagram().svg)
+    left, top, width, height = map(float, root.attrib["viewBox"].split())
+    assert len(root.findall(f"{SVG}path")) == len(network.connections)
+    for circle in root.findall(f"{SVG}circle"):
+        x, y, r = (float(circle.attrib[key]) for key in ("cx", "cy", "r"))
+        assert left <= x - r <= x + r <= left + width
+        assert top <= y - r <= y + r <= top + height
+
+
+def test_every_neuron_of_a_worm_has_a_place_of_its_own_in_the_svg():
+    root = ElementTree.fromstring(peristalsis_network(4).diagram().svg)
+    centers = {(c.attrib["cx"], c.attrib["cy"]) for c in root.findall(f"{SVG}circle") if float(c.attrib["r"]) > 10}
+    assert len(centers) == 16
+    labels = [t.text for t in root.findall(f"{SVG}text")]
+    assert {"contraction_1", "relay_4", "stretch_3", "kick"} <= set(labels)
+
+
+def test_saving_and_showing_a_diagram(tmp_path):
+    diagram = small_network().diagram()
+    for name in ("a.svg", "a.dot", "a.gv"):
+        text = diagram.save(tmp_path / name).read_text(encoding="utf-8")
+        assert text == (diagram.svg if name.endswith("svg") else diagram.graphviz)
+    assert diagram._repr_svg_() == diagram.svg
+    with pytest.raises(ConfigError, match=r"'a\.png'"):
+        diagram.save(tmp_path / "a.png")
+
+
+def test_table_lists_all_with_units_and_escapes_bars():
+    table = small_network().table()
+    assert "| neuron | C (nF) | Gm (uS) | rest (mV) | bias (nA) | start (mV) | also |" in table
+    assert "| down\\|side | 5 | 1 | 0 | 0 | 0 | fires at 5 mV, reset to 0 mV, adaptation 0.5 |" in table
+    assert "| up | down\\|side | excitatory | 0.5 | 194 | 0 to 20 mV |" in table
+    assert '| say "x" | up | modulatory |  |  | gates × 3, 0 to 20 mV |' in table
+    assert "| stimulus | up, down\\|side |" in table
+    for line in table.splitlines():
+        if line.startswith("|"):
+            assert len(re.findall(r"(?<!\\)\|", line)) in {3, 7, 8}
+
+
+def test_a_changed_neuron_shows_in_the_table():
+    network = Network()
+    network.add_neuron("a", replace(Neuron(), bias_nA=3.5))
+    assert "| a | 5 | 1 | 0 | 3.5 | 0 |  |" in network.table()

@@ -1,0 +1,81 @@
+"""The dynamic planar worms under the paper's network: order, run file, and pictures."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from annelid import Run, load_config, simulate, summary
+from annelid.view.planar_scene import PlanarScene, bent_rhombi, rhombi
+
+PRESETS = ("daltorio2013", "boxerbaum2012")
+
+
+@pytest.fixture(scope="module", params=PRESETS)
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    config = load_config(request.param, {"body.n_segments": 3, "duration_s": 4.0, "clock.physics_timestep_s": 0.002})
+    return simulate(config, tmp_path_factory.mktemp(request.param) / "run", progress=False)
+
+
+def test_segments_contract_in_order_at_the_network_s_pace(run: Run) -> None:
+    numbers = summary(run)
+    assert numbers.order[:4] == [1, 2, 3, 1]
+    # After the start, in which segment 1 is still at rest and its sensor held off, each takes 875 ms.
+    assert np.diff(numbers.onsets_s)[2:] == pytest.approx(0.875, abs=0.01)
+
+
+def test_the_run_file_closes_the_books(run: Run) -> None:
+    data = run.data
+    energy = (data["kinetic_energy"] + data["elastic_energy"]).values
+    work = data["muscle_work"].sum("muscle").values
+    lost = data["damping_loss"].values + (data["slip_loss"].sum("segment").values if "slip_loss" in data else 0.0)
+    assert np.abs(energy - energy[0] - work + lost).max() < 2e-3 * work[-1]
+    assert np.diff(data["damping_loss"].values).min() >= 0.0
+
+
+def test_only_the_worm_in_the_pipe_travels_and_slips(run: Run) -> None:
+    in_pipe = run.config.body.kind == "daltorio2013"
+    travel = summary(run).travel_m
+    assert travel is not None
+    assert (travel < -0.02) if in_pipe else (abs(travel) < 1e-5)
+    assert ("slip_loss" in run.data) == ("contact_force" in run.data) == in_pipe
+
+
+def test_pictures_show_the_contracted_segment_red_and_in_its_place(run: Run) -> None:
+    activation = run.data["activation"].values
+    middles = []
+    with PlanarScene(run, 640, 192) as scene:
+        for segment in range(3):
+            others = np.delete(activation, segment, axis=1).max(axis=1)
+            pixels = scene.picture(int(np.argmax(activation[:, segment] - others))).astype(int)
+            red = (pixels[..., 0] > 180) & (pixels[..., 1] < 90) & (pixels[..., 2] < 90)
+            assert red.sum() > 1000
+            middles.append(np.flatnonzero(red.any(axis=0)).mean())
+    assert np.all(np.diff(middles) > 80)
+
+
+def test_an_outline_of_rhombi_closes_to_rhombi(run: Run) -> None:
+    if run.config.body.kind != "daltorio2013":
+        pytest.skip("the sides of this worm bend")
+    data = run.data.isel(time=-1)
+    found = bent_rhombi(data["outline"].values, 3)
+    expected = rhombi(data["stretch_length"].values[:, 0], data["ring_length"].values)
+    assert found - found[0, 0] == pytest.approx(expected - expected[0, 0], abs=1e-12)
+    for left, right in pairwise(found):
+        assert left[2] == pytest.approx(right[0])
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_continued_run_equals_the_whole_bit_for_bit(preset: str, tmp_path: Path) -> None:
+    def config(duration_s: float):
+        return load_config(preset, {"body.n_segments": 3, "duration_s": duration_s})
+
+    first = simulate(config(0.2), tmp_path / "1", progress=False)
+    second = simulate(config(0.4), tmp_path / "2", resume=first, progress=False)
+    whole = simulate(config(0.4), tmp_path / "3", progress=False).data
+    for name in ("outline", "activation", "muscle_work", "damping_loss", "kinetic_energy"):
+        joined = np.concatenate([first.data[name].values, second.data[name].values])
+        assert np.array_equal(joined, whole[name].values), name

@@ -17,7 +17,7 @@ from annelid.errors import ConfigError
 from annelid.nervous import Network
 from annelid.nervous.neurons import Neuron, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
-from annelid.nervous.synapses import GapJunction, Synapse
+from annelid.nervous.synapses import GapJunction, ModulatorySynapse, Synapse
 from annelid.view.figures import muscle_surface, network_diagram, planar_models, robot_lengths
 
 
@@ -190,7 +190,7 @@ def test_figure_5_and_its_caption(rings: Rings, tmp_path: Path) -> None:
 
 
 def own_network() -> Network:
-    """Everything a network can have: both synapses, both gap junctions, twins, a self-connection, a shifted rest."""
+    """Everything a network can have: three kinds of synapses, both gap junctions, twins, a self-connection, a shifted rest."""
     network = Network("own")
     sodium = Neuron(channels=(persistent_sodium(1.0),))
     for name, neuron in {
@@ -207,6 +207,7 @@ def own_network() -> Network:
     network.add_synapse("sensor", "command", Synapse(0.3, 194.0))
     network.add_synapse("sensor", "command", Synapse(0.2, -40.0))
     network.add_synapse("sensor", "sensor", Synapse(0.2, 100.0))
+    network.add_synapse("command", "right", ModulatorySynapse("leak", 2.0))
     network.add_gap_junction("command", "left", GapJunction(0.5))
     network.add_gap_junction("command", "motor", GapJunction(0.5, rectified=True))
     network.add_input("touch", ("sensor", "command"))

@@ -190,7 +190,7 @@ def test_figure_5_and_its_caption(rings: Rings, tmp_path: Path) -> None:
 
 
 def own_network() -> Network:
-    """Everything a network can have: three kinds of synapses, both gap junctions, twins, a self-connection, a shifted rest."""
+    """Everything a network can have: synapses, gap junctions, twins, a self-connection, a shifted rest."""
     network = Network("own")
     sodium = Neuron(channels=(persistent_sodium(1.0),))
     for name, neuron in {

@@ -40,15 +40,28 @@ def lengths_of_pieces(outline: np.ndarray) -> np.ndarray:
 # Figure 1
 
 
-@pytest.fixture(scope="module")
-def posture() -> tuple[np.ndarray, np.ndarray]:
-    return planar_models.contracted_posture(load_config("riddle2022-planar"), 1)
+def outline_of(preset: str) -> np.ndarray:
+    return planar_models.contracted_outline(load_config(preset, {"body.n_segments": 3}), 1)
 
 
-def test_the_plants_posture_obeys_the_rhombus(posture: tuple[np.ndarray, np.ndarray]) -> None:
-    height, length = posture
+def test_the_kinematic_plant_s_outline_obeys_the_rhombus_and_moves_no_neighbour() -> None:
+    outline = outline_of("riddle2022-planar")
+    height, length = 2 * outline[:, 1, 1], outline[:, 2, 0] - outline[:, 0, 0]
     assert height == pytest.approx([0.11, 0.065, 0.11], abs=1e-6)
     assert height**2 + length**2 == pytest.approx(4 * 0.073**2, rel=1e-12)
+
+
+@pytest.mark.parametrize(("preset", "n_corners"), [("daltorio2013", 3), ("boxerbaum2012", 5)])
+def test_the_other_plants_outlines_keep_their_sides_join_and_draw_neighbours_along(preset: str, n_corners: int) -> None:
+    config = load_config(preset, {"body.n_segments": 3})
+    outline = outline_of(preset)
+    assert outline.shape == (3, n_corners, 2)
+    assert lengths_of_pieces(outline).sum(axis=1) == pytest.approx(2 * config.body.side_m)  # type: ignore[union-attr]
+    assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
+    assert outline[0, 0] == pytest.approx([0.0, 0.0])
+    height = outline[:, n_corners // 2, 1]
+    assert height[1] < 0.8 * height[0]
+    assert height[0] == pytest.approx(height[2], rel=0.02)
 
 
 @pytest.mark.parametrize("n", [1, 3, 6])
@@ -59,45 +72,6 @@ def test_rigid_rhombi_keep_their_sides_and_join(n: int) -> None:
     assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
     assert outline[:, 1, 1] == pytest.approx(height / 2)
     assert np.all(outline[:, [0, -1], 1] == 0)
-
-
-@pytest.mark.parametrize("n", [1, 3, 6])
-def test_bent_sides_keep_their_halves_and_go_straight_through_joints(n: int) -> None:
-    height = np.random.default_rng(n).uniform(0.075, 0.11, n)
-    outline = planar_models.bent_outline(height, 0.073)
-    assert lengths_of_pieces(outline) == pytest.approx(0.073 / 2)
-    assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
-    assert outline[:, 2, 1] == pytest.approx(height / 2)
-    before, after = outline[:-1, -1] - outline[:-1, -2], outline[1:, 1] - outline[1:, 0]
-    assert before == pytest.approx(after * [1, -1])
-
-
-def test_equal_heights_bend_no_side() -> None:
-    height = np.full(4, 0.09)
-    bent = planar_models.bent_outline(height, 0.073)
-    assert bent[:, ::2] == pytest.approx(planar_models.rigid_outline(height, np.sqrt(4 * 0.073**2 - height**2)))
-
-
-def test_sides_too_short_to_follow_are_refused() -> None:
-    with pytest.raises(ConfigError, match="neighbouring heights"):
-        planar_models.bent_outline(np.array([0.14, 0.02, 0.14]), 0.073)
-
-
-def test_joints_draw_neighbours_along() -> None:
-    height, side = np.array([0.11, 0.11, 0.065, 0.11, 0.11]), 0.073
-    free = planar_models.coupled_heights(height, side, 2, 0.0)
-    soft, stiff = (planar_models.coupled_heights(height, side, 2, coupling) for coupling in (0.5, 1e7))
-    assert free == pytest.approx(height)
-    assert stiff == pytest.approx(0.065, rel=1e-5)
-    assert soft == pytest.approx(soft[::-1])
-    assert soft[2] == pytest.approx(0.065)
-    assert 0.065 < soft[1] < soft[0] < 0.11
-
-
-def test_a_free_joint_is_in_balance() -> None:
-    height, side, coupling = np.array([0.11, 0.1, 0.065]), 0.073, 0.7
-    own, angle = (np.arcsin(h / (2 * side)) for h in (height, planar_models.coupled_heights(height, side, 2, coupling)))
-    assert angle[1] - own[1] == pytest.approx(coupling * (angle[0] + angle[2] - 2 * angle[1]))
 
 
 def test_symbols_of_springs_span_what_they_should() -> None:
@@ -112,12 +86,12 @@ def test_symbols_of_springs_span_what_they_should() -> None:
 
 
 def test_figure_1(tmp_path: Path) -> None:
-    assert_two_good_files(planar_models.figure_1_planar_models(load_config("riddle2022-planar"), tmp_path / "figure_1"))
+    assert_two_good_files(planar_models.figure_1_planar_models(tmp_path / "figure_1"))
 
 
-def test_figure_1_needs_a_planar_body(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="planar body"):
-        planar_models.figure_1_planar_models(load_config("riddle2023-rods"), tmp_path / "figure_1")
+def test_figure_1_needs_planar_bodies() -> None:
+    with pytest.raises(ConfigError, match="3D"):
+        planar_models.contracted_outline(load_config("riddle2023-rods"), 1)
 
 
 # Figure 5

@@ -9,11 +9,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from annelid.analysis.paper import published
-from annelid.config import WormBody, load_config
+from annelid.config import WormBody
 from annelid.errors import ConfigError, suggest
 from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.simulation.runfile import Run
-from annelid.studies.case import CHAIN, FAST, PLANAR, RODS, Case
+from annelid.studies.case import CHAIN, FAST, RODS, Case
 from annelid.studies.claims import Evidence, claim_cases, paper_claims
 from annelid.studies.contents import Claim, Examined, Figure, Report
 from annelid.studies.examination import Effort, Examination, Findings, Results, Table
@@ -115,7 +115,7 @@ def _stage(progress: Progress, stage: str) -> Callable[[int, int, float], object
 def _figure_1(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
     from annelid.view.figures.planar_models import CAPTION, figure_1_planar_models
 
-    figure_1_planar_models(load_config(PLANAR), stem)
+    figure_1_planar_models(stem)
     return CAPTION
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import PlanarBody, RunConfig
+from annelid.config import PlanarWorm, RunConfig, load_config
 from annelid.errors import ConfigError
+from annelid.protocols import Records
 from annelid.simulation import build_plant
 from annelid.view.canvas import canvas, save_both
 from annelid.view.style import panel_title, segment_colors
@@ -20,42 +21,46 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CAPTION = (
-    "Three planar models of worm segments with the middle segment contracted: a) Riddle et al. 2022, hinged rhombi of "
-    "rigid sides, whose heights w and lengths l (as the planar plant gives them) obey l² + w² = 4 l_s², so that the "
-    "neighbours keep their shape; b) Daltorio et al., with torsional springs at the joints between segments, which "
+    "Three planar models of worm segments, each as its planar plant rests with the middle segment contracted: a) "
+    "Riddle et al. 2022, hinged rhombi of rigid sides, whose heights w and lengths l obey l² + w² = 4 l_s², so that "
+    "the neighbours keep their shape; b) Daltorio et al., with torsional springs at the joints between segments, which "
     "resist differences in height and draw the neighbours along; c) Boxerbaum et al., with torsional springs in the "
-    "middle of the otherwise rigid sides, which bend there and pass straight through the joints. All are drawn with "
-    "contractile actuators and axial return springs; the postures of b and c illustrate the geometry and are not "
-    "solutions of those models."
+    "middle of the otherwise rigid sides, which bend there. All have contractile actuators and axial return springs."
 )
 
+N_SEGMENTS = 3
 _CM = 100.0
 _SETTLING_TIME_S = 3.0
-_COUPLING = 0.6
 
 
-def contracted_posture(config: RunConfig, contracted: int) -> tuple[Array, Array]:
-    """Lets the planar plant contract one segment until it rests.
+def contracted_outline(config: RunConfig, contracted: int) -> Array:
+    """Lets a planar plant contract one segment until it rests.
 
     Args:
         config: A configuration with a planar body.
         contracted: Index of the segment, from 0.
 
     Returns:
-        Heights and lengths of the segments, each of shape ``(n_segments,)``, m.
+        Upper half of each segment from front to rear, shape ``(n_segments, n_corners, 2)``, m; the front tip at x = 0.
 
     Raises:
         ConfigError: The body is not a planar one.
     """
+    if not isinstance(config.body, PlanarWorm):
+        raise ConfigError(f"figure 1 is drawn of planar bodies, and {config.name!r} has a body in 3D")
     plant = build_plant(config)
-    if not isinstance(config.body, PlanarBody):
-        raise ConfigError(f"figure 1 is drawn of a planar body, and {config.name!r} has a body in 3D")
     activation = np.zeros(plant.n_muscles)
     activation[contracted] = 1.0
     sensation = plant.reset(0)
     for _ in range(round(_SETTLING_TIME_S / config.clock.control_timestep_s)):
         sensation = plant.step(activation)
-    return sensation.ring_length_m, sensation.stretch_m[:, 0]
+    signals = plant.read(False) if isinstance(plant, Records) else {}
+    if "outline" not in signals:
+        return rigid_outline(sensation.ring_length_m, sensation.stretch_m[:, 0])
+    upper = np.asarray(signals["outline"], dtype=float)
+    pieces = (len(upper) - 1) // plant.n_segments
+    corners = pieces * np.arange(plant.n_segments)[:, np.newaxis] + np.arange(pieces + 1)
+    return (upper - [upper[0, 0], 0.0])[corners]
 
 
 def rigid_outline(height_m: Array, length_m: Array) -> Array:
@@ -72,58 +77,6 @@ def rigid_outline(height_m: Array, length_m: Array) -> Array:
     outline = np.zeros((len(height_m), 3, 2))
     outline[:, 0, 0], outline[:, 2, 0] = front[:-1], front[1:]
     outline[:, 1] = np.column_stack([front[:-1] + length_m / 2.0, height_m / 2.0])
-    return outline
-
-
-def coupled_heights(height_m: Array, side_m: float, contracted: int, coupling: float) -> Array:
-    """Heights of rhombi whose joints resist differences between the angles of neighbours' sides.
-
-    The angles minimise ``sum (angle - own angle)^2 + coupling sum (angle - next angle)^2``, that of the contracted
-    segment being held.
-
-    Args:
-        height_m: Heights without coupling, shape ``(n_segments,)``.
-        side_m: Side of a rhombus.
-        contracted: Index of the segment whose height is held.
-        coupling: Stiffness of the joints relative to that of the segments.
-
-    Returns:
-        Shape ``(n_segments,)``, m.
-    """
-    own = np.arcsin(height_m / (2.0 * side_m))
-    n = len(own)
-    differences = np.diff(np.eye(n), axis=0)
-    stiffness = np.eye(n) + coupling * differences.T @ differences
-    stiffness[contracted] = np.eye(n)[contracted]
-    return 2.0 * side_m * np.sin(np.linalg.solve(stiffness, own))
-
-
-def bent_outline(height_m: Array, side_m: float) -> Array:
-    """Places segments whose sides bend in their middle, each of two rigid halves.
-
-    Two neighbours' sides meet at a joint under the same angle, whose sine is the mean of those of the two rhombi; the
-    other half of each side makes up for the height. Free ends stay as they are.
-
-    Args:
-        height_m: Shape ``(n_segments,)``.
-        side_m: Length of a side, both halves together.
-
-    Returns:
-        Upper half of each, shape ``(n_segments, 5, 2)``: front joint, middle of a side, top, middle, rear joint, m.
-
-    Raises:
-        ConfigError: Neighbours differ so much in height that a half side would be too short.
-    """
-    unbent = height_m / (2.0 * side_m)
-    between = (unbent[:-1] + unbent[1:]) / 2.0
-    front, rear = np.concatenate([unbent[:1], between]), np.concatenate([between, unbent[-1:]])
-    # Sines of the four half sides from front to rear, rising to the top and falling from it.
-    rise = np.stack([front, 2.0 * unbent - front, rear - 2.0 * unbent, -rear], axis=1)
-    if np.any(np.abs(rise) > 1.0):
-        raise ConfigError("neighbouring heights differ by more than sides that bend in their middle can follow")
-    steps = side_m / 2.0 * np.stack([np.sqrt(1.0 - rise**2), rise], axis=-1)
-    outline = np.concatenate([np.zeros((len(unbent), 1, 2)), np.cumsum(steps, axis=1)], axis=1)
-    outline[1:, :, 0] += np.cumsum(outline[:-1, -1, 0])[:, np.newaxis]
     return outline
 
 
@@ -155,42 +108,35 @@ def spiral(center: Array, radius: float, turns: float = 2.25) -> Array:
     return center + radius * share[:, np.newaxis] * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def figure_1_planar_models(config: RunConfig, stem: Path) -> Path:
-    """Draws the three models with the middle segment contracted.
+def figure_1_planar_models(stem: Path) -> Path:
+    """Draws the three models with the middle segment contracted, each from its own plant.
 
     Args:
-        config: A configuration with a planar body, for its sides and its heights.
         stem: Path of the two files without their suffixes.
 
     Returns:
         The path of the PNG file; the SVG file lies beside it.
-
-    Raises:
-        ConfigError: The body is not a planar one.
     """
-    contracted = config.body.n_segments // 2
-    height, length = contracted_posture(config, contracted)
-    side = float(np.hypot(height[0], length[0]) / 2.0)
-    coupled = coupled_heights(height, side, contracted, _COUPLING)
+    contracted = N_SEGMENTS // 2
     outlines = {
-        "a) Riddle et al.": rigid_outline(height, length),
-        "b) Daltorio et al.": rigid_outline(coupled, np.sqrt((2.0 * side) ** 2 - coupled**2)),
-        "c) Boxerbaum et al.": bent_outline(height, side),
+        title: contracted_outline(load_config(preset, {"body.n_segments": N_SEGMENTS}), contracted)
+        for title, preset in _PANELS.items()
     }
+    rigid, coupled, bent = outlines.values()
     with canvas(3.35) as figure:
         panels = figure.subplots(2, 2).ravel()
         half_width = 1.09 * max(_CM * outline[-1, -1, 0] for outline in outlines.values()) / 2.0
-        half_height = 1.29 * _CM * height.max() / 2.0
+        half_height = 1.29 * _CM * max(outline[..., 1].max() for outline in outlines.values())
         for axes, (title, outline) in zip(panels, outlines.items(), strict=False):
             points = _CM * outline
             _draw_worm(axes, points, contracted)
             middle = points[-1, -1, 0] / 2.0
             axes.set_xlim(middle - half_width, middle + half_width)
             panel_title(axes, title)
-        _draw_dimensions(panels[0], _CM * outlines["a) Riddle et al."])
-        for joint in _CM * outlines["b) Daltorio et al."][1:, 0]:
+        _draw_dimensions(panels[0], _CM * rigid)
+        for joint in _CM * coupled[1:, 0]:
             _draw_torsional_spring(panels[1], joint)
-        for middle in _CM * outlines["c) Boxerbaum et al."][:, 1::2].reshape(-1, 2):
+        for middle in _CM * bent[:, 1::2].reshape(-1, 2):
             _draw_torsional_spring(panels[2], middle)
             _draw_torsional_spring(panels[2], middle * [1.0, -1.0])
         panels[3].set_xlim(0.0, 2.0 * half_width)
@@ -202,6 +148,11 @@ def figure_1_planar_models(config: RunConfig, stem: Path) -> Path:
         return save_both(figure, stem)
 
 
+_PANELS = {
+    "a) Riddle et al.": "riddle2022-planar",
+    "b) Daltorio et al.": "daltorio2013",
+    "c) Boxerbaum et al.": "boxerbaum2012",
+}
 _ACTUATOR, _SPRING = segment_colors(2)
 _SIDE = "0.25"
 

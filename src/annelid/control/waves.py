@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
@@ -76,7 +77,7 @@ def timed_activation(wave: TimedWave, n_segments: int, time_s: ArrayLike) -> Arr
     return wave.level * np.clip(np.minimum(up, down), 0.0, 1.0)
 
 
-class _Wave:
+class _Wave(ABC):
     """What open-loop waves share: no state, nothing to record, nothing random."""
 
     name: str
@@ -85,9 +86,9 @@ class _Wave:
         self._n_segments = n_segments
         self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
 
+    @abstractmethod
     def activation(self, time_s: float) -> Array:
         """Activation of each segment, ``(n_segments,)``."""
-        raise NotImplementedError
 
     def reset(self, seed: int) -> None:
         """Does nothing: there is no state, and nothing is random."""

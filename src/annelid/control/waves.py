@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,18 +76,14 @@ def timed_activation(wave: TimedWave, n_segments: int, time_s: ArrayLike) -> Arr
     return wave.level * np.clip(np.minimum(up, down), 0.0, 1.0)
 
 
-class _Wave(ABC):
+class _Wave:
     """What open-loop waves share: no state, nothing to record, nothing random."""
 
     name: str
 
-    def __init__(self, n_segments: int, n_muscles: int) -> None:
-        self._n_segments = n_segments
+    def __init__(self, activation: Callable[[float], Array], n_segments: int, n_muscles: int) -> None:
+        self._activation = activation
         self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
-
-    @abstractmethod
-    def activation(self, time_s: float) -> Array:
-        """Activation of each segment, ``(n_segments,)``."""
 
     def reset(self, seed: int) -> None:
         """Does nothing: there is no state, and nothing is random."""
@@ -102,7 +97,7 @@ class _Wave(ABC):
         Returns:
             Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
         """
-        return self.activation(sensation.time_s).repeat(self._muscles_a_segment)
+        return self._activation(sensation.time_s).repeat(self._muscles_a_segment)
 
     def recordable(self) -> Recordable:
         """Names the controller; it has no signals, as its activation is recorded anyway."""
@@ -137,12 +132,7 @@ class SineController(_Wave):
             n_segments: Segments of the worm.
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
         """
-        super().__init__(n_segments, n_muscles)
-        self._wave = wave
-
-    def activation(self, time_s: float) -> Array:
-        """Returns `sine_activation` at a time, ``(n_segments,)``."""
-        return sine_activation(self._wave, self._n_segments, time_s)
+        super().__init__(lambda time_s: sine_activation(wave, n_segments, time_s), n_segments, n_muscles)
 
 
 class TimedController(_Wave):
@@ -163,15 +153,10 @@ class TimedController(_Wave):
             n_segments: Segments of the worm.
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
         """
-        super().__init__(n_segments, n_muscles)
-        self._wave = wave
+        super().__init__(lambda time_s: timed_activation(wave, n_segments, time_s), n_segments, n_muscles)
         turn, cycle = wave.rise_s + wave.hold_s + wave.fall_s, timed_cycle_s(wave, n_segments)
         if turn > cycle + _SLACK_S:
             raise ConfigError(
                 f"controller.rise_s + hold_s + fall_s = {turn:g}: must be at most {cycle:g} s, the cycle of "
                 f"{n_segments} segments with interval_s = {wave.interval_s:g} and waves = {wave.waves}"
             )
-
-    def activation(self, time_s: float) -> Array:
-        """Returns `timed_activation` at a time, ``(n_segments,)``."""
-        return timed_activation(self._wave, self._n_segments, time_s)

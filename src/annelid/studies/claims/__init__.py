@@ -22,7 +22,7 @@ def paper_claims(evidence: Evidence) -> list[Claim]:
     return [
         *structure_claims(evidence, main),
         *actuation_claims(evidence, outcome, main),
-        *control_claims(evidence, outcome),
+        *control_claims(evidence, outcome, main),
         *result_claims(evidence, outcome, main),
         *discussion_claims(evidence, outcome, main),
         *outlook_claims(evidence),

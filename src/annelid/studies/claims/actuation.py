@@ -53,7 +53,7 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
             "Actuation",
             "Activation is 1/(1 + exp(-0.35 (U_exp - U_con))) (Eq. 2).",
             "section 2.3",
-            "does not hold",
+            holds_if(bool(printed > 0.5)),
             "sign as printed",
             f"as printed {printed:.4f} with the contraction neuron excited, {meant:.4f} with the sign reversed",
             "With the printed sign a muscle would relax while its contraction neuron is excited, against the text "

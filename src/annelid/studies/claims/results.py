@@ -82,18 +82,19 @@ def result_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Claim
             within,
         )
     )
+    verdict, within = nearness(difference, 0.0445)
     claims.append(
         Claim(
             "Results",
-            "Segments 1 and 3 differ by 4.45 %: a mere difference.",
+            "Segments 1 and 3 differ by 4.45 %.",
             "section 3",
-            holds_if(abs(difference - 0.0445) < 0.01) if abs(difference) > 0.1 else "holds within",
+            verdict,
             "4.45 %",
             f"{100 * difference:.1f} %",
-            "Small beside the middle's deficit, but it depends on details of contact and time step: the variants in "
-            "the main table scatter around the paper's value.",
+            "Segment 3 is the one that differs most from the paper, in every variant of the paper's formulation in the "
+            "main table. A difference of two large numbers is sensitive: it changes with time step and contacts.",
             MAIN.command,
-            "" if abs(difference) > 0.1 else f"{100 * abs(difference - 0.0445):.1f} points",
+            within,
         )
     )
     spent = (summary.duration_s or 0.0) / (summary.real_time_factor or float("nan"))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import config as settings
+from annelid.control.muscles import muscles_a_segment
 from annelid.control.stretch_sensor import StretchSensor
-from annelid.control.waves import muscles_a_segment
 from annelid.errors import ConfigError
 from annelid.nervous import (
     HeteroclinicRing,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import Program
+from annelid.control.muscles import muscles_a_segment
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Recordable, Sensation, State
 
@@ -33,17 +34,12 @@ class ProgramController:
             n_segments: Segments of the worm.
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
         """
-        if n_muscles not in (n_segments, 2 * n_segments):
-            raise ConfigError(
-                f"n_muscles = {n_muscles} does not fit {n_segments} segments: "
-                f"give {n_segments} (rings) or {2 * n_segments} (half-rings)"
-            )
         last = max((contraction.segment for contraction in program.contractions), default=0)
         if last > n_segments:
             raise ConfigError(f"a contraction is of segment {last}, but the worm has segments 1 .. {n_segments}")
         self._program = program
         self._n_segments = n_segments
-        self._muscles_a_segment = n_muscles // n_segments
+        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
 
     def reset(self, seed: int) -> None:
         """Does nothing: there is no state, and nothing is random."""

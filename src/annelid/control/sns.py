@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import config as settings
+from annelid.control.muscles import muscles_a_segment
 from annelid.control.stretch_sensor import StretchSensor
-from annelid.errors import ConfigError
 from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, neuron_names, peristalsis_network
 from annelid.protocols import Array, Recordable, Sensation, Signal, State
 
@@ -50,17 +50,12 @@ class SnsController:
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
             control_timestep_s: Step of the network, s.
         """
-        if n_muscles not in (n_segments, 2 * n_segments):
-            raise ConfigError(
-                f"n_muscles = {n_muscles} does not fit {n_segments} segments: "
-                f"give {n_segments} (rings) or {2 * n_segments} (half-rings)"
-            )
         self._config = config
         self._parameters = PeristalsisParameters(
             **{field.name: getattr(config, field.name) for field in fields(PeristalsisParameters)}
         )
         self._n_segments = n_segments
-        self._muscles_a_segment = n_muscles // n_segments
+        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
         self._stepper = peristalsis_network(n_segments, self._parameters).compile(
             timestep_ms=1e3 * control_timestep_s, scheme=config.scheme
         )

@@ -8,25 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import SineWave, TimedWave
+from annelid.control.muscles import muscles_a_segment
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Recordable, Sensation, State
 
 # Half a microsecond, half the shortest time step: sums of time steps miss the moments of a pattern by rounding.
 _SLACK_S = 5e-7
-
-
-def muscles_a_segment(n_segments: int, n_muscles: int) -> int:
-    """Returns 1 for whole rings and 2 for half-rings.
-
-    Raises:
-        ConfigError: Muscles that are neither one nor two a segment.
-    """
-    if n_muscles not in (n_segments, 2 * n_segments):
-        raise ConfigError(
-            f"n_muscles = {n_muscles} does not fit {n_segments} segments: "
-            f"give {n_segments} (rings) or {2 * n_segments} (half-rings)"
-        )
-    return n_muscles // n_segments
 
 
 def sine_activation(wave: SineWave, n_segments: int, time_s: ArrayLike) -> Array:

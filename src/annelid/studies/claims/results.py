@@ -91,8 +91,8 @@ def result_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Claim
             verdict,
             "4.45 %",
             f"{100 * difference:.1f} %",
-            "Segment 3 is the one that differs most from the paper, in every variant of the paper's formulation in the "
-            "main table. A difference of two large numbers is sensitive: it changes with time step and contacts.",
+            "It rests on segment 3, of which the main table gives what variants of the paper's formulation make. A "
+            "difference of two large numbers is sensitive: it changes with time step and contacts.",
             MAIN.command,
             within,
         )

@@ -19,7 +19,7 @@ from annelid.config import (
     preset_names,
     preset_text,
 )
-from annelid.config.models import Section
+from annelid.config.sections import Section
 from annelid.errors import ConfigError
 
 

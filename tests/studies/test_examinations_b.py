@@ -10,7 +10,7 @@ import pytest
 
 from annelid.analysis import RhythmScore
 from annelid.config import load_config
-from annelid.studies.case import CHAIN, RODS, Case, chain
+from annelid.studies.case import CHAIN, Case, chain, rods
 from annelid.studies.examination import Effort, Examination, Results
 from annelid.studies.examinations.discretization import DISCRETIZATION, convergence_order
 from annelid.studies.examinations.gate import GATE, read_beat
@@ -45,7 +45,7 @@ def test_the_quick_runs_are_among_the_full_ones(examination: Examination) -> Non
 
 @pytest.mark.parametrize("examination", EXAMINATIONS, ids=lambda each: each.name)
 def test_runs_are_shared_with_the_worms_as_they_come(examination: Examination) -> None:
-    shared = {case_key(case) for case in (Case(CHAIN), chain(), Case(RODS))}
+    shared = {case_key(case) for case in (Case(CHAIN), chain(), rods())}
     assert shared & keys(examination, "quick")
 
 
@@ -134,4 +134,4 @@ def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytes
 
 def test_the_presets_worms_are_on_the_maps() -> None:
     tight = next(chart for chart in MAPS["full"] if chart.worm is TIGHT)
-    assert case_key(tight.cell(TIGHT.case(None).config.sensor.tolerance_m, 0.0)[0]) == case_key(Case(RODS))
+    assert case_key(tight.cell(TIGHT.case(None).config.sensor.tolerance_m, 0.0)[0]) == case_key(rods())

@@ -9,7 +9,8 @@ from typing import Any, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from annelid.config.models import RunConfig, Section
+from annelid.config.run import RunConfig
+from annelid.config.sections import Section
 from annelid.errors import ConfigError
 
 

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config.checking import check_config
-from annelid.config.models import RunConfig, Section
+from annelid.config.fidelity import fidelity_changes, find_level
+from annelid.config.run import RunConfig
+from annelid.config.sections import Section
 from annelid.errors import ConfigError, suggest
 
 DEFAULT_BASE = "riddle2023-rods"
@@ -34,7 +36,12 @@ def preset_text(name: str) -> str:
     return (resources.files("annelid") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load_config(source: str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> RunConfig:
+def load_config(
+    source: str | Path | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    fidelity: str | None = None,
+) -> RunConfig:
     """Loads a preset, a TOML file or a mapping, applies overrides, and checks all of it.
 
     Args:
@@ -43,20 +50,20 @@ def load_config(source: str | Path | Mapping[str, Any], overrides: Mapping[str, 
             neither does so nor states ``body.kind`` starts from ``riddle2023-rods``.
         overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``; whole sections too.
             A section whose ``kind`` changes keeps nothing of what it had before.
+        fidelity: How finely a 3D worm is resolved: a level of `annelid.config.LEVELS`; lies over what the source
+            says and under the overrides. None leaves the source as it is.
 
     Returns:
         The checked configuration.
 
     Raises:
-        ConfigError: Unknown preset or field, unreadable file, or a value out of its range.
+        ConfigError: Unknown preset, level or field, unreadable file, or a value out of its range.
     """
     tree = _read_tree(source)
-    for path, value in sorted((overrides or {}).items(), key=_kinds_first):
-        nested: Any = value
-        for key in reversed(path.split(".")):
-            nested = {key: nested}
-        tree = _merge(tree, nested)
-    return check_config(tree)
+    if fidelity is not None:
+        preset = _read_tree(find_level(fidelity).preset)
+        tree = _overridden(tree, fidelity_changes(fidelity, tree, preset))
+    return check_config(_overridden(tree, overrides or {}))
 
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
@@ -91,6 +98,16 @@ def toml_value(value: Any) -> str:
         short = f"{value:g}"
         return short if float(short) == value else repr(value)
     return json.dumps(value)
+
+
+def _overridden(tree: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """Lays values given by dotted path over a tree."""
+    for path, value in sorted(overrides.items(), key=_kinds_first):
+        nested: Any = value
+        for key in reversed(path.split(".")):
+            nested = {key: nested}
+        tree = _merge(tree, nested)
+    return tree
 
 
 def _parse_value(text: str) -> Any:

@@ -13,6 +13,8 @@ from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
 PLANAR = "riddle2022-planar"
+PAPERS_MESH = {"body.mesh.elements_per_side": 3}
+"""What the rods are compared with the chain at; their preset has a coarser mesh."""
 
 HOLD_S, REST_S = 0.8, 0.4
 """In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
@@ -76,8 +78,8 @@ def chain(changes: Mapping[str, Any] | None = None) -> Case:
 
 
 def rods(changes: Mapping[str, Any] | None = None) -> Case:
-    """The worm of tight rods."""
-    return Case(RODS, changes or {})
+    """The worm of tight rods with the paper's three elements a side, at steps of 5 ms."""
+    return Case(RODS, {**PAPERS_MESH, "clock.physics_timestep_s": 0.005, **(changes or {})})
 
 
 def fast(changes: Mapping[str, Any] | None = None) -> Case:

@@ -13,7 +13,7 @@ from annelid.config import WormBody
 from annelid.errors import ConfigError, suggest
 from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.simulation.runfile import Run
-from annelid.studies.case import CHAIN, FAST, RODS, Case
+from annelid.studies.case import CHAIN, FAST, RODS, Case, rods
 from annelid.studies.claims import Evidence, claim_cases, paper_claims
 from annelid.studies.contents import Claim, Examined, Figure, Report
 from annelid.studies.examination import Effort, Examination, Findings, Results, Table
@@ -33,7 +33,7 @@ VARIANTS = {
         CHAIN, {"arena.contact_time_constant_s": 0.01, "arena.contact_impedance": [0.95, 0.99, 0.0001]}
     ),
     "riddle2023-fast": Case(FAST),
-    "riddle2023-rods": Case(RODS),
+    "riddle2023-rods": rods(),
 }
 """The worms of the main table."""
 _QUICK = ("riddle2023", "riddle2023-fast", "riddle2023-rods")

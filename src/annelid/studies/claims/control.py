@@ -5,7 +5,7 @@ from __future__ import annotations
 from annelid.analysis.rhythm import CONTRACTED
 from annelid.config import SnsController
 from annelid.simulation.runfile import Run
-from annelid.studies.case import FAST, RODS, Case
+from annelid.studies.case import fast, rods
 from annelid.studies.claims.evidence import (
     MAIN,
     PLANAR_CASES,
@@ -19,7 +19,7 @@ from annelid.studies.outcome import Outcome
 def control_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Claim]:
     """Judges the claims about sensing and the network."""
     planar = evidence.results[PLANAR_CASES[300]]
-    tight, quick = evidence.results[Case(RODS)], evidence.results[Case(FAST)]
+    tight, quick = evidence.results[rods()], evidence.results[fast()]
     periods = [o.rhythm.period_s or float("nan") for o in (planar, outcome, quick, tight)]
     ordered = all(o.rhythm.verdict == "ordered" and o.rhythm.direction == 1 for o in (planar, outcome, quick, tight))
     steady = evidence.first_number("gate", "verdict_{}_steady_euler")

@@ -9,7 +9,7 @@ import numpy as np
 
 from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
 from annelid.simulation.runfile import Run
-from annelid.studies.case import FAST, RODS, Case, chain, fast, one_after_the_other
+from annelid.studies.case import chain, fast, one_after_the_other, rods
 from annelid.studies.claims.evidence import (
     LABELS,
     MAIN,
@@ -86,8 +86,8 @@ def _speed_claim(evidence: Evidence, outcome: Outcome, main: Run) -> Claim:
     body_m = float(main.data.attrs["body_length_m"])
     ours = _travel_in_a_cycle(main, period)
     others = {
-        name: _travel_in_a_cycle(evidence.store.run(Case(name)), evidence.results[Case(name)].rhythm.period_s or period)
-        for name in (FAST, RODS)
+        case.preset: _travel_in_a_cycle(evidence.store.run(case), evidence.results[case].rhythm.period_s or period)
+        for case in (fast(), rods())
     }
     listed = ", ".join(f"{1e3 * travel:+.0f} mm ({name})" for name, travel in others.items())
     return Claim(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from annelid.studies.case import CHAIN, FAST, PLANAR, RODS, Case, chain, fast, one_after_the_other, rods
+from annelid.studies.case import CHAIN, FAST, PLANAR, Case, chain, fast, one_after_the_other, rods
 from annelid.studies.contents import Verdict
 from annelid.studies.examination import Effort, Findings, Results
 from annelid.studies.examinations.side_by_side import WORMS
@@ -92,7 +92,7 @@ def claim_cases(effort: Effort) -> Sequence[Case]:
     return [
         MAIN,
         Case(FAST),
-        Case(RODS),
+        rods(),
         SHORT_MINIMUM,
         rods(one_after_the_other()),
         fast(one_after_the_other()),

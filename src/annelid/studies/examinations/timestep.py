@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from annelid.config import RunConfig, WormBody
 from annelid.simulation.runfile import open_run
-from annelid.studies.case import CHAIN, FAST, RODS, Case, one_after_the_other
+from annelid.studies.case import CHAIN, FAST, PAPERS_MESH, RODS, Case, one_after_the_other
 from annelid.studies.examination import Effort, Examination, Findings, Results, Table
 from annelid.studies.examinations.side_by_side import (
     CM,
@@ -88,7 +88,7 @@ class Stepping:
 RK4 = Stepping(PAPERS, CHAIN, "the paper's chain, RK4", {})
 EULER = Stepping(PAPERS, CHAIN, "the paper's chain, Euler", {"body.formulation.integrator": "Euler"}, hollow=True)
 SOFT = Stepping(SPRUNG, FAST, SPRUNG.label, {})
-HARD = Stepping(TIGHT, RODS, TIGHT.label, {})
+HARD = Stepping(TIGHT, RODS, TIGHT.label, PAPERS_MESH)
 
 WALKS: Mapping[Effort, Sequence[tuple[Stepping, Sequence[float]]]] = {
     "quick": (

@@ -1,0 +1,155 @@
+"""The whole of a run: the worm in its arena, its controller, clock, records and guards."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import Field, Tag, model_validator
+
+from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
+from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
+from annelid.config.sections import Impedance, NonNegative, Positive, Section, kind_or
+from annelid.config.worm import WormBody
+
+Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
+MOST_SAMPLES = 10_000_000
+
+Body = Annotated[
+    Annotated[WormBody, Tag("worm")]
+    | Annotated[PlanarBody, Tag("riddle2022")]
+    | Annotated[Daltorio2013Body, Tag("daltorio2013")]
+    | Annotated[Boxerbaum2012Body, Tag("boxerbaum2012")],
+    kind_or("worm"),
+]
+
+
+def _is_multiple(large: float, small: float) -> bool:
+    ratio = large / small
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-6 * ratio
+
+
+class Arena(Section):
+    """Where the worm crawls: flat ground under gravity."""
+
+    friction: Annotated[float, Field(ge=0.01, le=100)] = Field(
+        default=1.0, description="coefficient of sliding friction"
+    )
+    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
+    gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
+    contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")
+    contact_impedance: Impedance = Field(
+        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
+    )
+
+
+class Clock(Section):
+    """Time steps: one is an integer multiple of the other."""
+
+    control_timestep_s: Timestep = Field(default=0.001, description="step of the nervous system")
+    physics_timestep_s: Timestep = Field(default=0.005, description="step of the body")
+
+    @model_validator(mode="after")
+    def _multiples(self) -> Self:
+        small, large = sorted((self.control_timestep_s, self.physics_timestep_s))
+        if not _is_multiple(large, small):
+            raise ValueError(
+                f"clock.control_timestep_s = {self.control_timestep_s:g} and clock.physics_timestep_s = "
+                f"{self.physics_timestep_s:g}: one must be an integer multiple of the other"
+            )
+        return self
+
+
+class Record(Section):
+    """What goes into the run file how often."""
+
+    signals_interval_s: Positive = Field(default=0.005, description="interval of potentials, lengths and forces")
+    frames_interval_s: Positive = Field(default=0.04, description="interval of whole postures, for pictures and video")
+
+
+class Guard(Section):
+    """Limits at which a run stops because its numbers have run away."""
+
+    kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body")
+    height_m: Positive = Field(default=1.0, description="of any crossing above the floor")
+    edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
+    pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
+
+
+class RunConfig(Section):
+    """Everything that defines a run; the run file carries it whole."""
+
+    name: str = Field(default="custom", description="name of the preset or of the user's own configuration")
+    summary: str = Field(default="", description="one line for the list of presets")
+    duration_s: Positive = Field(default=5.0, description="simulated time")
+    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
+    body: Body = WormBody()
+    arena: Arena | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
+    controller: ControllerSection = SnsController()
+    sensor: StretchSensor = StretchSensor()
+    clock: Clock = Clock()
+    record: Record = Record()
+    guard: Guard = Guard()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _ground_under_the_worm(cls, tree: Any) -> Any:
+        if not isinstance(tree, Mapping) or tree.get("arena") is not None:
+            return tree
+        body = tree.get("body", {})
+        kind = body.get("kind", "worm") if isinstance(body, Mapping) else getattr(body, "kind", "worm")
+        return {**tree, "arena": {}} if kind == "worm" else tree
+
+    @model_validator(mode="after")
+    def _no_ground_for_planar_worms(self) -> Self:
+        if isinstance(self.body, PlanarWorm) and self.arena is not None:
+            raise ValueError(f"arena has no effect on body.kind = {self.body.kind!r}, which touches no ground")
+        return self
+
+    @model_validator(mode="after")
+    def _contractions_are_of_segments_that_exist(self) -> Self:
+        if isinstance(self.controller, Program):
+            for i, contraction in enumerate(self.controller.contractions):
+                if contraction.segment > self.body.n_segments:
+                    raise ValueError(
+                        f"controller.contractions.{i}.segment = {contraction.segment}: must be in "
+                        f"1 .. {self.body.n_segments}, the segments of the body"
+                    )
+        return self
+
+    @model_validator(mode="after")
+    def _contact_needs_ground(self) -> Self:
+        contact = isinstance(self.controller, HeteroclinicChannel) and self.controller.feedback == "contact"
+        if contact and isinstance(self.body, PlanarBody | Boxerbaum2012Body):
+            raise ValueError(
+                f"controller.feedback = 'contact' has no effect on body.kind = {self.body.kind!r}, which touches no "
+                "ground: choose 'none' or 'stretch'"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _intervals_are_whole_steps(self) -> Self:
+        step = self.clock.control_timestep_s
+        for field, value in (
+            ("record.signals_interval_s", self.record.signals_interval_s),
+            ("record.frames_interval_s", self.record.frames_interval_s),
+            ("duration_s", self.duration_s),
+        ):
+            if not _is_multiple(value, step):
+                raise ValueError(
+                    f"{field} = {value:g} must be an integer multiple of clock.control_timestep_s = {step:g}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _samples_have_an_end(self) -> Self:
+        for field, interval in (
+            ("record.signals_interval_s", self.record.signals_interval_s),
+            ("record.frames_interval_s", self.record.frames_interval_s),
+        ):
+            if self.duration_s / interval > MOST_SAMPLES:
+                raise ValueError(
+                    f"duration_s = {self.duration_s:g} at {field} = {interval:g} makes more than {MOST_SAMPLES:,} "
+                    "samples: shorten the run or lengthen the interval"
+                )
+        return self

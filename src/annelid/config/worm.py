@@ -1,0 +1,208 @@
+"""The 3D worm's body: mesh, materials, rings, and the two formulations."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, Tag, field_validator, model_validator
+
+from annelid.config.sections import Impedance, NonNegative, Positive, Range, Section, kind_or
+
+
+class Mesh(Section):
+    """Geometry of the helical mesh (lengths in m)."""
+
+    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
+    n_helices: Annotated[int, Field(ge=6, le=96)] = Field(
+        default=12, description="strands, half of each handedness; even"
+    )
+    radius_m: Positive = Field(default=0.16, description="radius of the tube at rest")
+    angular_rate_rad_per_m: Positive = Field(
+        default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"
+    )
+    elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
+        default=3, description="straight elements between neighbouring crossings"
+    )
+    elements_per_end: Annotated[int, Field(ge=1, le=32)] | None = Field(
+        default=None, description="straight elements in each free end of a strand; default as many as in a side"
+    )
+    planes_between_rings: Annotated[int, Field(ge=2, le=50)] = Field(
+        default=4, description="crossing planes from one ring to the next"
+    )
+    free_planes_at_ends: Annotated[int, Field(ge=1, le=50)] = Field(
+        default=3, description="crossing planes before the first and after the last ring"
+    )
+    rear_overhang_m: Positive | None = Field(
+        default=None,
+        description="free strand behind the last crossing, along the body; default half a plane spacing",
+    )
+
+    @field_validator("n_helices")
+    @classmethod
+    def _even(cls, value: int) -> int:
+        if value % 2:
+            raise ValueError("the number of helices must be even, half of each handedness, and at least 6")
+        return value
+
+
+class Strands(Section):
+    """Material of the strands."""
+
+    radius_m: Positive = Field(default=0.002, description="radius of the solid round cross-section")
+    young_modulus_Pa: Positive = Field(default=0.3e9, description="resists bending")
+    shear_modulus_Pa: Positive = Field(default=0.2e9, description="resists twisting")
+    linear_density_kg_per_m: Positive = Field(default=0.01291, description="mass per length of strand")
+    joint_damping_Nms_per_rad: NonNegative = Field(
+        default=0.12, description="viscous resistance to bending between two elements"
+    )
+
+
+class Pins(Section):
+    """The pins that join two strands at a crossing."""
+
+    mass_kg: Positive = Field(default=0.00052, description="mass of one pin")
+    radius_m: Positive = Field(default=0.005, description="radius of the drawn sphere")
+
+
+class Springs(Section):
+    """Axial springs between crossings two planes apart at the same angle."""
+
+    stiffness_N_per_m: NonNegative = Field(default=19.9, description="spring rate")
+    rest_length_m: Positive | None = Field(default=None, description="default: two plane spacings, unstretched at rest")
+    tension_only: bool = Field(default=False, description="true: slack below rest length; false: pushes as well")
+
+
+class Rings(Section):
+    """Ring muscles: MuJoCo's force-length-velocity muscle on a closed ring (or two half-rings).
+
+    The muscle's optimal length is ``(length_range[1] - length_range[0]) / (1.05 - 0.75)``: MuJoCo scales the
+    given range to 0.75-1.05 of it. The force is ``peak_force_N * (activation * FL * FV + FP)``.
+    """
+
+    layout: Literal["whole", "halves"] = Field(
+        default="whole",
+        description="one muscle round the body, or a left (-y: segment 1 leads towards -x) and a right one",
+    )
+    peak_force_N: Positive = Field(default=117.57, description="isometric force at the optimal length, F0")
+    length_range_m: Range | tuple[Range, ...] = Field(
+        default=(0.566, 1.067),
+        description="operating range of a whole ring, one pair for all or one pair a segment",
+    )
+    minimum_length: Positive = Field(default=0.58, description="lmin, relative to the optimal length")
+    maximum_length: Positive = Field(default=1.6, description="lmax, relative to the optimal length")
+    maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
+    passive_peak: NonNegative = Field(default=1.3, description="fpmax, relative to the peak force")
+    lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
+    activation_dynamics: bool = Field(
+        default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
+    )
+
+    @field_validator("length_range_m")
+    @classmethod
+    def _ordered(cls, value: Any) -> Any:
+        if not value:
+            raise ValueError("needs one pair for all rings or one pair a segment")
+        for low, high in value if isinstance(value[0], tuple) else (value,):
+            if low >= high:
+                raise ValueError("each length range needs its lower bound below its upper bound")
+        return value
+
+    def length_ranges(self, n_segments: int) -> list[tuple[float, float]]:
+        """Returns one operating range for each segment's whole ring, m."""
+        if isinstance(self.length_range_m[0], tuple):
+            return [(float(low), float(high)) for low, high in self.length_range_m]  # type: ignore[misc]
+        low, high = self.length_range_m
+        return [(float(low), float(high))] * n_segments  # type: ignore[arg-type]
+
+
+class Rods(Section):
+    """The fast formulation: elastic rods, which share one vertex at each crossing unless pins are separate."""
+
+    kind: Literal["rods"] = "rods"
+    edge_time_constant_s: Positive = Field(default=0.001, description="time constant of the inextensible edges")
+    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
+        default=100, description="Newton iterations at most"
+    )
+    solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
+    friction_impedance_ratio: Positive = Field(
+        default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
+    )
+    lateral_damping_Nms_per_rad: NonNegative = Field(
+        default=0.0,
+        description="viscous resistance to bending across the plane of a strand's own curvature, for which the "
+        "engine's curved rods have none",
+    )
+    pins: Literal["shared", "separate"] = Field(
+        default="shared",
+        description="both strands of a crossing share its vertex, or a pin mass is tied to a vertex of each",
+    )
+    pin_stiffness_N_per_m: Positive = Field(
+        default=22.0, description="of the tie between a separate pin and each of its strands"
+    )
+    pin_damping_Ns_per_m: Positive = Field(default=0.88, description="of the same tie")
+    pin_inertance_kg: Positive = Field(
+        default=0.0094, description="of the same tie: its force per relative acceleration, numerical"
+    )
+
+
+class Chain(Section):
+    """The paper's formulation: rigid capsules on damped elastic joints, with a point mass at every pin."""
+
+    kind: Literal["chain"] = "chain"
+    joint: Literal["ball", "hinges"] = Field(
+        default="ball",
+        description="one isotropic ball joint, or three hinges with torsion apart from bending",
+    )
+    armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
+    pin_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the pin constraints")
+    pin_impedance: Impedance = Field(
+        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
+    )
+    pins: Literal["separate", "direct"] = Field(
+        default="separate", description="strands tied to a pin mass each, or straight to one another"
+    )
+    integrator: Literal["RK4", "Euler"] = Field(default="RK4", description="time integration")
+    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
+        default=500, description="PGS iterations at most"
+    )
+    solver_tolerance: NonNegative = Field(default=1e-8, description="PGS tolerance")
+
+
+Formulation = Annotated[Annotated[Rods, Tag("rods")] | Annotated[Chain, Tag("chain")], kind_or("rods")]
+
+
+class WormBody(Section):
+    """The 3D worm."""
+
+    kind: Literal["worm"] = "worm"
+    mesh: Mesh = Mesh()
+    strands: Strands = Strands()
+    pins: Pins = Pins()
+    springs: Springs = Springs()
+    rings: Rings = Rings()
+    formulation: Formulation = Rods()
+
+    @property
+    def n_segments(self) -> int:
+        """Number of actuated segments."""
+        return self.mesh.n_segments
+
+    @model_validator(mode="after")
+    def _parts_fit_together(self) -> Self:
+        if self.strands.radius_m >= self.mesh.radius_m:
+            raise ValueError(
+                f"body.strands.radius_m = {self.strands.radius_m:g} must be less than "
+                f"body.mesh.radius_m = {self.mesh.radius_m:g}"
+            )
+        if self.rings.layout == "halves" and self.mesh.n_helices % 4:
+            raise ValueError(
+                f"body.rings.layout = 'halves' needs body.mesh.n_helices to be a multiple of 4, "
+                f"not {self.mesh.n_helices}: equal halves need an even number of crossings round a ring"
+            )
+        n = len(self.rings.length_ranges(self.mesh.n_segments))
+        if n != self.mesh.n_segments:
+            raise ValueError(
+                f"body.rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
+                "give one pair for each, or one for all, for example body.rings.length_range_m=[0.566,1.067]"
+            )
+        return self

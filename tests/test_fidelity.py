@@ -1,0 +1,128 @@
+"""Levels of fidelity: what they change, what they leave, and how near they come to a converged run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.analysis import summary
+from annelid.config import LEVELS, RunConfig, fields_of, load_config
+from annelid.config.fidelity import CALIBRATION, RESOLUTION
+from annelid.errors import ConfigError
+from annelid.simulation import simulate
+
+WORMS = ("riddle2023", "riddle2023-rods")
+LEVEL_NAMES = list(LEVELS)
+NAMES = {"name", "summary"}
+
+
+def flat(config: RunConfig) -> dict[str, object]:
+    def walk(tree: dict[str, object], above: str) -> dict[str, object]:
+        found: dict[str, object] = {}
+        for key, value in tree.items():
+            path = f"{above}{key}"
+            found |= walk(value, f"{path}.") if isinstance(value, dict) else {path: value}
+        return found
+
+    return walk(config.model_dump(exclude=NAMES), "")
+
+
+@pytest.mark.parametrize("worm", WORMS)
+@given(
+    level=st.sampled_from(LEVEL_NAMES),
+    friction=st.floats(0.05, 1.5),
+    n_segments=st.integers(3, 12),
+    rate=st.floats(5.0, 20.0),
+)
+def test_a_level_changes_resolution_and_formulation_only(
+    worm: str, level: str, friction: float, n_segments: int, rate: float
+) -> None:
+    own = {
+        "arena.friction": friction,
+        "body.mesh.n_segments": n_segments,
+        "body.springs.stiffness_N_per_m": rate,
+        "body.rings.length_range_m": [0.55, 1.05],
+    }
+    plain = flat(load_config(worm, own))
+    resolved = flat(load_config(worm, own, fidelity=level))
+    changed = {path for path in plain | resolved if plain.get(path) != resolved.get(path)}
+    assert all(path.startswith((*RESOLUTION, *CALIBRATION)) for path in changed)
+
+
+@pytest.mark.parametrize("level", LEVEL_NAMES)
+def test_a_level_is_the_same_from_either_worm(level: str) -> None:
+    first, second = (flat(load_config(worm, fidelity=level)) for worm in WORMS)
+    # The guards of the two presets are the same but for their comments.
+    assert first == second
+
+
+def test_levels_at_home_are_their_presets() -> None:
+    assert flat(load_config("riddle2023", fidelity="paper")) == flat(load_config("riddle2023"))
+    assert flat(load_config("riddle2023-rods", fidelity="fast")) == flat(load_config("riddle2023-rods"))
+
+
+def test_levels_go_from_slow_to_fast() -> None:
+    steps = [load_config("riddle2023", fidelity=level).clock.physics_timestep_s for level in LEVEL_NAMES]
+    assert steps == sorted(steps)
+
+
+def test_overrides_win_over_the_level_and_the_level_over_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("[clock]\nphysics_timestep_s = 0.01\n[sensor]\ntolerance_m = 0.017\n", encoding="utf-8")
+    assert load_config(file).clock.physics_timestep_s == 0.01
+    accurate = load_config(file, fidelity="accurate")
+    assert accurate.clock.physics_timestep_s == 0.005
+    assert accurate.sensor.tolerance_m == 0.017
+    own = load_config(file, {"clock.physics_timestep_s": 0.002}, fidelity="accurate")
+    assert own.clock.physics_timestep_s == 0.002
+    assert own.body.mesh.elements_per_side == accurate.body.mesh.elements_per_side  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("source", "overrides", "level", "words"),
+    [
+        ("riddle2023-rods", {}, "acurate", "accurate"),
+        ("riddle2022-planar", {}, "fast", "body.kind = 'riddle2022'"),
+        ("riddle2023-fast", {}, "preview", "pins = 'separate'"),
+    ],
+)
+def test_what_has_no_such_level_is_refused(source: str, overrides: dict[str, object], level: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        load_config(source, overrides, fidelity=level)
+
+
+def test_the_soft_pinned_worm_has_the_papers_level() -> None:
+    assert flat(load_config("riddle2023-fast", fidelity="paper")) == flat(load_config("riddle2023"))
+
+
+def test_every_field_of_a_level_exists() -> None:
+    known = set(fields_of(load_config("riddle2023")))
+    for level in LEVELS.values():
+        assert set(level.changes) <= set(RESOLUTION)
+    assert all(any(path == field or path.startswith(f"{field}.") for path in known) for field in RESOLUTION)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", ["accurate", "fast", "preview"])
+def test_a_level_comes_within_two_percent_of_short_steps(level: str, tmp_path: Path) -> None:
+    """Half the test of ``annelid bench``: steps of 1 ms on the paper's mesh in place of 0.5 ms."""
+    converged = {
+        "clock.physics_timestep_s": 0.001,
+        "body.mesh.elements_per_side": 3,
+        "body.formulation.friction_impedance_ratio": 1000.0,
+        "record.signals_interval_s": 0.005,
+    }
+    ours, reference = (
+        summary(simulate(config, tmp_path / str(number), progress=False))
+        for number, config in enumerate(
+            (load_config("riddle2023-rods", fidelity=level), load_config("riddle2023-rods", converged))
+        )
+    )
+    assert ours.order == reference.order
+    assert ours.period_s == pytest.approx(reference.period_s, rel=0.02)
+    # Six elements are 1.5 % below three, whatever the step.
+    within = 0.035 if level == "accurate" else 0.02
+    assert ours.elongation_mean_max_m == pytest.approx(reference.elongation_mean_max_m, rel=within)

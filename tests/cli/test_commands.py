@@ -130,7 +130,7 @@ def test_doctor_ends_well(annelid: Command) -> None:
     assert any(line.split()[:2] == ["ok", "mujoco"] for line in done.out.splitlines())
 
 
-@pytest.mark.parametrize("command", ["run", "build", "show", "plot", "render", "presets", "doctor"])
+@pytest.mark.parametrize("command", ["run", "build", "show", "plot", "render", "bench", "presets", "doctor"])
 def test_every_command_teaches_by_example(annelid: Command, command: str) -> None:
     done = annelid(command, "--help")
     assert done.exit_code == 0

@@ -1,0 +1,26 @@
+"""The command line, a thin skin over the library. Heavy imports are inside the commands, so help is quick."""
+
+from annelid.cli.bench import bench_command
+from annelid.cli.entry import app, main
+from annelid.cli.limit_cycle import limit_cycle_command
+from annelid.cli.paper import paper_command
+from annelid.cli.results import plot, render, show
+from annelid.cli.run import run_command
+from annelid.cli.worm import build, doctor, presets
+
+__all__ = ["app", "main"]
+
+# In the order in which the help lists them.
+for _name, _command in (
+    ("run", run_command),
+    ("build", build),
+    ("show", show),
+    ("plot", plot),
+    ("render", render),
+    ("limit-cycle", limit_cycle_command),
+    ("paper", paper_command),
+    ("bench", bench_command),
+    ("presets", presets),
+    ("doctor", doctor),
+):
+    app.command(_name)(_command)

@@ -1,0 +1,101 @@
+"""What several commands share: their parameters, configurations, and what they print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from annelid.errors import RunFileError
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+    from annelid.simulation.runfile import Run
+
+DEFAULT_PRESET = "riddle2023-rods"
+
+Preset = Annotated[str | None, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="Set any field by its dotted path; may be repeated."),
+]
+Segments = Annotated[int | None, typer.Option("--segments", help="Number of segments, at least 3.")]
+FidelityLevel = Annotated[
+    str | None,
+    typer.Option(
+        "--fidelity",
+        metavar="LEVEL",
+        help="How finely the 3D worm is resolved: paper, accurate, fast or preview (docs/speed.md has their errors)"
+        "  [default: as the preset has it, fast for riddle2023-rods]",
+    ),
+]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
+
+
+def or_default(preset: str | None, fidelity: str | None = None) -> str:
+    """Returns the preset that was named, or the one that a level of fidelity comes from, or the default one."""
+    # An empty name, as from an unset variable of a shell, must not pass for none.
+    if preset is not None:
+        return preset
+    if fidelity is None:
+        return DEFAULT_PRESET
+    from annelid.config import find_level
+
+    return find_level(fidelity).preset
+
+
+def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
+    """Joins the assignments of ``--set`` and the options that were given; the latter win.
+
+    Args:
+        assignments: Each ``FIELD=VALUE``.
+        **options: Fields by name, None where the option was left out.
+
+    Returns:
+        Values by dotted path.
+
+    Raises:
+        ConfigError: An assignment is malformed.
+    """
+    from annelid.config import parse_assignments
+
+    given = {field: value for field, value in options.items() if value is not None}
+    return parse_assignments(assignments or []) | given
+
+
+def config_of(source: str, overrides: dict[str, Any], segments: int | None, fidelity: str | None = None) -> RunConfig:
+    """Loads a preset or a TOML file with what is changed in it.
+
+    Raises:
+        ConfigError: There is no such preset, file or level of fidelity, or a value is out of range.
+    """
+    from annelid.config import PlanarWorm, load_config
+
+    if segments is not None:
+        planar = isinstance(load_config(source).body, PlanarWorm)
+        overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
+    return load_config(source, overrides, fidelity=fidelity)
+
+
+def refuse_existing(path: Path, force: bool) -> None:
+    """Keeps what stands in the way of an output file.
+
+    Raises:
+        RunFileError: The path is a folder, or a file that exists and ``force`` is false.
+    """
+    if path.is_dir():
+        raise RunFileError(f"{path} is a folder: name a file")
+    if path.exists() and not force:
+        raise RunFileError(f"{path} exists: name another file with -o, or replace it with --force")
+
+
+def print_table(run: Run) -> None:
+    """Prints the numbers of a run, the published ones beside them."""
+    from rich.console import Console
+
+    from annelid.analysis import summary
+    from annelid.view.table import summary_table
+
+    Console().print(summary_table(summary(run), run.config))

@@ -1,0 +1,72 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `paper`."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.errors import RunFileError
+
+
+def paper_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("report"),
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 5 minutes.")] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    claims: Annotated[
+        Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the paths.")] = False,
+) -> None:
+    """Reproduce the paper's figures and claims, and examine them.
+
+    Writes report.html, one file with all pictures to read and to send, and report.md beside its figures.
+    The whole takes about 40 minutes on two cores, --quick about 5. Every run is kept in report/runs, so
+    a second call takes seconds, and a killed one goes on where it was.
+
+    \b
+    annelid paper                                      the whole, into the folder report
+    annelid paper --quick -o draft                     the same claims from coarser maps
+    annelid paper --only pins --only friction          these examinations only
+    annelid paper -o report --claims docs/paper.md     and the table of claims for the repository
+    """
+    from annelid.studies.paper import reproduce
+    from annelid.studies.progress import study_progress
+    from annelid.studies.report import claims_page, write_report
+    from annelid.view.output import whole_file, with_suffix
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    if claims is not None:
+        if only:
+            raise typer.BadParameter("--claims needs the whole report, so leave --only out")
+        claims = with_suffix(claims, (".md",), "Markdown", default=".md")
+        if not claims.parent.is_dir():
+            raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            report = reproduce(output, "quick" if quick else "full", only=only or None, jobs=jobs, progress=progress)
+            html = write_report(report, output)
+    except KeyboardInterrupt:
+        options = [*(["--quick"] if quick else []), *(word for name in only or () for word in ("--only", name))]
+        options += ["--jobs", str(jobs)] if jobs else []
+        options += ["--claims", str(claims)] if claims else []
+        again = shlex.join(["annelid", "paper", "-o", str(output), *options])
+        complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if claims is not None:
+        with whole_file(claims) as draft:
+            draft.write_text(claims_page(report), encoding="utf-8")
+    for path in (html, html.with_suffix(".md"), claims):
+        if path is not None:
+            typer.echo(path)

@@ -1,0 +1,104 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The commands on a finished run: `show`, `plot` and `render`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import Force, RunPath, print_table, refuse_existing
+
+
+def show(
+    run: RunPath,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON, in SI units.")] = False,
+) -> None:
+    """Print the numbers of a run.
+
+    Beside them stand the published ones, where there are any.
+
+    \b
+    annelid show runs/riddle2023-001
+    annelid show runs/riddle2023-001 --json | jq .period_s
+    """
+    from annelid.analysis import summary
+    from annelid.simulation.runfile import open_run
+
+    opened = open_run(run)
+    if as_json:
+        typer.echo(summary(opened).to_json())
+        return
+    print_table(opened)
+    if opened.message:
+        typer.echo(opened.message)
+
+
+def plot(
+    run: RunPath,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: figure7.png in the run]"),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Draw potentials and lengths over time.
+
+    The counterpart of the paper's figure 7.
+
+    \b
+    annelid plot runs/riddle2023-001 -o figure7.pdf
+    """
+    from annelid.simulation.runfile import open_run
+    from annelid.view.plots import figure7, plot_path
+
+    opened = open_run(run)
+    if output is None:
+        target = opened.path.parent / "figure7.png"
+    else:
+        target = plot_path(output)
+        refuse_existing(target, force)
+    typer.echo(figure7(opened, target))
+
+
+def render(
+    run: RunPath,
+    at: Annotated[float | None, typer.Option("--time", help="Draw one frame at this time, s.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Frame to write: .png, .jpg  [default: frame.png in the run]")
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv")] = None,
+    fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
+    camera: Annotated[str | None, typer.Option(help="isometric, side, top or front  [default: isometric]")] = None,
+    force: Force = False,
+) -> None:
+    """Draw a frame or a video of a run.
+
+    Both come from the recorded postures: later, and on any machine.
+
+    \b
+    annelid render runs/riddle2023-001 --time 1.5 -o frame.png
+    annelid render runs/riddle2023-001 --video slow.mp4 --speed 0.25
+    annelid render runs/riddle2023-001 --time 1.5 --camera side -o side.png
+    """
+    from annelid.simulation.runfile import open_run
+    from annelid.view.gallery import video_bar
+    from annelid.view.render import render_frame, render_video
+
+    if video is None and at is None:
+        raise typer.BadParameter("say what to draw: --time SECONDS for a frame, --video FILE for a video")
+    if output is not None and at is None:
+        raise typer.BadParameter("-o names the frame, so it needs --time SECONDS as well")
+    opened = open_run(run)
+    for target in (output, video):
+        if target is not None:
+            refuse_existing(target, force)
+    frame = opened.path.parent / "frame.png" if output is None else output
+    if at is not None:
+        typer.echo(render_frame(opened, at, frame, camera=camera))
+    if video is not None:
+        with video_bar() as progress:
+            render_video(opened, video, fps=fps, speed=speed, camera=camera, progress=progress)
+        typer.echo(video)

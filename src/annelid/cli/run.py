@@ -1,0 +1,135 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `run`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from annelid.cli.common import (
+    Assignments,
+    FidelityLevel,
+    Preset,
+    Segments,
+    config_of,
+    or_default,
+    overrides_of,
+    print_table,
+)
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.errors import SimulationStopped
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+
+
+def run_command(
+    preset: Preset = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    fidelity: FidelityLevel = None,
+    duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of every random draw.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the results  [default: runs/NAME-NNN, the next free number]")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Continue this run from where it ended; --duration counts from its start."),
+    ] = None,
+    video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars and no table.")] = False,
+) -> None:
+    """Run a worm, draw it and print its numbers.
+
+    Writes run.nc, figure7.png, frame.png and video.mp4, and prints a table.
+
+    \b
+    annelid run                                              the paper's robot with pins that hold, in seconds
+    annelid run riddle2023                                   the paper's own worm to the letter, in a minute
+    annelid run --segments 4 --fidelity accurate             four segments, finely resolved
+    annelid run riddle2023-rods --set arena.friction=0.3     any field of any preset
+    annelid run my.toml --duration 20 --out long             your own file, your own folder
+    annelid run --resume long --duration 40                  twenty seconds more
+    """
+    from annelid.simulation.loop import simulate
+    from annelid.view.gallery import draw_all
+
+    overrides = overrides_of(assignments, duration_s=duration, seed=seed)
+    if resume is None:
+        config = config_of(or_default(preset, fidelity), overrides, segments, fidelity)
+    elif preset is None and segments is None and fidelity is None:
+        config = _config_to_continue(resume, overrides)
+    else:
+        raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments or --fidelity with it")
+    with _run_folder(out, config.name) as folder:
+        try:
+            done = simulate(config, folder, resume=resume, progress=False if quiet else None)
+        except SimulationStopped as stop:
+            raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
+    if not quiet:
+        print_table(done)
+    if done.status == "interrupted":
+        complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
+        raise typer.Exit(EXIT_INTERRUPTED)
+    typer.echo(done.path)
+    for path in draw_all(done, folder, video=video, quiet=quiet, complain=complain):
+        typer.echo(path)
+
+
+def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
+    from annelid.config import load_config
+    from annelid.simulation.runfile import open_run
+
+    return load_config(open_run(path).config.model_dump(), overrides)
+
+
+@contextmanager
+def _run_folder(out: Path | None, name: str) -> Iterator[Path]:
+    """Yields the folder to run into; what was made for a numbered one and stayed empty is removed."""
+    if out is not None:
+        yield out
+        return
+    parent = Path("runs")
+    first = not parent.exists()
+    folder = _next_free(parent, re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run")
+    try:
+        yield folder
+    finally:
+        with suppress(OSError):
+            folder.rmdir()
+            if first:
+                parent.rmdir()
+
+
+def _next_free(parent: Path, name: str) -> Path:
+    """Makes and returns the folder with the next number; making it keeps it from runs that start together."""
+    parent.mkdir(exist_ok=True)
+    numbered = re.compile(re.escape(name) + r"-(\d+)")
+    taken = [int(match[1]) for entry in parent.iterdir() if (match := numbered.fullmatch(entry.name))]
+    number = max(taken, default=0) + 1
+    while True:
+        folder = parent / f"{name}-{number:03d}"
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            number += 1
+        else:
+            return folder
+
+
+def _show_what_is_left(folder: Path, quiet: bool) -> str:
+    """Prints the table of a run that a guard stopped; returns the words that name its file."""
+    from annelid.simulation.runfile import FILE_NAME, open_run
+
+    if not (folder / FILE_NAME).exists():
+        return ""
+    left = open_run(folder)
+    if not quiet:
+        print_table(left)
+    return f"; what was computed is in {left.path}"

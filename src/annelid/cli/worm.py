@@ -1,0 +1,90 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The commands on what there is before a run: `build`, `presets` and `doctor`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import (
+    Assignments,
+    FidelityLevel,
+    Force,
+    Preset,
+    Segments,
+    config_of,
+    or_default,
+    overrides_of,
+    refuse_existing,
+)
+from annelid.errors import ConfigError
+
+
+def build(
+    preset: Preset = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The MJCF file to write.")] = Path("worm.xml"),
+    assignments: Assignments = None,
+    segments: Segments = None,
+    fidelity: FidelityLevel = None,
+    force: Force = False,
+) -> None:
+    """Write a worm and its arena as MJCF, for plain MuJoCo.
+
+    \b
+    annelid build riddle2023-rods -o worm.xml
+    annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
+    """
+    from annelid.body import build_spec
+    from annelid.view.output import whole_file
+
+    refuse_existing(output, force)
+    config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity)
+    spec = build_spec(config)
+    try:
+        spec.compile()
+    except ValueError as error:
+        raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+    with whole_file(output) as draft:
+        draft.write_text(spec.to_xml(), encoding="utf-8")
+    typer.echo(output)
+
+
+def presets(
+    name: Annotated[str | None, typer.Argument(help="Print this preset's commented TOML.")] = None,
+    fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
+) -> None:
+    """List the presets, or print one.
+
+    What it prints is a start for a file of your own.
+
+    \b
+    annelid presets
+    annelid presets riddle2023 > my.toml
+    annelid presets riddle2023 --fields
+    """
+    from rich.console import Console
+
+    from annelid.config import load_config, preset_names, preset_text
+    from annelid.view.table import field_lines, presets_table
+
+    if name is not None and not fields:
+        typer.echo(preset_text(name), nl=False)
+        return
+    if fields:
+        typer.echo("\n".join(field_lines(load_config(or_default(name)))))
+        return
+    Console().print(presets_table([load_config(each) for each in preset_names()]))
+
+
+def doctor() -> None:
+    """Tell what is missing and how to install it.
+
+    \b
+    annelid doctor
+    """
+    from annelid.view.doctor import examine
+
+    for finding in examine():
+        typer.echo(finding.line())

@@ -1,0 +1,1 @@
+"""Speed and error side by side: closed loops timed one by one, judged against converged runs."""

@@ -1,0 +1,107 @@
+"""Measurements, one file a case, written as they come; each case measured in a process of its own."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from annelid.errors import AnnelidError
+from annelid.studies.bench.cases import BenchCase
+from annelid.studies.store import READERS, case_key, code_fingerprint
+from annelid.view.output import whole_file
+
+MEASURING = ("studies/bench/measure.py", "studies/bench/timing.py", *READERS)
+"""The code that a measurement depends on beside the physics."""
+PEER_CODE = ("studies/bench/peer.py",)
+
+Share = Callable[[float], object]
+"""Called with the share of a case that is done."""
+
+
+class MeasurementFailed(AnnelidError):
+    """A case could not be measured; the text says why."""
+
+
+class Measurements:
+    """A folder of measurements."""
+
+    def __init__(self, folder: Path) -> None:
+        """Opens it; it is made with the first measurement."""
+        self.folder = folder
+
+    def find(self, case: BenchCase | None) -> dict[str, Any] | None:
+        """Returns what was measured before with the same configuration, code and engine, or None."""
+        try:
+            return json.loads(self._path(case).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+
+    def measure(self, case: BenchCase | None, progress: Share) -> dict[str, Any]:
+        """Measures a case, or the peer for None, and keeps the numbers.
+
+        Raises:
+            MeasurementFailed: The process died, or the case cannot be built.
+        """
+        request = {} if case is None else {"config": case.case.config.model_dump(mode="json")}
+        measured = _in_a_process(request, progress)
+        # A peer that is missing may be installed before the next call.
+        if measured.get("installed", True):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with whole_file(self._path(case)) as draft:
+                draft.write_text(json.dumps(measured, indent=1, allow_nan=False), encoding="utf-8")
+        return measured
+
+    def _path(self, case: BenchCase | None) -> Path:
+        key = _digest(code_fingerprint(*PEER_CODE)) if case is None else _digest(case_key(case.case) + _measuring())
+        stem = "peer" if case is None else case.name.replace(", ", "-").replace(" ", "-")
+        return self.folder / f"{stem}-{key}.json"
+
+
+def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
+    command = [sys.executable, "-m", "annelid.studies.bench.measure"]
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as complaints:
+        child = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, text=True, encoding="utf-8"
+        )
+        assert child.stdin is not None
+        assert child.stdout is not None
+        try:
+            # A process that dies at once leaves its reason on stderr.
+            with suppress(BrokenPipeError), child.stdin:
+                json.dump(request, child.stdin)
+            answer: dict[str, Any] = {}
+            for line in child.stdout:
+                # A library may print too.
+                if line.startswith("{"):
+                    answer = json.loads(line)
+                    if "share" in answer:
+                        progress(answer["share"])
+            child.wait()
+        except BaseException:
+            child.kill()
+            child.wait()
+            raise
+        finally:
+            child.stdout.close()
+        if "measured" in answer:
+            return answer["measured"]
+        complaints.seek(0)
+        last = (complaints.read().strip().splitlines() or [f"the process ended with status {child.returncode}"])[-1]
+        raise MeasurementFailed(answer.get("error", last))
+
+
+@cache
+def _measuring() -> str:
+    return code_fingerprint(*MEASURING)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -1,0 +1,389 @@
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.config import LEVELS, WormBody, load_config
+from annelid.errors import ConfigError
+from annelid.studies.bench import peer as peer_module
+from annelid.studies.bench import store as store_module
+from annelid.studies.bench.benchmark import JSON_NAME, bench, judge
+from annelid.studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
+from annelid.studies.bench.errors import errors, exponent, front
+from annelid.studies.bench.measure import measure, peak_memory_bytes
+from annelid.studies.bench.store import MeasurementFailed, Measurements
+from annelid.studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
+from annelid.studies.case import CHAIN, RODS
+from annelid.view.bench_table import bench_table
+from annelid.view.figures.bench import bench_figure
+
+positive = st.floats(1e-3, 1e3)
+
+
+def numbers(ring: float = 0.4, elongation: float = 0.08, period: float = 2.6, travel: float = -0.2) -> dict[str, Any]:
+    return {
+        "ring_length_min_m": ring,
+        "elongation_mean_max_m": [elongation, 0.9 * elongation],
+        "period_s": period,
+        "travel_m": travel,
+    }
+
+
+class TestErrors:
+    @given(positive, positive, positive, st.floats(-1, 1))
+    def test_a_run_has_no_error_against_itself(self, ring: float, elongation: float, period: float, travel: float):
+        same = numbers(ring, elongation, period, travel)
+        found = errors(same, same)
+        assert found["elongation"] == [0.0, 0.0]
+        assert all(found[name] == 0.0 for name in found if name != "elongation")
+
+    @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
+    def test_the_larger_of_elongation_and_period_counts(self, a: float, b: float) -> None:
+        found = errors(numbers(elongation=0.08 * (1 + a), period=2.6 * (1 + b)), numbers())
+        assert found["elongation_max"] == pytest.approx(abs(a), abs=1e-12)
+        assert found["period"] == pytest.approx(abs(b), abs=1e-12)
+        assert found["largest"] == pytest.approx(max(abs(a), abs(b)), abs=1e-12)
+
+    def test_travel_is_a_difference_in_metres(self) -> None:
+        assert errors(numbers(travel=-0.2), numbers(travel=0.1))["travel_m"] == pytest.approx(0.3)
+
+    @pytest.mark.parametrize("missing", ["period_s", "elongation_mean_max_m", "ring_length_min_m", "travel_m"])
+    def test_what_is_missing_is_unknown_and_not_small(self, missing: str) -> None:
+        for found in (
+            errors(numbers() | {missing: None}, numbers()),
+            errors(numbers(), numbers() | {missing: None}),
+        ):
+            judging = missing in ("period_s", "elongation_mean_max_m")
+            assert (found["largest"] is None) == judging
+            assert list(found.values()).count(None) == {"period_s": 2, "elongation_mean_max_m": 3}.get(missing, 1)
+
+    def test_one_unknown_segment_makes_the_elongation_unknown(self) -> None:
+        found = errors(numbers() | {"elongation_mean_max_m": [0.08, None]}, numbers())
+        assert found["elongation"] == [0.0, None]
+        assert found["elongation_max"] is None
+
+
+@given(st.floats(0.5, 3.0), positive, st.lists(st.integers(1, 100), min_size=2, unique=True))
+def test_exponent_of_a_power_law(power: float, factor: float, sizes: list[int]) -> None:
+    assert exponent(sizes, [factor * n**power for n in sizes]) == pytest.approx(power, abs=1e-6)
+
+
+def test_one_size_has_no_exponent() -> None:
+    assert exponent([3, 3], [1.0, 2.0]) is None
+
+
+@given(st.dictionaries(st.text(max_size=3), st.tuples(st.integers(0, 5), st.integers(0, 5)), max_size=12))
+def test_front_holds_one_of_each_point_that_no_other_beats(grid: dict[str, tuple[int, int]]) -> None:
+    def beats(a: tuple[int, int], b: tuple[int, int]) -> bool:
+        return a[0] >= b[0] and a[1] <= b[1] and a != b
+
+    found = front({name: (float(x), float(y)) for name, (x, y) in grid.items()})
+    unbeaten = {point for point in grid.values() if not any(beats(other, point) for other in grid.values())}
+    assert {grid[name] for name in found} == unbeaten
+    assert len(found) == len(unbeaten)
+    speeds = [grid[name][0] for name in found]
+    assert speeds == sorted(speeds, reverse=True)
+
+
+class TestTiming:
+    def test_a_stopwatch_adds_up_and_counts_nested_calls_once(self) -> None:
+        times = iter([0.0, 1.0, 5.0, 5.5, 7.0, 9.0])
+        thing = SimpleNamespace(double=lambda x: 2 * x, fourfold=lambda x: thing.double(thing.double(x)))
+        watch = Stopwatch(thing, "double", "fourfold", "absent", reading=lambda: 7.0, clock=lambda: next(times))
+        assert [thing.double(1), thing.fourfold(1), thing.double(3)] == [2, 4, 6]
+        assert watch.seconds == 1.0 + 0.5 + 2.0
+        assert list(watch.ends) == [1.0, 5.5, 9.0]
+        assert list(watch.readings) == [7.0] * 3
+
+    def test_a_stopwatch_counts_a_call_that_fails(self) -> None:
+        times = iter([0.0, 1.0, 2.0, 4.0])
+        thing = SimpleNamespace(invert=lambda x: 1 / x)
+        watch = Stopwatch(thing, "invert", clock=lambda: next(times))
+        with pytest.raises(ZeroDivisionError):
+            thing.invert(0)
+        assert thing.invert(2) == 0.5
+        assert watch.seconds == 3.0
+
+    @given(st.lists(st.tuples(st.integers(0, 3), st.floats(0.01, 10.0)), min_size=1, max_size=20))
+    def test_laps_go_from_movement_to_movement(self, calls: list[tuple[int, float]]) -> None:
+        steps, durations = zip(*calls, strict=True)
+        ends, times = np.cumsum(durations), 0.02 * np.cumsum(steps)
+        laps = laps_s(list(ends), list(times), 0.02)
+        moves = [index for index, n in enumerate(steps) if n]
+        assert len(laps) == max(0, len(moves) - 1)
+        weighed = laps * [steps[index] for index in moves[1:]]
+        assert weighed.sum() == pytest.approx(ends[moves[-1]] - ends[moves[0]] if moves else 0.0)
+
+    @given(st.lists(positive, min_size=5, max_size=5), positive, positive, positive, positive)
+    def test_shares_add_up_to_one(
+        self, phases: list[float], rest: float, around: float, control: float, loop: float
+    ) -> None:
+        step = sum(phases) + rest
+        engine = EngineTimes(tuple(phases), step, step + around, (), ())
+        # The timed run may be longer than the one with the engine's timers.
+        plant, total = 3 * (step + around), 3 * (step + around) + control + loop
+        found = shares(total, plant, control, engine)
+        assert tuple(found) == PHASES
+        assert sum(found.values()) == pytest.approx(1.0)
+        expected = [*(3 * phase for phase in phases), 3 * rest, 3 * around, control, loop]
+        assert list(found.values()) == pytest.approx([part / total for part in expected], abs=1e-9)
+
+
+class TestCases:
+    @pytest.mark.parametrize("effort", ["quick", "full"])
+    def test_each_is_a_valid_configuration_and_there_once(self, effort: Any) -> None:
+        cases = bench_cases(effort)
+        assert len({case.name for case in cases}) == len({case.case.config.model_dump_json() for case in cases})
+        assert {line for case in cases for line in case.lines} == set(LINES) - {"peer"}
+
+    def test_the_full_benchmark_takes_over_what_the_quick_one_measured(self) -> None:
+        full = {case.name: case.case.config for case in bench_cases("full")}
+        for case in bench_cases("quick"):
+            assert full[case.name] == case.case.config
+
+    def test_all_levels_are_among_the_cases(self) -> None:
+        entries = judge(cases := bench_cases("quick", ["levels"]), {case.name: {"failed": "-"} for case in cases})
+        assert set(entries["levels"]) == set(LEVELS)
+        by_name = {case.name: case for case in cases}
+        for level, name in entries["levels"].items():
+            preset = load_config(LEVELS[level].preset, LEVELS[level].changes)
+            assert by_name[name].case.config.body == preset.body
+            assert by_name[name].case.config.clock == preset.clock
+
+    def test_converged_runs_are_there_where_something_is_judged(self) -> None:
+        assert [case.name for case in bench_cases("full", ["steps"]) if case.kind == "converged"] == [
+            "converged, 3 elements",
+            "converged, 6 elements",
+        ]
+        assert all(case.kind == "speed" for case in bench_cases("full", ["segments", "chain"]))
+
+    def test_the_converged_run_differs_in_step_contact_and_sampling_only(self) -> None:
+        fine, coarse = converged(3).case.config, judged(3, 20, "steps").case.config
+        body = fine.body.model_dump()
+        assert body["formulation"].pop("friction_impedance_ratio") == 1000.0
+        other = coarse.body.model_dump()
+        other["formulation"].pop("friction_impedance_ratio")
+        assert body == other
+        assert fine.clock.physics_timestep_s == 0.0005
+        assert fine.clock.control_timestep_s == coarse.clock.control_timestep_s == 0.001
+        assert (fine.controller, fine.sensor, fine.arena) == (coarse.controller, coarse.sensor, coarse.arena)
+
+    def test_an_unknown_line_is_refused(self) -> None:
+        with pytest.raises(ConfigError, match="did you mean 'segments'"):
+            bench_cases("full", ["segmets"])
+
+
+SPEED = {
+    "status": "complete",
+    "real_time_factor": 2.0,
+    "step_median_ms": 4.0,
+    "step_mean_ms": 4.0,
+    "shares": dict.fromkeys(PHASES, 1.0 / len(PHASES)),
+    "peak_memory_MB": 150.0,
+    "rhythm": {"verdict": "ordered", "reason": "in order"},
+    "summary": numbers(),
+}
+
+
+def as_measured(cases: list[BenchCase], **special: Any) -> dict[str | None, Any]:
+    return {case.name: {**SPEED, "step_median_ms": 1.5 * case.body.n_segments} | special for case in cases}
+
+
+class TestJudging:
+    def test_errors_of_a_disordered_run_are_stated_but_set_no_front(self) -> None:
+        cases = bench_cases("quick", ["steps"])
+        measured = as_measured(cases)
+        fastest = measured["rods, 2 elements, 20 ms"]
+        fastest |= {"real_time_factor": 9.0, "rhythm": {"verdict": "disordered", "reason": "out of order"}}
+        fastest["summary"] = numbers(elongation=0.081)
+        report = judge(cases, measured)
+        entry = next(entry for entry in report["cases"] if entry["name"] == "rods, 2 elements, 20 ms")
+        assert entry["errors"]["converged, 3 elements"]["largest"] == pytest.approx(0.001 / 0.08)
+        assert entry["rhythm"]["reason"] == "out of order"
+        assert len(report["fronts"]["converged, 3 elements"]) == 1
+        assert entry["name"] not in report["fronts"]["converged, 3 elements"]
+
+    def test_the_meshes_are_compared_with_both_converged_runs(self) -> None:
+        cases = bench_cases("full", ["steps"])
+        measured = as_measured(cases)
+        measured["converged, 6 elements"]["summary"] = numbers(period=2.5)
+        for entry in judge(cases, measured)["cases"]:
+            if entry["kind"] == "judged":
+                found = entry["errors"]
+                assert found["converged, 3 elements"]["largest"] == 0.0
+                assert found["converged, 6 elements"]["period"] == pytest.approx(0.1 / 2.5)
+
+    def test_exponents_over_both_ranges(self) -> None:
+        cases = bench_cases("full", ["segments"])
+        found = judge(cases, as_measured(cases))["cost_exponents"]
+        assert found[RODS] == pytest.approx({"3-48": 1.0, "12-48": 1.0})
+        assert found[CHAIN] == {}
+
+    def test_a_failed_case_is_named_with_its_reason(self) -> None:
+        cases = bench_cases("quick", ["steps"])
+        measured = as_measured(cases)
+        measured["rods, 3 elements, 5 ms"] = {"failed": "not enough memory"}
+        measured["converged, 3 elements"] = {"failed": "not enough memory"}
+        report = judge(cases, measured)
+        assert [entry["failed"] for entry in report["cases"] if "failed" in entry] == ["not enough memory"] * 2
+        assert report["fronts"] == {}
+
+
+class TestStore:
+    def test_what_is_measured_is_kept_and_an_interruption_loses_the_case_in_progress_only(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[dict[str, Any]] = []
+
+        def in_a_process(request: dict[str, Any], progress: Any) -> dict[str, Any]:
+            asked.append(request)
+            if len(asked) == 3:
+                raise KeyboardInterrupt
+            progress(1.0)
+            return SPEED
+
+        monkeypatch.setattr(store_module, "_in_a_process", in_a_process)
+        with pytest.raises(KeyboardInterrupt):
+            bench(tmp_path, "quick", lines=["steps"])
+        assert not (tmp_path / JSON_NAME).exists()
+        n_cases = len(bench_cases("quick", ["steps"]))
+        told: list[tuple[int, int, float]] = []
+        path = bench(tmp_path, "quick", lines=["steps"], progress=lambda _, *state: told.append(state))
+        assert len(asked) == n_cases + 1
+        assert told[0] == (2, n_cases, 0.0)
+        assert told[-1][2] == pytest.approx(1.0)
+        assert [share for *_, share in told] == sorted(share for *_, share in told)
+        report = json.loads(path.read_text())
+        assert len(report["cases"]) == n_cases
+        assert report["peer"] is None
+
+    @pytest.mark.parametrize("reads", ["cat > /dev/null", "exec <&-"])
+    def test_a_dead_process_is_told_and_not_kept(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reads: str
+    ) -> None:
+        program = tmp_path / "dies"
+        program.write_text(f"#!/bin/sh\n{reads}\necho by the way\necho out of luck >&2\nexit 3\n")
+        program.chmod(0o755)
+        monkeypatch.setattr(sys, "executable", str(program))
+        case, store = judged(2, 20, "steps"), Measurements(tmp_path / "cases")
+        with pytest.raises(MeasurementFailed, match="out of luck"):
+            store.measure(case, lambda share: None)
+        assert store.find(case) is None
+        report = json.loads(bench(tmp_path, "quick", lines=["duration"]).read_text())
+        assert [entry["failed"] for entry in report["cases"]] == ["out of luck"]
+        assert "failed: out of luck" in list(bench_table(report).columns[1].cells)
+
+    def test_a_case_is_measured_in_a_process_of_its_own(self, tmp_path: Path) -> None:
+        ballast = np.ones(40_000_000)
+        case = timed(RODS, 3, 0.2, "duration")
+        store = Measurements(tmp_path)
+        shares_told: list[float] = []
+        found = store.measure(case, shares_told.append)
+        assert store.find(case) == found
+        assert found["status"] == "complete"
+        assert sum(found["shares"].values()) == pytest.approx(1.0)
+        assert all(share > -0.02 for share in found["shares"].values())
+        assert all(found["shares"][phase] > 0.0 for phase in ENGINE_PHASES)
+        assert found["compile_s"] > 0.0
+        body = case.body
+        assert found["velocities"] > 3 * body.mesh.n_helices * body.mesh.elements_per_side
+        if Path("/proc/self/status").is_file():
+            assert 1e6 * found["peak_memory_MB"] < ballast.nbytes
+        assert found["real_time_factor"] * found["wall_s"] == pytest.approx(found["simulated_s"], rel=1e-6)
+        # Laps run from the end of the first step to the end of the last.
+        n_steps = round(found["simulated_s"] / case.case.config.clock.physics_timestep_s)
+        assert found["step_mean_ms"] * (n_steps - 1) <= 1e3 * found["wall_s"]
+        assert shares_told == sorted(shares_told)
+
+
+def test_finer_physics_than_control_counts_single_steps() -> None:
+    config = load_config(RODS, {"duration_s": 0.02, "clock.physics_timestep_s": 0.0005})
+    found = measure(config)
+    # Two physics steps a call, and 19 laps between 20 calls.
+    assert 0.0 < found["step_mean_ms"] * 38 <= 1e3 * found["wall_s"]
+
+
+def test_peak_memory_grows_by_what_is_allocated() -> None:
+    before = peak_memory_bytes()
+    assert before is not None
+    block = np.ones((before + 100_000_000) // 8)
+    after = peak_memory_bytes()
+    assert after is not None
+    assert after >= block.nbytes > before
+
+
+class TestPeer:
+    def test_the_step_is_the_stability_limit_of_a_section_turning_against_shear(self) -> None:
+        body = load_config(CHAIN).body
+        assert isinstance(body, WormBody)
+        strands = body.strands
+        area, inertia = math.pi * strands.radius_m**2, math.pi * strands.radius_m**4 / 4
+        stiffness = peer_module.SHEAR_CORRECTION * strands.shear_modulus_Pa * area
+        per_length = strands.linear_density_kg_per_m / area * inertia
+        rate = stiffness / per_length
+
+        def grows(step: float) -> bool:
+            angle, speed = 1.0, 0.0
+            for _ in range(2000):
+                angle += 0.5 * step * speed
+                speed -= step * rate * angle
+                angle += 0.5 * step * speed
+            return abs(angle) > 100.0
+
+        limit = peer_module.stable_step_s(strands)
+        assert not grows(0.99 * limit)
+        assert grows(1.01 * limit)
+
+    def test_a_missing_peer_is_told_with_the_line_that_installs_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(peer_module, "find_spec", lambda name: None)
+        assert peer_module.peer() == {"installed": False, "install": "pip install pyelastica"}
+
+    def test_a_missing_peer_is_asked_for_again(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        answers = iter([{"installed": False, "install": "-"}, {"installed": True, "real_time_factor": 0.1}])
+        monkeypatch.setattr(store_module, "_in_a_process", lambda request, progress: next(answers))
+        assert [json.loads(bench(tmp_path, lines=["peer"]).read_text())["peer"]["installed"] for _ in range(3)] == [
+            False,
+            True,
+            True,
+        ]
+
+    @pytest.mark.slow
+    def test_pyelastica_is_stable_up_to_the_limit(self) -> None:
+        pytest.importorskip("elastica")
+        found = peer_module.peer()
+        assert found["stable"]
+        assert found["step_us"] == pytest.approx(found["step_limit_us"], rel=0.03)
+
+
+class TestPicture:
+    def report(self, effort: Any, lines: list[str] | None = None) -> dict[str, Any]:
+        cases = bench_cases(effort, lines)
+        measured = as_measured(cases)
+        for case in cases:
+            if case.kind == "judged":
+                measured[case.name]["summary"] = numbers(period=2.6 + 0.01 * case.body.mesh.elements_per_side)
+        peer = {"installed": True, "rods": 12, "step_mean_ms": 0.1, "real_time_factor": 0.05}
+        return {"machine": "2 cores", "peer": peer, **judge(cases, measured)}
+
+    def test_holds_all_panels(self, tmp_path: Path) -> None:
+        path = bench_figure(self.report("full"), tmp_path / "bench")
+        assert path.read_bytes().startswith(b"\x89PNG")
+        text = path.with_suffix(".svg").read_text()
+        for words in ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..48)", "constraint"):
+            assert f"<!-- {words}" in text or words in text, words
+
+    @pytest.mark.parametrize("lines", [["peer"], ["chain"], ["levels"], ["duration"], ["steps"]])
+    def test_leaves_out_what_was_not_measured(self, tmp_path: Path, lines: list[str]) -> None:
+        text = bench_figure(self.report("quick", lines), tmp_path / "bench").with_suffix(".svg").read_text()
+        assert ("Cost of a step" in text) == (lines == ["chain"])
+        assert ("Where the time" in text) == (lines in (["chain"], ["levels"]))
+        assert ("Against converged" in text) == (lines in (["levels"], ["steps"]))

@@ -20,10 +20,12 @@ if TYPE_CHECKING:
     from annelid.nervous import Network
     from annelid.protocols import Controller, Plant, Sensation
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
+    from annelid.simulation.batch import BatchResult, simulate_batch
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "BatchResult": "simulation.batch",
     "Controller": "protocols",
     "Network": "nervous",
     "Plant": "protocols",
@@ -36,10 +38,12 @@ _HOME = {
     "open_run": "simulation",
     "preset_names": "config",
     "simulate": "simulation",
+    "simulate_batch": "simulation.batch",
     "summary": "analysis",
 }
 
 __all__ = [
+    "BatchResult",
     "Controller",
     "Network",
     "Plant",
@@ -53,6 +57,7 @@ __all__ = [
     "open_run",
     "preset_names",
     "simulate",
+    "simulate_batch",
     "summary",
 ]
 

@@ -2,7 +2,8 @@
 
 Any body (2D or 3D) is a `Plant`, anything that turns sensation into activation is a `Controller`.
 Both may also be *recordable* (they name signals for the run file) and *stateful* (they can be saved
-and restored bit for bit); the simulation asks for those capabilities and does without where they are absent.
+and restored bit for bit), and take several control steps at a *stride* while the body rests; the simulation asks for
+those capabilities and does without where they are absent.
 """
 
 from __future__ import annotations
@@ -73,6 +74,38 @@ class Controller(Protocol):
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step; returns activation in [0, 1], shape ``(n_muscles,)``."""
+        ...
+
+
+@runtime_checkable
+class SlowPlant(Protocol):
+    """The capability of a plant that may be slower than the control clock of telling when it moves next."""
+
+    def steps_to_move(self) -> int:
+        """Returns the number of control steps to the end of the next one in which the body moves, at least 1.
+
+        Until then the sensation stays what it is, but for its time.
+        """
+        ...
+
+    def stride(self, activation: Array, n_steps: int) -> Sensation:
+        """Advances by ``n_steps`` control steps, at most `steps_to_move`; the same as so many calls of ``step``.
+
+        ``activation`` is that of the last of them, the only one in which the body may move.
+        """
+        ...
+
+
+@runtime_checkable
+class StridingController(Protocol):
+    """The capability of a controller of taking several control steps under one sensation."""
+
+    def stride(self, sensation: Sensation, n_steps: int) -> Array:
+        """Advances by ``n_steps`` control steps; the same as so many calls of ``step`` bit for bit.
+
+        ``sensation`` is that of the first step. Those of the others differ from it in their times only, which are
+        multiples of the control timestep. Returns the activation after the last.
+        """
         ...
 
 

@@ -232,7 +232,9 @@ def test_a_worm_of_rods_contracts_its_ring_and_can_be_continued(tmp_path: Path) 
     whole = simulate(rods(0.4), tmp_path / "3", progress=False)
     rings = whole.data["ring_length"].values.reshape(-1, 3, 2).sum(axis=2)
     assert rings[-1, 1] < 0.8 * rings[0, 1]
-    assert np.abs(rings[:10] / rings[0] - 1).max() < 0.02
+    before = whole.data["time"].values <= 0.05
+    assert before.sum() > 1
+    assert np.abs(rings[before] / rings[0] - 1).max() < 0.02
     np.testing.assert_array_equal(whole.data["activation"].values[:, 2], whole.data["activation"].values[:, 3])
     first = simulate(rods(0.2), tmp_path / "1", progress=False)
     joined_equal(first, simulate(rods(0.4), tmp_path / "2", resume=first, progress=False), whole)

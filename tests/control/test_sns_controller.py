@@ -1,15 +1,17 @@
 """The controller around the peristalsis network: order of a step, activation, state, records."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid import config
-from annelid.control import SnsController
+from annelid.control import CopySettings, SnsController
 from annelid.errors import ConfigError
 from annelid.nervous import neuron_names
-from annelid.protocols import Controller, Records, Sensation, Stateful, Watched
+from annelid.protocols import Controller, Records, Sensation, Stateful, StridingController, Watched
 
 REST_M = 0.07
 
@@ -182,3 +184,75 @@ def test_alarm_rings_when_the_step_is_too_long_and_only_then():
 def test_worms_that_do_not_fit_are_refused(n_segments, n_muscles):
     with pytest.raises(ConfigError, match=r"n_(muscles|segments)"):
         controller(n_segments=n_segments, n_muscles=n_muscles)
+
+
+def same_state(one: SnsController, other: SnsController) -> None:
+    for a, b in zip(one.get_state().values(), other.get_state().values(), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+chunk_sizes = st.lists(st.integers(1, 30), min_size=1, max_size=8)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    chunks=chunk_sizes,
+    hold_s=st.floats(0.0, 0.08),
+    tolerance_m=st.floats(0.0, 0.02),
+    hysteresis_m=st.floats(0.0, 0.01),
+    timestep_s=st.sampled_from([0.001, 0.0005, 0.0007]),
+    scheme=st.sampled_from(["euler", "toolbox", "heun"]),
+    seed=st.integers(0, 999),
+)
+def test_a_stride_is_bitwise_so_many_steps(chunks, hold_s, tolerance_m, hysteresis_m, timestep_s, scheme, seed):
+    section = config.StretchSensor(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=hold_s)
+    one, other = (controller(timestep_s=timestep_s, sensor=section, scheme=scheme, kick_nA=2.0) for _ in range(2))
+    assert isinstance(one, StridingController)
+    rng = np.random.default_rng(seed)
+    taken = 0
+    for n_steps in chunks:
+        excess = rng.uniform(-0.01, 0.03, 3)
+        strode = one.stride(sensation(taken * timestep_s, excess), n_steps)
+        stepped = np.array([])
+        for step in range(taken, taken + n_steps):
+            stepped = other.step(sensation(step * timestep_s, excess))
+        np.testing.assert_array_equal(strode, stepped)
+        same_state(one, other)
+        taken += n_steps
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    chunks=chunk_sizes,
+    n_copies=st.integers(1, 9),
+    hold_s=st.sampled_from([0.0, 0.02, 0.2]),
+    seed=st.integers(0, 999),
+)
+def test_copies_with_settings_of_their_own_are_bitwise_single_controllers(chunks, n_copies, hold_s, seed):
+    rng = np.random.default_rng(seed)
+    sections = [
+        (
+            config.SnsController(kick_nA=rng.uniform(0, 2), sensor_current_nA=rng.uniform(10, 25)),
+            config.StretchSensor(
+                tolerance_m=rng.uniform(0, 0.02), hysteresis_m=rng.choice([0.0, 0.005]), startup_hold_s=hold_s
+            ),
+        )
+        for _ in range(n_copies)
+    ]
+    singles = [SnsController(sns, sensor, 3, 3, 0.001) for sns, sensor in sections]
+    batch = controller(sensor=config.StretchSensor(startup_hold_s=hold_s))
+    each = CopySettings.of(sections)
+    first = [one.get_state() for one in singles]
+    states = {name: np.stack([state[name] for state in first]) for name in first[0]} | {"n_steps": np.array(0)}
+    taken = 0
+    for n_steps in chunks:
+        alike = [sensation(taken * 0.001, rng.uniform(-0.01, 0.03, 3)) for _ in singles]
+        together = replace(alike[0], stretch_m=np.stack([felt.stretch_m for felt in alike]))
+        states, activation = batch.step_copies(states, together, n_steps, each)
+        taken += n_steps
+        assert int(states["n_steps"]) == taken
+        for copy, (one, felt) in enumerate(zip(singles, alike, strict=True)):
+            np.testing.assert_array_equal(activation[copy], one.stride(felt, n_steps))
+            alone = one.get_state()
+            for name in ("potential", "gate", "sensor_on"):
+                np.testing.assert_array_equal(states[name][copy], alone[name])

@@ -80,3 +80,33 @@ def test_the_reading_is_the_callers_to_keep():
 def test_no_segments_are_refused():
     with pytest.raises(ConfigError, match="n_segments"):
         sensor(n_segments=0)
+
+
+@given(
+    n_worms=st.integers(1, 6),
+    n_sensors=st.integers(1, 20),
+    time_s=st.sampled_from([0.0, 0.1, 0.2, 5.0]),
+    axes=st.permutations(range(3)),
+    seed=st.integers(0, 999),
+)
+def test_worms_with_tolerances_of_their_own_are_read_as_alone(n_worms, n_sensors, time_s, axes, seed):
+    rng = np.random.default_rng(seed)
+    rest = rng.uniform(0.06, 0.08, (3, n_sensors))
+    tolerance, hysteresis = rng.uniform(0, 0.02, n_worms), rng.uniform(0, 0.01, n_worms)
+    before = rng.random((n_worms, 3)) < 0.5
+    shape = np.array([n_worms, 3, n_sensors])
+    # Some memory layout: the bits of a mean must not depend on it.
+    lengths = np.empty(shape[list(axes)]).transpose(np.argsort(axes))
+    lengths[...] = rest + rng.uniform(-0.01, 0.03, shape)
+    together = sensor(9.9, startup_hold_s=0.2).reading(
+        before, lengths, rest, time_s, tolerance[:, np.newaxis], hysteresis[:, np.newaxis]
+    )
+    for worm in range(n_worms):
+        alone = sensor(tolerance[worm], hysteresis[worm], startup_hold_s=0.2)
+        alone.on[:] = before[worm]
+        stretch = np.array(lengths[worm], order="C")
+        assert np.array_equal(together[worm], alone.read(stretch, rest, time_s))
+        # A worm that sits right on its threshold finds any other order of the sum.
+        mean = (stretch - rest).sum(axis=-1) / n_sensors
+        on_edge = sensor(9.9).reading(before[worm], lengths[worm], rest, time_s, mean, 0.0)
+        assert on_edge.all()

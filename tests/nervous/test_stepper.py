@@ -16,6 +16,7 @@ from annelid.nervous import (
     Neuron,
     PeristalsisParameters,
     Synapse,
+    peristalsis_network,
     persistent_sodium,
 )
 
@@ -106,7 +107,53 @@ def test_batch_equals_single_runs(recipe, scheme, n_worms, seed):
         state = single.initial_state()
         state.potential[0] = start.potential[worm]
         alone = single.run(inputs[:, worm], state)
-        np.testing.assert_allclose(together[:, worm], alone[:, 0], rtol=1e-10, atol=1e-10)
+        np.testing.assert_array_equal(together[:, worm], alone[:, 0])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    n_segments=st.integers(3, 9),
+    n_worms=st.integers(1, 40),
+    scheme=st.sampled_from(SCHEMES),
+    n_steps=st.integers(1, 25),
+    seed=st.integers(0, 999),
+)
+def test_worms_of_a_batch_of_any_size_are_bitwise_those_alone(n_segments, n_worms, scheme, n_steps, seed):
+    network = peristalsis_network(n_segments)
+    rng = np.random.default_rng(seed)
+    inputs = rng.uniform(0, 20, (n_worms, n_segments + 1))
+    batch, single = network.compile(1.0, scheme, n_worms), network.compile(1.0, scheme)
+    together = batch.initial_state()
+    together.potential += rng.uniform(-10, 10, together.potential.shape)
+    together.gate[...] = rng.uniform(0, 1, together.gate.shape)
+    start = together.copy()
+    batch.advance(together, inputs, n_steps)
+    for worm in range(n_worms):
+        alone = single.initial_state()
+        alone.potential[0], alone.gate[0] = start.potential[worm], start.gate[worm]
+        single.advance(alone, inputs[worm], n_steps)
+        np.testing.assert_array_equal(together.potential[worm], alone.potential[0])
+        np.testing.assert_array_equal(together.gate[worm], alone.gate[0])
+    assert (together.potential != start.potential).all()
+
+
+@settings(max_examples=60)
+@given(
+    recipe=recipes(),
+    scheme=st.sampled_from(SCHEMES),
+    n_worms=st.integers(1, 3),
+    chunks=st.lists(st.integers(0, 9), min_size=1, max_size=5),
+    seed=st.integers(0, 99),
+)
+def test_many_steps_in_one_call_are_bitwise_as_many_calls(recipe, scheme, n_worms, chunks, seed):
+    stepper = recipe.build(list(range(len(recipe.neurons)))).compile(TIMESTEP_MS, scheme, n_worms)
+    together, singly = stepper.initial_state(), stepper.initial_state()
+    for n_steps, inputs in zip(chunks, random_inputs(recipe, n_worms, seed, len(chunks)), strict=True):
+        stepper.advance(together, inputs, n_steps)
+        for _ in range(n_steps):
+            stepper.advance(singly, inputs)
+        np.testing.assert_array_equal(together.potential, singly.potential)
+        np.testing.assert_array_equal(together.gate, singly.gate)
 
 
 @settings(max_examples=60)

@@ -7,6 +7,7 @@ import mujoco
 from annelid.arena.floor import add_floor
 from annelid.body.actuation import add_ring_muscles, add_springs
 from annelid.body.chain import add_chains
+from annelid.body.elimination import order_elimination
 from annelid.body.rods import add_rods
 from annelid.config import Chain, Mesh, RunConfig, WormBody
 from annelid.errors import ConfigError
@@ -62,3 +63,17 @@ def build_spec(config: RunConfig) -> mujoco.MjSpec:
     add_ring_muscles(spec, geometry, body.rings)
     add_floor(spec, arena, geometry.length_m)
     return spec
+
+
+def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compiles a worm and lets the engine factor it in an order fit for a long tube.
+
+    Args:
+        spec: What `build_spec` returned, with anything added to it.
+
+    Raises:
+        ValueError: The engine refuses the model.
+    """
+    model = spec.compile()
+    order_elimination(model)
+    return model

@@ -3,13 +3,14 @@
 from annelid.control.callable import CallableController
 from annelid.control.oscillators import AdaptiveController, HeteroclinicController, PhaseChainController
 from annelid.control.program import ProgramController
-from annelid.control.sns import SnsController
+from annelid.control.sns import CopySettings, SnsController
 from annelid.control.stretch_sensor import StretchSensor
 from annelid.control.waves import SineController, TimedController
 
 __all__ = [
     "AdaptiveController",
     "CallableController",
+    "CopySettings",
     "HeteroclinicController",
     "PhaseChainController",
     "ProgramController",

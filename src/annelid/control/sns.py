@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,33 @@ from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, neuron
 from annelid.protocols import Array, Recordable, Sensation, Signal, State
 
 _CONTRACTION, _EXPANSION, _NEURONS_A_SEGMENT = 0, 1, 4
+
+
+@dataclass(frozen=True, slots=True)
+class CopySettings:
+    """What may differ between copies that are advanced together: one number for all, or an array ``(n_copies,)``.
+
+    Attributes:
+        tolerance_m: Tolerance of the stretch sensors, m.
+        hysteresis_m: Their hysteresis, m.
+        sensor_current_nA: Current of a sensor that is on, nA.
+        kick_nA: Current of the first step, nA.
+    """
+
+    tolerance_m: float | Array
+    hysteresis_m: float | Array
+    sensor_current_nA: float | Array
+    kick_nA: float | Array
+
+    @classmethod
+    def of(cls, sections: Sequence[tuple[settings.SnsController, settings.StretchSensor]]) -> Self:
+        """Returns those of the configurations of all copies, given as sections of the controller and its sensors."""
+        return cls(
+            tolerance_m=np.array([sensor.tolerance_m for _, sensor in sections]),
+            hysteresis_m=np.array([sensor.hysteresis_m for _, sensor in sections]),
+            sensor_current_nA=np.array([controller.sensor_current_nA for controller, _ in sections]),
+            kick_nA=np.array([controller.kick_nA for controller, _ in sections]),
+        )
 
 
 class SnsController:
@@ -59,7 +88,13 @@ class SnsController:
         self._stepper = peristalsis_network(n_segments, self._parameters).compile(
             timestep_ms=1e3 * control_timestep_s, scheme=config.scheme
         )
+        self._timestep_s = control_timestep_s
         self._sensor = StretchSensor(sensor, n_segments)
+        self._own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, config.sensor_current_nA, config.kick_nA)
+        drive = (config.sensor_current_nA + config.kick_nA) / config.leak_conductance_uS
+        reversals = config.excitatory_reversal_mV, config.sodium_reversal_mV
+        self._explicable_mV = config.inhibitory_reversal_mV - drive, max(reversals) + drive
+        self._no_gates = np.full(len(self._stepper.arrays.neurons), np.nan)
         self._batches: dict[int, tuple[Stepper, NetworkState]] = {}
         self._inputs_nA = np.zeros(n_segments + 1)
         self.reset(0)
@@ -79,43 +114,85 @@ class SnsController:
         Returns:
             Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
         """
-        on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, sensation.time_s)
-        np.multiply(on, self._config.sensor_current_nA, out=self._inputs_nA[:-1])
-        self._inputs_nA[-1] = self._config.kick_nA if self._n_steps == 0 else 0.0
-        self._stepper.advance(self._state, self._inputs_nA)
-        self._n_steps += 1
+        return self.stride(sensation, 1)
+
+    def stride(self, sensation: Sensation, n_steps: int) -> Array:
+        """Advances by control steps that feel the same lengths; bit for bit the same as so many calls of `step`.
+
+        Args:
+            sensation: What the body feels at the beginning of the first step; its time is a multiple of the
+                control step, and goes on.
+            n_steps: Control steps, at least 1.
+
+        Returns:
+            Activation after the last step, as `step` returns it.
+        """
+        for n, time_s in self._pieces(self._n_steps, sensation.time_s, n_steps):
+            on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, time_s)
+            np.multiply(on, self._config.sensor_current_nA, out=self._inputs_nA[:-1])
+            self._inputs_nA[-1] = self._config.kick_nA if self._n_steps == 0 else 0.0
+            self._stepper.advance(self._state, self._inputs_nA, n)
+            self._n_steps += n
         return self._activation(self._state.potential[0])
 
-    def step_copies(self, states: State, sensation: Sensation) -> tuple[State, Array]:
-        """Advances many copies by one control step at once, as `step` does one; changes nothing here.
+    def step_copies(
+        self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
+    ) -> tuple[State, Array]:
+        """Advances many copies at once, each as `stride` does one, bit for bit; changes nothing here.
 
         Args:
             states: As `get_state` returns them, the arrays but for the number of steps with one more axis in
                 front, ``n_copies`` long.
             sensation: Lengths with the same axis in front, ``(n_copies, n_segments, n_sensors)``; one time for all.
+            n_steps: Control steps under these lengths, at least 1.
+            each: What differs between the copies; None for this controller's own settings.
 
         Returns:
-            The states one step on, and their activation, ``(n_copies, n_muscles)``.
+            The states that many steps on, and their activation, ``(n_copies, n_muscles)``.
         """
-        on = self._sensor.reading(
-            states["sensor_on"].astype(bool), sensation.stretch_m, sensation.rest_stretch_m, sensation.time_s
+        each = each or self._own
+        tolerance, hysteresis, current = (
+            np.asarray(value)[..., np.newaxis]
+            for value in (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
         )
-        n_copies = len(on)
+        lengths = sensation.stretch_m, sensation.rest_stretch_m
+        on = states["sensor_on"].astype(bool)
+        n_copies, n_taken = len(on), int(states["n_steps"])
         stepper, batch = self._batch(n_copies)
-        inputs = np.zeros((stepper.n_worms, self._n_segments + 1))
-        inputs[:n_copies, :-1] = self._config.sensor_current_nA * on
-        inputs[:, -1] = self._config.kick_nA if int(states["n_steps"]) == 0 else 0.0
         batch.potential[:n_copies] = states["potential"][:, 0]
         batch.gate[:n_copies] = states["gate"][:, 0]
-        stepper.advance(batch, inputs)
+        inputs = np.zeros((stepper.n_worms, self._n_segments + 1))
+        for n, time_s in self._pieces(n_taken, sensation.time_s, n_steps):
+            on = self._sensor.reading(on, *lengths, time_s, tolerance, hysteresis)
+            inputs[:n_copies, :-1] = current * on
+            inputs[:n_copies, -1] = each.kick_nA if n_taken == 0 else 0.0
+            stepper.advance(batch, inputs, n)
+            n_taken += n
         potential, gate = batch.potential[:n_copies].copy(), batch.gate[:n_copies].copy()
         after: State = {
             "potential": potential[:, np.newaxis],
             "gate": gate[:, np.newaxis],
             "sensor_on": on,
-            "n_steps": np.array(int(states["n_steps"]) + 1),
+            "n_steps": np.array(n_taken),
         }
         return after, self._activation(potential)
+
+    def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
+        """Cuts steps under one sensation where the inputs change: after the kick, and at the end of the hold.
+
+        Returns:
+            For every piece its number of steps and the time at its beginning, s.
+        """
+        held = self._sensor.held_at(time_s)
+        if n_steps == 1 or (n_taken > 0 and not held):
+            return [(n_steps, time_s)]
+        first = round(time_s / self._timestep_s)
+        times_s = [time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
+        cuts = {0, n_steps} | ({1} if n_taken == 0 else set())
+        if held:
+            cuts.add(sum(self._sensor.held_at(time) for time in times_s))
+        ends = sorted(cuts)
+        return [(end - start, times_s[start]) for start, end in pairwise(ends)]
 
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""
@@ -151,7 +228,7 @@ class SnsController:
         if frame:
             return {}
         potential = self._state.potential[0]
-        gate = np.full(potential.shape, np.nan)
+        gate = self._no_gates.copy()
         gate[self._stepper.arrays.channel_neuron] = self._state.gate[0, 0]
         return {
             "potential": potential.copy(),
@@ -177,14 +254,12 @@ class SnsController:
 
     def alarm(self) -> str | None:
         """Returns a sentence if a potential has left the range that currents and reversals can explain."""
-        p, c = self._parameters, self._config
-        drive = (c.sensor_current_nA + c.kick_nA) / p.leak_conductance_uS
-        low = p.inhibitory_reversal_mV - drive
-        high = max(p.excitatory_reversal_mV, p.sodium_reversal_mV) + drive
+        low, high = self._explicable_mV
         potential = self._state.potential[0]
-        within = (potential >= low) & (potential <= high)
-        if within.all():
+        # Written so that NaN fails it.
+        if np.minimum.reduce(potential) >= low and np.maximum.reduce(potential) <= high:
             return None
+        within = (potential >= low) & (potential <= high)
         worst = int(np.argmin(within))
         return (
             f"potential of {self._stepper.arrays.neurons[worst]} is {potential[worst]:.4g} mV, outside "

@@ -53,7 +53,13 @@ class StretchSensor:
         return self.on.copy()
 
     def reading(
-        self, before: NDArray[np.bool_], stretch_m: Array, rest_stretch_m: Array, time_s: float
+        self,
+        before: NDArray[np.bool_],
+        stretch_m: Array,
+        rest_stretch_m: Array,
+        time_s: float,
+        tolerance_m: float | Array | None = None,
+        hysteresis_m: float | Array | None = None,
     ) -> NDArray[np.bool_]:
         """Tells what `read` reads from lengths, without remembering it; any number of worms at once.
 
@@ -62,13 +68,26 @@ class StretchSensor:
             stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.
             rest_stretch_m: Their lengths at rest, m, same shape.
             time_s: Simulated time of the reading, s.
+            tolerance_m: Instead of the sensor's own, m: a number, or an array that broadcasts against the result,
+                such as ``(n_worms, 1)`` for one a worm.
+            hysteresis_m: Likewise.
 
         Returns:
             Shape ``(.., n_segments)``.
         """
         n_sensors = stretch_m.shape[-1]
-        excess = (stretch_m - rest_stretch_m).sum(axis=-1) / n_sensors
-        on = excess <= self._tolerance_m + self._hysteresis_m * before
-        if time_s < self._hold_until_s:
+        tolerance = self._tolerance_m if tolerance_m is None else tolerance_m
+        hysteresis = self._hysteresis_m if hysteresis_m is None else hysteresis_m
+        # In one memory layout, whatever that of the lengths: the order of a sum depends on it.
+        excess = np.subtract(stretch_m, rest_stretch_m, order="C").sum(axis=-1) / n_sensors
+        on = excess <= tolerance + hysteresis * before
+        if self.held_at(time_s):
             on[..., 0] = False
         return on
+
+    def held_at(self, time_s: float) -> bool:
+        """Tells whether segment 1's sensor is held off at a time, s.
+
+        While this and the lengths stay the same, a second reading gives what the first one gave.
+        """
+        return time_s < self._hold_until_s

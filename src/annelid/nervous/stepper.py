@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from functools import partial
+from math import prod
+from typing import Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,10 @@ from annelid.nervous.synapses import Modulated
 
 Scheme = Literal["euler", "toolbox", "heun"]
 GateStart = Literal["steady", "toolbox"]
+Operations = list[Callable[[], object]]
+
+# As arrays, numpy need not convert them at every call.
+_ZERO, _HALF, _ONE = np.array(0.0), np.array(0.5), np.array(1.0)
 
 
 @dataclass(slots=True)
@@ -44,12 +50,38 @@ class NetworkState:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """Gates and potentials, or a change of them, in one row of numbers, so that one call adds both.
+
+    Attributes:
+        all: The row.
+        gate: Its slow gates, ``(n_slow, n_worms, n_channels)``.
+        potential: Its potentials, ``(n_worms, n_neurons)``.
+    """
+
+    all: Array
+    gate: Array
+    potential: Array
+
+    @classmethod
+    def empty(cls, arrays: NetworkArrays, n_worms: int) -> Self:
+        gates = arrays.n_slow, n_worms, arrays.channel_neuron.size
+        row = np.empty(prod(gates) + n_worms * len(arrays.neurons))
+        return cls(row, row[: prod(gates)].reshape(gates), row[prod(gates) :].reshape(n_worms, -1))
+
+
 class Stepper:
     """Advances ``n_worms`` copies of a compiled network by a fixed step.
 
     With ``y = sqrt(factor exp(slope (midpoint - U)))`` a gate's steady state is ``1 / (1 + y^2)`` and its rate
     ``(1 - z (1 + y^2)) / (y time_constant_ms)``, which needs one exponential a gate. The exponents of the gates and
     the open fractions of the terminals are one affine map of the potentials; ``dt / C`` is part of the weights.
+
+    For small networks the time goes into calling numpy, not into arithmetic. So a step is laid down once as a list of
+    calls bound to fixed buffers, and made by going through the list. Every copy gets the same bits whatever their
+    number: the product with the weights is taken copy by copy, since a matrix product of all copies sums in another
+    order.
 
     Two steppers that run at once need not share anything but their arrays; one stepper keeps scratch buffers
     and must not be used from two threads.
@@ -77,26 +109,35 @@ class Stepper:
         self.n_worms = n_worms
         self._prepare_parameters()
         self._prepare_buffers()
+        self._step = self._lay_down_step()
 
     def _prepare_parameters(self) -> None:
-        a, dt = self.arrays, self.timestep_ms
-        n_channels, n_slow = a.channel_neuron.size, a.n_slow
-        shape = (len(a.gates), n_channels)
+        a, dt, w = self.arrays, self.timestep_ms, self.n_worms
+        n_slots, n_slow, n_channels = len(a.gates), a.n_slow, a.channel_neuron.size
         gates = [gate for slot in a.gates for gate in slot]
         with np.errstate(divide="ignore"):
             log_factor = np.log([gate.factor for gate in gates])
         slope = np.array([gate.slope_per_mV for gate in gates])
         midpoint = np.array([gate.midpoint_mV for gate in gates])
-        power = np.array([gate.power for gate in gates]).reshape(shape)
+        power = np.array([gate.power for gate in gates])
         taus = [gate.time_constant_ms for slot in a.gates[:n_slow] for gate in slot]
+
+        def by_slot(values: Array, n: int) -> Array:
+            """A row of channels for every slot and copy, as the buffers of the gates have it."""
+            return np.repeat(values.reshape(n, 1, n_channels), w, axis=1)
+
+        def laid_out(of_terminals: Array, of_gates: Array) -> Array:
+            """A row of terminals for every copy, then the gates."""
+            return np.concatenate([np.tile(of_terminals, w), by_slot(of_gates, n_slots).ravel()])
+
         terminal_slope = a.terminal_slope_per_mV
-        self._looked_at = np.concatenate([a.terminal_neuron, *[a.channel_neuron] * len(a.gates)])
-        self._affine_slope = np.concatenate([terminal_slope, -0.5 * slope])
-        self._affine_offset = np.concatenate(
-            [-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint)]
-        )
-        self._power = None if (power == 1.0).all() else power
-        self._gate_rate = np.array([0.0 if tau is None else dt / tau for tau in taus]).reshape(n_slow, n_channels)
+        self._affine_slope = laid_out(terminal_slope, -0.5 * slope)
+        self._affine_offset = laid_out(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
+        first = len(a.neurons) * np.arange(w)[:, np.newaxis]
+        bearers = (first + a.channel_neuron).ravel()
+        self._looked_at = np.concatenate([(first + a.terminal_neuron).ravel(), *[bearers] * n_slots])
+        self._power = None if (power == 1.0).all() else by_slot(power, n_slots)
+        self._gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), n_slow)
         membrane_rate = dt / a.capacitance_nF
         self._weights = a.weights * np.tile(membrane_rate, 2)
         self._leak_step = a.leak_conductance_uS * membrane_rate
@@ -129,7 +170,8 @@ class Stepper:
         n_terminals, n_firing = a.terminal_neuron.size, a.firing_neuron.size
         where = a.drive_slices()
         drive = np.zeros((w, a.weights.shape[0]))
-        self._drive = drive
+        # One matrix-vector product a copy.
+        self._drive = drive[:, np.newaxis]
         self._open = drive[:, where["terminals"]]
         self._release = drive[:, where["releases"]]
         self._channel_open = drive[:, where["channels"]]
@@ -137,23 +179,25 @@ class Stepper:
         self._potentials = drive[:, where["potentials"]]
         drive[:, where["one"]] = 1.0
         self._inputs = drive[:, where["inputs"]]
-        self._total = np.empty((w, 2 * n))
-        self._conductance, self._current = self._total[:, :n], self._total[:, n:]
-        self._affine = np.empty((w, self._looked_at.size))
-        self._transmission = self._affine[:, :n_terminals]
-        self._exponent = self._affine[:, n_terminals:]
-        self._y = self._exponent.reshape(w, n_slots, n_channels)
-        self._y_slow = self._y[:, :n_slow]
-        self._q = np.empty((w, n_slots, n_channels))
-        self._q_slow, self._q_instant = self._q[:, :n_slow], self._q[:, n_slow:]
-        self._z = np.empty((w, n_slots, n_channels))
-        self._gate_steps = (np.empty((w, n_slow, n_channels)), np.empty((w, n_slow, n_channels)))
-        self._gate_scratch = np.empty((w, n_slow, n_channels))
-        self._potential_steps = (np.empty((w, n)), np.empty((w, n)))
+        total = np.empty((w, 2 * n))
+        self._total = total[:, np.newaxis]
+        self._conductance, self._current = total[:, :n], total[:, n:]
+        # Terminals and gates of all copies lie in one row, so that one call serves both at any number of copies.
+        self._affine = np.empty(self._looked_at.size)
+        self._transmission = self._affine[: w * n_terminals].reshape(w, n_terminals)
+        self._exponent = self._affine[w * n_terminals :]
+        self._y = self._exponent.reshape(n_slots, w, n_channels)
+        self._y_slow = self._y[:n_slow]
+        self._q = np.empty((n_slots, w, n_channels))
+        self._q_slow, self._q_instant = self._q[:n_slow], self._q[n_slow:]
+        self._z = np.empty((n_slots, w, n_channels))
+        self._gate_scratch = np.empty((n_slow, w, n_channels))
+        self._rectified_target = np.empty((w, a.rectified_target.size))
         self._modulation = np.ones((w, len(a.modulated)))
-        self._middle = NetworkState(
-            np.empty((w, n)),
-            np.empty((w, n_slow, n_channels)),
+        self._motion = _Motion.empty(a, w)
+        self._now = NetworkState(
+            self._motion.potential,
+            self._motion.gate.swapaxes(0, 1),
             np.empty((w, n_firing)),
             np.empty((w, a.release_source.size)),
             np.zeros((w, n_firing), dtype=bool),
@@ -186,33 +230,32 @@ class Stepper:
             fired=np.zeros((w, a.firing_neuron.size), dtype=bool),
         )
 
-    def advance(self, state: NetworkState, inputs_nA: Array | None = None) -> None:
-        """Advances a state by one step, in place.
+    def advance(self, state: NetworkState, inputs_nA: Array | None = None, n_steps: int = 1) -> None:
+        """Advances a state, in place.
 
         Args:
             state: The state of all copies.
-            inputs_nA: Input currents during the step, shape ``(n_worms, n_inputs)`` or ``(n_inputs,)`` for all
+            inputs_nA: Input currents during all of the steps, shape ``(n_worms, n_inputs)`` or ``(n_inputs,)`` for all
                 copies alike; None for no current.
+            n_steps: Number of steps; bit for bit the same as so many calls.
         """
+        now, step = self._now, self._step
         self._inputs[...] = 0.0 if inputs_nA is None else inputs_nA
-        potential, gate = state.potential, state.gate
-        gate_step, potential_step = self._gate_steps[0], self._potential_steps[0]
-        self._release[...] = state.release
-        self._look(potential)
-        self._step_gates(gate, gate_step)
-        if self.scheme == "toolbox":
-            gate += gate_step
-            self._step_potentials(potential, gate, potential_step)
-        else:
-            self._step_potentials(potential, gate, potential_step)
-            if self.scheme == "heun":
-                self._average_with_end(potential, gate)
-            gate += gate_step
-        if state.fired.size:
-            self._adapt_thresholds(state)
-        potential += potential_step
-        if state.fired.size:
-            self._fire(state)
+        now.potential[...] = state.potential
+        now.gate[...] = state.gate
+        fires = state.fired.size
+        if fires:
+            now.threshold[...] = state.threshold
+            now.release[...] = state.release
+        for _ in range(n_steps):
+            for operation in step:
+                operation()
+        state.potential[...] = now.potential
+        state.gate[...] = now.gate
+        if fires:
+            state.threshold[...] = now.threshold
+            state.release[...] = now.release
+            state.fired[...] = now.fired
 
     def outputs(self, state: NetworkState) -> Array:
         """Returns the potentials that the outputs read, mV, shape ``(n_worms, n_outputs)``."""
@@ -236,94 +279,145 @@ class Stepper:
             trace[i + 1] = state.potential
         return trace
 
-    def _average_with_end(self, potential: Array, gate: Array) -> None:
-        """Replaces the Euler steps by the mean of those at the beginning and at the end that they lead to."""
-        middle = self._middle
-        np.add(potential, self._potential_steps[0], out=middle.potential)
-        np.add(gate, self._gate_steps[0], out=middle.gate)
-        self._look(middle.potential)
-        self._step_gates(middle.gate, self._gate_steps[1])
-        self._step_potentials(middle.potential, middle.gate, self._potential_steps[1])
-        for step, end in (self._gate_steps, self._potential_steps):
-            step += end
-            step *= 0.5
+    def _lay_down_step(self) -> Operations:
+        """Lists the operations that take the present state one step on."""
+        now, spiking = self._motion, self._now
+        step, middle, end = (_Motion.empty(self.arrays, self.n_worms) for _ in range(3))
+        take_step = partial(np.add, now.all, step.all, now.all)
+        look, gates, potentials = self._euler_step(now, step)
+        operations = [*look, *gates, *potentials]
+        if self.scheme == "toolbox":
+            take_gate_step = partial(np.add, now.gate, step.gate, now.gate)
+            operations = [*look, *gates, take_gate_step, *potentials]
+            take_step = partial(np.add, now.potential, step.potential, now.potential)
+        elif self.scheme == "heun":
+            # The mean of the Euler steps at the beginning and at the end that they lead to.
+            operations.append(partial(np.add, now.all, step.all, middle.all))
+            for part in self._euler_step(middle, end):
+                operations += part
+            operations.append(partial(np.add, step.all, end.all, step.all))
+            operations.append(partial(np.multiply, step.all, _HALF, step.all))
+        if not spiking.fired.size:
+            return [*operations, take_step]
+        release = partial(np.copyto, self._release, spiking.release)
+        return [release, *operations, self._adapt_thresholds, take_step, self._fire]
 
-    def _look(self, potential: Array) -> None:
+    def _euler_step(self, state: _Motion, step: _Motion) -> tuple[Operations, Operations, Operations]:
+        """Writes the Euler step at a state: what depends on potentials alone, then the gates', then the potentials'."""
+        return (
+            self._look(state.potential),
+            self._gate_step(state.gate, step.gate),
+            self._potential_step(state.potential, state.gate, step.potential),
+        )
+
+    def _look(self, potential: Array) -> Operations:
         """Finds all that depends on the potentials alone: terminals, exponentials of gates, modulation."""
-        if not self._affine.size:
-            return
-        np.take(potential, self._looked_at, axis=1, out=self._affine, mode="clip")
-        self._affine *= self._affine_slope
-        self._affine += self._affine_offset
-        if self._open.size:
-            np.maximum(self._transmission, 0.0, out=self._open)
-            np.minimum(self._open, 1.0, out=self._open)
-        if self._q.size:
-            np.exp(self._exponent, out=self._exponent)
-            np.multiply(self._y, self._y, out=self._q)
-            self._q += 1.0
+        affine, opened, q = self._affine, self._open, self._q
+        if not affine.size:
+            return []
+        operations: Operations = [
+            partial(potential.take, self._looked_at, None, affine, "clip"),
+            partial(np.multiply, affine, self._affine_slope, affine),
+            partial(np.add, affine, self._affine_offset, affine),
+        ]
+        if opened.size:
+            transmission = self._transmission
+            operations.append(partial(np.maximum, transmission, _ZERO, out=transmission))
+            operations.append(partial(np.minimum, transmission, _ONE, out=opened))
+        if q.size:
+            operations.append(partial(np.exp, self._exponent, self._exponent))
+            operations.append(partial(np.square, self._y, q))
+            operations.append(partial(np.add, q, _ONE, q))
         if self._modulation.size:
-            np.matmul(self._open, self.arrays.log_modulation, out=self._modulation)
-            np.exp(self._modulation, out=self._modulation)
+            factors = self._modulation
+            each_open, each_factor = opened[:, np.newaxis], factors[:, np.newaxis]
+            operations.append(partial(np.matmul, each_open, self.arrays.log_modulation, each_factor))
+            operations.append(partial(np.exp, factors, factors))
+        return operations
 
-    def _step_gates(self, gate: Array, step: Array) -> None:
+    def _gate_step(self, gate: Array, step: Array) -> Operations:
         """Writes the slow gates' Euler step at the potential last looked at."""
         if not step.size:
-            return
-        np.multiply(self._q_slow, gate, out=step)
-        np.subtract(1.0, step, out=step)
-        np.divide(self._gate_rate, self._y_slow, out=self._gate_scratch)
-        step *= self._gate_scratch
-        channels, factors = self._gate_factor
-        if channels.size:
-            step[:, :, channels] /= self._modulation[:, np.newaxis, factors]
+            return []
+        pace = self._gate_scratch
+        operations: Operations = [
+            partial(np.multiply, self._q_slow, gate, step),
+            partial(np.subtract, _ONE, step, step),
+            partial(np.divide, self._gate_rate, self._y_slow, pace),
+            partial(np.multiply, step, pace, step),
+        ]
+        if self._gate_factor[0].size:
+            operations.append(partial(self._slow_down, step, *self._gate_factor))
+        return operations
 
-    def _step_potentials(self, potential: Array, gate: Array, step: Array) -> None:
+    def _potential_step(self, potential: Array, gate: Array, step: Array) -> Operations:
         """Writes the potentials' Euler step; `potential` is what was last looked at."""
-        if self._channel_open.size:
-            self._open_channels(gate)
-        if self._rectified.size:
-            source, target = self.arrays.rectified_source, self.arrays.rectified_target
-            np.subtract(potential[:, source], potential[:, target], out=self._rectified)
-            np.maximum(self._rectified, 0.0, out=self._rectified)
-        if self._potentials.size:
-            self._potentials[...] = potential
-        np.matmul(self._drive, self._weights, out=self._total)
-        neurons, factors = self._leak_factor
-        if neurons.size:
-            more = self._leak_step[neurons] * (self._modulation[:, factors] - 1.0)
-            self._conductance[:, neurons] += more
-            self._current[:, neurons] += more * self.arrays.rest_mV[neurons]
-        np.multiply(self._conductance, potential, out=step)
-        np.subtract(self._current, step, out=step)
-        neurons, factors = self._membrane_factor
-        if neurons.size:
-            step[:, neurons] /= self._modulation[:, factors]
-
-    def _open_channels(self, gate: Array) -> None:
-        """Multiplies the powers of all gates of each channel."""
-        n_slow = self.arrays.n_slow
-        if self._power is None and self._z.shape[1] == 2 and n_slow == 1:
-            np.divide(gate[:, 0], self._q[:, 1], out=self._channel_open)
-        else:
-            self._z[:, :n_slow] = gate
-            np.reciprocal(self._q_instant, out=self._z[:, n_slow:])
-            if self._power is not None:
-                np.power(self._z, self._power, out=self._z)
-            np.multiply.reduce(self._z, axis=1, out=self._channel_open)
-        channels, factors = self._channel_factor
-        if channels.size:
-            self._channel_open[:, channels] *= self._modulation[:, factors]
-
-    def _adapt_thresholds(self, state: NetworkState) -> None:
-        """Takes the thresholds' Euler step, from the potentials before this step."""
         a = self.arrays
+        operations = self._open_channels(gate) if self._channel_open.size else []
+        if self._rectified.size:
+            difference, target = self._rectified, self._rectified_target
+            operations += [
+                partial(potential.take, a.rectified_source, 1, difference, "clip"),
+                partial(potential.take, a.rectified_target, 1, target, "clip"),
+                partial(np.subtract, difference, target, difference),
+                partial(np.maximum, difference, _ZERO, out=difference),
+            ]
+        if self._potentials.size:
+            operations.append(partial(np.copyto, self._potentials, potential))
+        operations.append(self._sum_currents())
+        if self._leak_factor[0].size:
+            operations.append(partial(self._modulate_leaks, *self._leak_factor))
+        operations.append(partial(np.multiply, self._conductance, potential, step))
+        operations.append(partial(np.subtract, self._current, step, step))
+        if self._membrane_factor[0].size:
+            operations.append(partial(self._slow_down, step, *self._membrane_factor))
+        return operations
+
+    def _sum_currents(self) -> Callable[[], object]:
+        """Writes conductances and currents: for every copy the same product of a vector and the weights."""
+        if self.n_worms == 1:
+            # Calls the same routine of BLAS with less ado.
+            return partial(self._drive[0, 0].dot, self._weights, self._total[0, 0])
+        return partial(np.matmul, self._drive, self._weights, self._total)
+
+    def _open_channels(self, gate: Array) -> Operations:
+        """Multiplies the powers of all gates of each channel."""
+        n_slow, z = self.arrays.n_slow, self._z
+        if self._power is None and len(z) == 2 and n_slow == 1:
+            operations: Operations = [partial(np.divide, gate[0], self._q[1], self._channel_open)]
+        else:
+            operations = [
+                partial(np.copyto, z[:n_slow], gate),
+                partial(np.reciprocal, self._q_instant, z[n_slow:]),
+            ]
+            if self._power is not None:
+                operations.append(partial(np.power, z, self._power, z))
+            operations.append(partial(np.multiply.reduce, z, axis=0, out=self._channel_open))
+        if self._channel_factor[0].size:
+            operations.append(partial(self._modulate_channels, *self._channel_factor))
+        return operations
+
+    def _slow_down(self, step: Array, columns: NDArray[np.intp], factors: NDArray[np.intp]) -> None:
+        """Divides columns of a step by modulation factors, which lengthen their time constants."""
+        step[..., columns] /= self._modulation[:, factors]
+
+    def _modulate_leaks(self, neurons: NDArray[np.intp], factors: NDArray[np.intp]) -> None:
+        more = self._leak_step[neurons] * (self._modulation[:, factors] - 1.0)
+        self._conductance[:, neurons] += more
+        self._current[:, neurons] += more * self.arrays.rest_mV[neurons]
+
+    def _modulate_channels(self, channels: NDArray[np.intp], factors: NDArray[np.intp]) -> None:
+        self._channel_open[:, channels] *= self._modulation[:, factors]
+
+    def _adapt_thresholds(self) -> None:
+        """Takes the thresholds' Euler step, from the potentials before this step."""
+        a, state = self.arrays, self._now
         depolarisation = state.potential[:, a.firing_neuron] - a.rest_mV[a.firing_neuron]
         state.threshold += self._threshold_rate * (a.threshold_mV - state.threshold + a.adaptation * depolarisation)
 
-    def _fire(self, state: NetworkState) -> None:
+    def _fire(self) -> None:
         """Resets the neurons at or above their thresholds, and lets their synapses release."""
-        a = self.arrays
+        a, state = self.arrays, self._now
         reached = state.potential[:, a.firing_neuron]
         np.greater_equal(reached, state.threshold, out=state.fired)
         state.potential[:, a.firing_neuron] = np.where(state.fired, a.reset_mV, reached)

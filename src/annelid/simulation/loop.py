@@ -30,7 +30,7 @@ from annelid.simulation.recorder import (
 from annelid.simulation.resume import Origin, continued_config, origin_of
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
 
-FLUSH_INTERVAL_S = 0.25
+FLUSH_INTERVAL_S = 0.5
 CHECKPOINT_INTERVAL_S = 1.0
 PROGRESS_INTERVAL_S = 0.2
 
@@ -51,8 +51,8 @@ def simulate(
     """Runs a worm and writes its run file ``run.nc`` as it goes.
 
     The first sample is the state at time zero, the last one that of ``config.duration_s``. Ctrl-C or SIGTERM
-    ends the run after the control step in progress, with everything up to there in the file; a second one
-    raises KeyboardInterrupt.
+    ends the run after the control steps in progress (at the latest when the body has moved), with everything up to
+    there in the file; a second one raises KeyboardInterrupt.
 
     Args:
         config: The configuration, or the name of a preset; None for that of the run to continue.
@@ -86,13 +86,24 @@ def simulate(
         raise ConfigError("a run needs a configuration, or a run to continue")
     plant = plant or build_plant(config)
     simulation = start(config, plant, as_controller(controller, config, plant), origin)
-    recorder = _recorder(config, simulation, origin, out / FILE_NAME)
+    recorder = recorder_of(config, simulation, origin, out / FILE_NAME)
     with reporting(progress, simulation.schedule.start * simulation.schedule.timestep_s, config.duration_s) as report:
         _record(simulation, recorder, report)
     return open_run(out / FILE_NAME)
 
 
-def _recorder(config: RunConfig, simulation: Coupling, origin: Origin | None, path: Path) -> Recorder:
+def recorder_of(config: RunConfig, simulation: Coupling, origin: Origin | None, path: Path) -> Recorder:
+    """Lays out the run file of a simulation that is about to begin.
+
+    Args:
+        config: The configuration, which the file carries whole.
+        simulation: Plant and controller at their start.
+        origin: The run that it continues, or None.
+        path: The run file.
+
+    Raises:
+        RunFileError: The file cannot be made.
+    """
     plant = simulation.plant
     of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(simulation.sensation)
     parts = [of_plant, recordable_of(simulation.controller), loop_signals(plant.n_muscles)]

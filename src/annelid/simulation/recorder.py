@@ -64,6 +64,12 @@ class Schedule:
         """Returns the times of the frames, s."""
         return self._times(self.frame_every)
 
+    def steps_to_record(self, step: int) -> int:
+        """Returns how many control steps after ``step`` the next sample or frame is due, or the run ends."""
+        to_sample = self.sample_every - step % self.sample_every
+        to_frame = self.frame_every - step % self.frame_every
+        return min(to_sample, to_frame, self.end - step)
+
     def _times(self, every: int) -> Array:
         # A run that continues another leaves its first instant to that one's file.
         first = 0 if self.start == 0 else self.start // every + 1

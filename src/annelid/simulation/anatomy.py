@@ -1,0 +1,243 @@
+"""Where the parts of a worm are in the engine's arrays, and what they say of its lengths and forces.
+
+Every function takes the arrays of one worm, or those of many with one more axis in front, and gives the same numbers
+to the last bit in both cases: sums run in the same order whatever the number of worms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Self
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.body import mesh_of
+from annelid.body.actuation import crossing_site, ring_names
+from annelid.body.rods import vertex_name
+from annelid.config import Chain, Rods, WormBody
+from annelid.morphology import Array, MeshGeometry
+
+FLOOR = "floor"
+_NET_FORCE = 3
+"""The engine's number for a contact sensor that adds up all contacts of a pair."""
+
+
+def add_contact_sensors(spec: mujoco.MjSpec) -> None:
+    """Adds, for every geom that can touch the floor, a sensor of the floor's net force on it in the world's axes.
+
+    They change nothing in the motion, take no measurable time, and read the same in a batch as alone.
+    """
+    force = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
+    for number, geom in enumerate(spec.geoms):
+        if geom.name == FLOOR or not (geom.contype or geom.conaffinity):
+            continue
+        geom.name = geom.name or f"geom_{number}"
+        spec.add_sensor(
+            name=f"floor_on_{geom.name}",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_GEOM,
+            objname=FLOOR,
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname=geom.name,
+            intprm=[force, _NET_FORCE, 1],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Arrays that all have the same axes in front."""
+
+    def each(self) -> list[Self]:
+        """Returns those of every worm, out of those of many."""
+        return [
+            type(self)(*of_one) for of_one in zip(*(getattr(self, field.name) for field in fields(self)), strict=True)
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Posture(_Rows):
+    """Positions and lengths at one instant, m; of many worms with one more axis in front.
+
+    Attributes:
+        crossing: Positions of the crossings, ``(n_crossings, 3)``.
+        center_of_mass: Shape ``(3,)``.
+        spring_length: Shape ``(n_springs,)``.
+        stretch: Lengths of the springs that serve as sensors, ``(n_segments, n_sensors)``.
+        ring_length: Shape ``(n_muscles,)``.
+    """
+
+    crossing: Array
+    center_of_mass: Array
+    spring_length: Array
+    stretch: Array
+    ring_length: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Forces(_Rows):
+    """What acted during the last physics step; of many worms with one more axis in front.
+
+    Attributes:
+        muscle: Contractile force of every ring muscle, N, ``(n_muscles,)``.
+        contact: Force of the floor on every segment, N, ``(n_segments, 3)``.
+        edge_strain: Largest strain of a rod's edge, ``()``; 0 for a chain.
+        pin_gap: Largest gap between two pinned strands, m, ``()``; 0 where pins cannot part.
+    """
+
+    muscle: Array
+    contact: Array
+    edge_strain: Array
+    pin_gap: Array
+
+
+class Anatomy:
+    """The parts of one compiled worm, found once.
+
+    Attributes:
+        model: The compiled body.
+        geometry: The mesh.
+        muscle_names: Names of the ring muscles.
+        n_segments: Number of actuated segments.
+        n_muscles: Number of ring muscles.
+        rest_stretch_m: Lengths of the stretch sensors at rest, m, ``(n_segments, n_sensors)``.
+        has_edges: Whether strands are rods, whose edges may be strained.
+        pins_can_part: Whether the two strands of a crossing may part.
+        outputs: Names of the engine's arrays that `forces` needs.
+    """
+
+    def __init__(self, model: mujoco.MjModel, body: WormBody) -> None:
+        """Finds the parts of a body compiled with `add_contact_sensors`."""
+        self.model = model
+        self.geometry: MeshGeometry = mesh_of(body.mesh)
+        self.muscle_names = ring_names(body.n_segments, body.rings)
+        self.n_segments = self.geometry.n_segments
+        self.n_muscles = len(self.muscle_names)
+        self.rest_stretch_m = self.geometry.spring_length_m[self.geometry.sensor_springs]
+        self.has_edges = bool(model.nflexedge)
+        self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
+        self._ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
+        self._mass_share = model.body_mass / model.body_mass.sum()
+        self._edges_per_m = 1.0 / model.flexedge_length0
+        self._contact_slice, self._segment_rows = self._contacts_of_segments()
+        self._pin_gap, pin_outputs = self._pin_reader(body)
+        self.pins_can_part = self._pin_gap is not None
+        edges = ("flexedge_length",) if self.has_edges else ()
+        self.outputs: tuple[str, ...] = ("actuator_force", "sensordata", *edges, *pin_outputs)
+
+    def _path_of(self, tendon: int) -> NDArray[np.int64]:
+        """Crossings along a ring tendon."""
+        start, count = self.model.tendon_adr[tendon], self.model.tendon_num[tendon]
+        sites = self.model.wrap_objid[start : start + count]
+        crossing = {int(site): index for index, site in enumerate(self._crossing_site)}
+        return np.array([crossing[int(site)] for site in sites])
+
+    def _contacts_of_segments(self) -> tuple[slice, Array]:
+        """Where the contact sensors are, and which segment's ring is nearest to each sensor's geom at rest."""
+        model, geometry = self.model, self.geometry
+        sensors = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_CONTACT))
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        ring_x = geometry.plane_x_m[geometry.ring_planes]
+        x = data.geom_xpos[model.sensor_refid[sensors], :1]
+        nearest = np.abs(x - ring_x[None]).argmin(axis=1)
+        first = int(model.sensor_adr[sensors[0]])
+        return slice(first, first + 3 * len(sensors)), np.eye(geometry.n_segments)[:, nearest]
+
+    def _pin_reader(self, body: WormBody) -> tuple[Callable[[Mapping[str, Array]], Array] | None, tuple[str, ...]]:
+        """Returns what reads the largest gap at a pin, if pins can part, and the arrays that it needs."""
+        formulation = body.formulation
+        if isinstance(formulation, Chain):
+            return _gap_at_connections(self.model, formulation.pins == "separate"), ("xpos", "xmat")
+        if isinstance(formulation, Rods) and formulation.pins == "separate":
+            return _gap_at_vertices(_pinned_bodies(self.model, self.geometry)), ("xpos",)
+        return None, ()
+
+    def locate(self, data: mujoco.MjData) -> tuple[Array, Array]:
+        """Brings the engine's positions up to its coordinates, which is not part of a step.
+
+        Returns:
+            Positions of the crossings, ``(n_crossings, 3)``, and of the centre of mass, ``(3,)``, m.
+        """
+        mujoco.mj_kinematics(self.model, data)
+        return data.site_xpos.take(self._crossing_site, axis=0), self._mass_share @ data.xipos
+
+    def posture(self, crossing: Array, center_of_mass: Array) -> Posture:
+        """Measures all lengths from the positions of the crossings and adds the centre of mass."""
+        ends = crossing.take(self.geometry.springs, axis=-2)
+        spring = _norm(ends[..., 1, :] - ends[..., 0, :])
+        corners = crossing.take(self._ring_path, axis=-2)
+        ring = _norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
+        return Posture(crossing, center_of_mass, spring, spring.take(self.geometry.sensor_springs, axis=-1), ring)
+
+    def forces(self, engine: Mapping[str, Array]) -> Forces:
+        """Reads what acted during the last physics step.
+
+        Args:
+            engine: The engine's arrays named in `outputs`.
+        """
+        muscle = -engine["actuator_force"]
+        by_geom = engine["sensordata"][..., self._contact_slice]
+        contact = self._segment_rows @ by_geom.reshape(*by_geom.shape[:-1], -1, 3)
+        strain = gap = np.zeros(muscle.shape[:-1])
+        if self.has_edges:
+            strain = np.abs(engine["flexedge_length"] * self._edges_per_m - 1.0).max(axis=-1)
+        if self._pin_gap is not None:
+            gap = self._pin_gap(engine)
+        return Forces(muscle, contact, strain, gap)
+
+    def no_forces(self, *n_worms: int) -> Forces:
+        """Returns the forces before the first step."""
+        return Forces(
+            np.zeros((*n_worms, self.n_muscles)),
+            np.zeros((*n_worms, self.n_segments, 3)),
+            np.zeros(n_worms),
+            np.zeros(n_worms),
+        )
+
+
+def _pinned_bodies(model: mujoco.MjModel, geometry: MeshGeometry) -> NDArray[np.int64]:
+    """Bodies of both strands at every crossing of rods with separate pins, ``(n_crossings, 2)``."""
+    vertices = geometry.crossing_vertex[geometry.crossing_plane]
+    return np.array(
+        [
+            [model.body(vertex_name(int(strand), int(vertex))).id for strand in strands]
+            for strands, vertex in zip(geometry.crossing_strands, vertices, strict=True)
+        ]
+    )
+
+
+def _gap_at_vertices(bodies: NDArray[np.int64]) -> Callable[[Mapping[str, Array]], Array]:
+    def gap(engine: Mapping[str, Array]) -> Array:
+        ends = engine["xpos"].take(bodies, axis=-2)
+        return _norm(ends[..., 1, :] - ends[..., 0, :]).max(axis=-1)
+
+    return gap
+
+
+def _gap_at_connections(model: mujoco.MjModel, separate: bool) -> Callable[[Mapping[str, Array]], Array]:
+    """Reads the residual of the engine's connections; with a pin mass, two of them make one crossing."""
+    sides = ((model.eq_obj1id, model.eq_data[:, :3]), (model.eq_obj2id, model.eq_data[:, 3:6]))
+
+    def gap(engine: Mapping[str, Array]) -> Array:
+        position, turn = engine["xpos"], engine["xmat"]
+        turn = turn.reshape(*turn.shape[:-1], 3, 3)
+        first, second = (
+            position.take(body, axis=-2) + (turn.take(body, axis=-3) * local[:, np.newaxis]).sum(axis=-1)
+            for body, local in sides
+        )
+        residual = first - second
+        if separate:
+            residual = residual[..., 0::2, :] - residual[..., 1::2, :]
+        return _norm(residual).max(axis=-1)
+
+    return gap
+
+
+def _norm(vectors: Array) -> Array:
+    """Lengths of vectors along the last axis."""
+    squares = vectors * vectors
+    # In this order the last bit is that of numpy's einsum and of a dot product.
+    return np.sqrt((squares[..., 0] + squares[..., 2]) + squares[..., 1])

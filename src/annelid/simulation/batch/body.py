@@ -1,0 +1,182 @@
+"""The bodies of a batch of worms, stepped by one engine batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch, SimulationError
+from numpy.typing import NDArray
+
+from annelid.config import RunConfig
+from annelid.errors import ConfigError, SimulationStopped
+from annelid.protocols import Array
+from annelid.simulation.anatomy import Anatomy, Forces, Posture
+from annelid.simulation.worm import Worm, compile_worm, engine_stopped
+
+_NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
+_TIMES_GIVEN = 1
+"""Column of the engine batch's warnings that counts them; the other holds their last information."""
+
+
+class BodyBatch:
+    """Bodies of one structure, each with parameters of its own.
+
+    The engine keeps each body's state and as many workspaces as threads, not one for each body; bodies with the same
+    physical configuration share one compiled model.
+
+    Attributes:
+        worms: The worms, each also a plant by itself.
+    """
+
+    def __init__(self, configs: Sequence[RunConfig], n_threads: int) -> None:
+        """Compiles the bodies.
+
+        Args:
+            configs: One configuration for each worm, alike in what `structure.ALIKE` names.
+            n_threads: Threads that step them, the caller's included.
+
+        Raises:
+            ConfigError: The engine refuses a model, or two models' arrays differ in size.
+        """
+        anatomies = _compiled(configs)
+        models = [anatomy.model for anatomy in anatomies]
+        self._anatomy = anatomies[0]
+        self._batch = Batch(models[0], len(models), n_threads)
+        if any(model is not models[0] for model in models):
+            try:
+                self._batch.set_models(models)
+            except ValueError as error:
+                raise ConfigError(f"these worms differ too much for one batch: {error}") from None
+        bind = self._batch.bind
+        self._time, self._ctrl, self._qpos, self._qvel = (bind(name) for name in ("time", "ctrl", "qpos", "qvel"))
+        self._mass_matrix = bind("M")
+        self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
+        self._scratch = mujoco.MjData(models[0])
+        self.worms = [
+            BatchWorm(config, anatomy, self, row)
+            for row, (config, anatomy) in enumerate(zip(configs, anatomies, strict=True))
+        ]
+
+    def reset(self, row: int, state: Array | None) -> None:
+        """Resets one body, and gives it a state of the engine if there is one."""
+        self._batch.reset([row], stage=_NO_STAGE)
+        if state is not None:
+            self._batch.state[row] = state
+
+    def move(self, rows: Sequence[int], activation: Array, n_steps: int) -> dict[int, str]:
+        """Takes physics steps with some of the bodies.
+
+        Args:
+            rows: The bodies, in ascending order.
+            activation: Muscle activation of each of them, ``(len(rows), n_muscles)``.
+            n_steps: Number of physics steps.
+
+        Returns:
+            Why the engine gave up, for every body that it could not step.
+        """
+        self._ctrl[rows] = activation
+        try:
+            self._batch.step(rows, n_steps)
+        except SimulationError as failure:
+            return {
+                int(row): engine_stopped(float(self._time[row]), self._batch.error(int(row))) for row in failure.ids
+            }
+        return {}
+
+    def forces(self, rows: Sequence[int]) -> Forces:
+        """Reads what acted on some bodies during their last physics step, with an axis of them in front."""
+        if len(rows) == len(self.worms):
+            return self._anatomy.forces(self._outputs)
+        return self._anatomy.forces({name: values[rows] for name, values in self._outputs.items()})
+
+    def postures(self, rows: Sequence[int]) -> Posture:
+        """Reads the postures of some bodies, with an axis of them in front."""
+        crossing = np.empty((len(rows), self._anatomy.geometry.n_crossings, 3))
+        center_of_mass = np.empty((len(rows), 3))
+        for place, row in enumerate(rows):
+            crossing[place], center_of_mass[place] = self.located(row)
+        return self._anatomy.posture(crossing, center_of_mass)
+
+    def located(self, row: int) -> tuple[Array, Array]:
+        """Returns a body's crossings, ``(n_crossings, 3)``, and centre of mass, ``(3,)``, m."""
+        self._scratch.qpos[:] = self._qpos[row]
+        return self.worms[row].anatomy.locate(self._scratch)
+
+    def kinetic_energy_J(self, row: int) -> float:
+        """Kinetic energy of a body, from the mass matrix of its last step, J."""
+        scratch = self._scratch
+        scratch.qvel[:] = self._qvel[row]
+        scratch.M[:] = self._mass_matrix[row]
+        mujoco.mj_energyVel(self.worms[row].model, scratch)
+        return float(scratch.energy[1])
+
+    def qpos(self, row: int) -> Array:
+        """Returns a body's generalised positions, ``(nq,)``."""
+        return self._qpos[row]
+
+    def engine_state(self, row: int) -> Array:
+        """Returns a copy of a body's engine state."""
+        return self._batch.state[row].copy()
+
+    def warnings(self, row: int) -> NDArray[np.int32]:
+        """Returns how often the engine has given each of its warnings to a body."""
+        return self._batch.warning[row, :, _TIMES_GIVEN]
+
+
+class BatchWorm(Worm):
+    """One worm of a batch: a plant like any other, whose engine state is a row of the batch."""
+
+    def __init__(self, config: RunConfig, anatomy: Anatomy, bodies: BodyBatch, row: int) -> None:
+        """Makes the worm of one row."""
+        super().__init__(config, anatomy)
+        self._bodies = bodies
+        self._row = row
+
+    def reset_engine(self, state: Array | None = None) -> None:
+        """Resets its row, and gives it a state that `engine_state` returned if there is one."""
+        self._bodies.reset(self._row, state)
+
+    def move(self, activation: Array, n_steps: int) -> Forces:
+        """Takes physics steps with this worm alone.
+
+        Raises:
+            SimulationStopped: The engine gave up.
+        """
+        reasons = self._bodies.move([self._row], activation[np.newaxis], n_steps)
+        if reasons:
+            raise SimulationStopped(reasons[self._row])
+        return self._bodies.forces([self._row]).each()[0]
+
+    def locate(self) -> Posture:
+        """Reads the posture from its row's coordinates."""
+        return self.anatomy.posture(*self._bodies.located(self._row))
+
+    def qpos(self) -> Array:
+        """Returns the generalised positions, ``(nq,)``."""
+        return self._bodies.qpos(self._row)
+
+    def engine_state(self) -> Array:
+        """Returns a copy of all that the engine's next step depends on."""
+        return self._bodies.engine_state(self._row)
+
+    def warnings(self) -> NDArray[np.int32]:
+        """Returns how often the engine has given each of its warnings."""
+        return self._bodies.warnings(self._row)
+
+    def kinetic_energy_J(self) -> float:
+        """Kinetic energy of the whole body, J."""
+        return self._bodies.kinetic_energy_J(self._row)
+
+
+def _compiled(configs: Sequence[RunConfig]) -> list[Anatomy]:
+    """Compiles one model for each physical configuration."""
+    models: dict[str, Anatomy] = {}
+    anatomies: list[Anatomy] = []
+    for config in configs:
+        physical = config.model_dump_json(include={"body", "arena", "clock"})
+        if physical not in models:
+            models[physical] = compile_worm(config)
+        anatomies.append(models[physical])
+    return anatomies

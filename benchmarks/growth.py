@@ -4,6 +4,10 @@ A wave contracts every third ring, so that each segment has as much to do at any
 turn in one process, and times are the thread's own, so that other load disturbs both alike. Run
 ``taskset -c 1 python benchmarks/growth.py [--elements 3] [--segments 3 6 12 24]``; it takes some minutes, and half
 an hour with 48 segments of three elements, where the engine orders nothing (``docs/upstream/sparse_ordering.md``).
+
+Then several worms of twelve segments are stepped in turn. Each does the same arithmetic as alone, but finds the caches
+filled by the others, as the parts of a long worm do: what a step takes longer is the caches' share of the growth. Last,
+how long a worm of 48 segments takes to build and compile.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ import mujoco
 import numpy as np
 
 from annelid import load_config
-from annelid.body import build_spec
+from annelid.body import build_spec, compile_spec
 from annelid.body.elimination import SHORT_TUBE, order_elimination
 
 TIMESTEP_S = 0.01
@@ -69,8 +73,8 @@ class Worm:
         return {name: float(np.mean(values)) for name, values in numbers.items()} | self.phases()
 
 
-def compiled(n_segments: int, elements: int) -> mujoco.MjModel:
-    """Compiles the rods preset at a length, in the engine's own order."""
+def spec_of(n_segments: int, elements: int) -> mujoco.MjSpec:
+    """Builds the rods preset at a length."""
     changes = {
         "body.mesh.n_segments": n_segments,
         "body.mesh.elements_per_side": elements,
@@ -79,7 +83,7 @@ def compiled(n_segments: int, elements: int) -> mujoco.MjModel:
         "record.signals_interval_s": TIMESTEP_S,
         "record.frames_interval_s": TIMESTEP_S,
     }
-    return build_spec(load_config("riddle2023-rods", changes)).compile()
+    return build_spec(load_config("riddle2023-rods", changes))
 
 
 def exponent(cost: dict[int, float], first: int, last: int) -> float:
@@ -88,19 +92,30 @@ def exponent(cost: dict[int, float], first: int, last: int) -> float:
     return float(np.polyfit(np.log(lengths), np.log([cost[length] for length in lengths]), 1)[0])
 
 
+def in_turn(n_segments: int, elements: int, n_worms: int, steps: int) -> float:
+    """Median milliseconds a step of each of several worms that are stepped in turn."""
+    worms = [Worm("dissected", compile_spec(spec_of(n_segments, elements))) for _ in range(n_worms)]
+    for number in range(steps):
+        for worm in worms:
+            worm.step(number)
+    return float(np.median([spent for worm in worms for spent in worm.milliseconds]))
+
+
 def main() -> None:
-    """Prints the table and the exponents."""
+    """Prints the table, the exponents, the caches' share and the time of compilation."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--segments", type=int, nargs="+", default=[3, 6, 12, 24])
     parser.add_argument("--elements", type=int, default=3)
     parser.add_argument("--steps", type=int, default=80)
+    parser.add_argument("--in-turn", type=int, nargs="+", default=[1, 2, 4], help="numbers of worms of 12 segments")
+    parser.add_argument("--compile", type=int, default=48, help="segments of the worm whose compilation is timed")
     arguments = parser.parse_args()
     mujoco.set_mjcb_time(lambda: 1e3 * thread_time())
     columns = ("ms", "kinematics", "forces", "implicit", "solver", "iterations", "entries")
     print(("{:>4} {:10} {:>6} {:>6} {:>8}" + " {:>10}" * len(columns)).format("N", "order", "nv", "rows", "", *columns))
     costs: dict[str, dict[int, dict[str, float]]] = {"engine": {}, "dissected": {}}
     for n_segments in arguments.segments:
-        worms = [Worm(order, compiled(n_segments, arguments.elements)) for order in costs]
+        worms = [Worm(order, spec_of(n_segments, arguments.elements).compile()) for order in costs]
         order_elimination(worms[1].model)
         for number in range(arguments.steps):
             for worm in worms if number % 2 else worms[::-1]:
@@ -123,6 +138,17 @@ def main() -> None:
                 f"exponent {first}-{last} {order:10}",
                 ", ".join(f"{name} {slope:.2f}" for name, slope in slopes.items()),
             )
+    for n_worms in arguments.in_turn:
+        spent = in_turn(12, arguments.elements, n_worms, arguments.steps)
+        print(f"{n_worms} worms of 12 segments in turn: {spent:.2f} ms a step of each")
+    began = thread_time()
+    spec = spec_of(arguments.compile, arguments.elements)
+    built = thread_time()
+    compile_spec(spec)
+    print(
+        f"{arguments.compile} segments, {arguments.elements} elements a side: built in {built - began:.2f} s, "
+        f"compiled in {thread_time() - built:.2f} s"
+    )
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Annotated, Any
 
 import typer
@@ -63,6 +64,7 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the command ``annelid``."""
+    warnings.showwarning = _complain_of_warning
     app(prog_name="annelid")
 
 
@@ -83,13 +85,18 @@ def _start(
     """Simulate a soft, peristaltic earthworm robot driven by a synthetic nervous system.
 
     \b
-    annelid run                        run the paper's worm: about a minute
+    annelid run                        run the paper's robot with pins that hold: a few seconds
+    annelid run riddle2023             run it as the paper built it: about a minute
     annelid run riddle2022-planar      run the planar worm: a few seconds
     annelid paper                      reproduce and examine the whole paper: about 40 minutes
     annelid bench                      speed and error side by side: about 15 minutes
     annelid presets                    what else there is
     annelid doctor                     is everything in place?
     """
+
+
+def _complain_of_warning(message: Warning | str, *_: object, **__: object) -> None:
+    complain(f"warning: {message}")
 
 
 def complain(what: object) -> None:

@@ -36,14 +36,14 @@ def build(
     annelid build riddle2023-rods -o worm.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
-    from annelid.body import build_spec
+    from annelid.body import build_spec, compile_spec
     from annelid.view.output import whole_file
 
     refuse_existing(output, force)
     config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity)
     spec = build_spec(config)
     try:
-        spec.compile()
+        compile_spec(spec)
     except ValueError as error:
         raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
     with whole_file(output) as draft:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body import build_spec
+from annelid.body import build_spec, compile_spec
 from annelid.clock import StepRatio
 from annelid.config import RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
@@ -54,7 +54,7 @@ def compile_worm(config: RunConfig) -> Anatomy:
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     add_contact_sensors(spec)
     try:
-        model = spec.compile()
+        model = compile_spec(spec)
     except ValueError as error:
         raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
     return Anatomy(model, config.body)

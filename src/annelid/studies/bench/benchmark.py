@@ -21,7 +21,7 @@ from annelid.view.output import whole_file
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"
 
-SCALED_SEGMENTS = (12, 48)
+SCALED_SEGMENTS = (12, 47)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
 
 SCHEMA = {

@@ -20,8 +20,12 @@ DURATION_S = 0.2
 RING = "ring_1"
 STEPS_S = (0.0005, 0.001, 0.005, 0.010)
 ROWS: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("rods, the engine's damping", "riddle2023-rods", {"body.formulation.lateral_damping_Nms_per_rad": 0.0}),
-    ("rods, and 0.12 N m s/rad lateral", "riddle2023-rods", {"body.formulation.lateral_damping_Nms_per_rad": 0.12}),
+    ("rods, the engine's damping", "riddle2023-rods", {"body.mesh.elements_per_side": 3}),
+    (
+        "rods, and 0.12 N m s/rad lateral",
+        "riddle2023-rods",
+        {"body.mesh.elements_per_side": 3, "body.formulation.lateral_damping_Nms_per_rad": 0.12},
+    ),
     ("chain of damped joints", "riddle2023", {"body.formulation.pin_time_constant_s": 0.004}),
 )
 

@@ -18,13 +18,7 @@ from rich.table import Table
 from annelid import load_config, simulate_batch, summary
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5)
-SETTINGS = {
-    "duration_s": 12.0,
-    "clock.physics_timestep_s": 0.02,
-    "body.mesh.elements_per_side": 2,
-    "record.signals_interval_s": 0.02,
-    "record.frames_interval_s": 0.2,
-}
+SETTINGS = {"duration_s": 12.0, "record.frames_interval_s": 0.2}
 
 
 def main(folder: Path) -> None:

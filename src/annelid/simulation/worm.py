@@ -229,11 +229,18 @@ class Worm(ABC):
                 if warned[warning]:
                     return f"{words}; a shorter clock.physics_timestep_s or softer settings may help"
         guard = self._config.guard
-        height = self._posture.crossing[:, 2].max()
-        strain, gap = self._forces.edge_strain, self._forces.pin_gap
+        height = float(self._posture.crossing[:, 2].max())
+        strain, gap = float(self._forces.edge_strain), float(self._forces.pin_gap)
         energy = 0.0
         if self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0:
             energy = self.kinetic_energy_J()
+        if (
+            height <= guard.height_m
+            and strain <= guard.edge_strain
+            and gap <= guard.pin_gap_m
+            and energy <= guard.kinetic_energy_J
+        ):
+            return None
         readings = (
             ("guard.height_m", "height of a crossing", height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),

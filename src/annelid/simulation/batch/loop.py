@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -50,6 +50,9 @@ class BatchResult:
 
     def __getitem__(self, worm: int) -> Run:
         return open_run(self.folders[worm])
+
+    def __iter__(self) -> Iterator[Run]:
+        return (self[worm] for worm in range(len(self)))
 
     @property
     def failed(self) -> list[int]:

@@ -146,7 +146,7 @@ def test_an_error_of_the_engine_ends_one_worm(tmp_path: Path, monkeypatch: pytes
     configs = [config(**own) for own in DIFFERENT]
     with monkeypatch.context() as patched:
         patched.setattr(Batch, "step", failing)
-        result = simulate_batch(configs, tmp_path / "batch", progress=False)
+        result = simulate_batch(configs, tmp_path / "batch", threads=1, progress=False)
     assert result.statuses == ("complete", "stopped_by_guard", "complete")
     assert "the engine stopped at 0.100 s" in result.messages[1]
     assert float(result[1].data["time"][-1]) == pytest.approx(0.1)
@@ -166,7 +166,7 @@ def test_a_full_disk_ends_one_worm(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         sample(recorder, *sources)
 
     monkeypatch.setattr(Recorder, "sample", failing)
-    result = simulate_batch(config(), tmp_path, n_worms=3, progress=False)
+    result = simulate_batch(config(), tmp_path, n_worms=3, threads=1, progress=False)
     assert result.statuses == ("complete", "disk_failure", "complete")
     assert result.messages[1] == "no room"
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from annelid.morphology import Array, Indices
 
-SHORT_TUBE = 1000
-"""Vertices below which the engine's own order does as well: 6 segments of three elements a side, 12 of two."""
+SHORT_TUBE = 850
+"""Vertices below which the engine's own order does as well: 6 segments of three elements a side."""
 LARGEST_PART = 200
 """Vertices that minimum degree orders without a further cut: about two segments; 150 to 250 do as well."""
 LEAST_SHARE = 0.3

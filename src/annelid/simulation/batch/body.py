@@ -23,27 +23,26 @@ _TIMES_GIVEN = 1
 class BodyBatch:
     """Bodies of one structure, each with parameters of its own.
 
-    The engine keeps each body's state and as many workspaces as threads, not one for each body; bodies with the same
-    physical configuration share one compiled model.
+    The engine keeps each body's state and one workspace, not one for each body; bodies with the same physical
+    configuration share one compiled model. The thread that calls steps them, without holding Python's lock.
 
     Attributes:
         worms: The worms, each also a plant by itself.
     """
 
-    def __init__(self, configs: Sequence[RunConfig], n_threads: int) -> None:
-        """Compiles the bodies.
+    def __init__(self, configs: Sequence[RunConfig], anatomies: Sequence[Anatomy]) -> None:
+        """Makes the bodies.
 
         Args:
             configs: One configuration for each worm, alike in what `structure.ALIKE` names.
-            n_threads: Threads that step them, the caller's included.
+            anatomies: Their compiled bodies, as `compile_worms` returns them.
 
         Raises:
-            ConfigError: The engine refuses a model, or two models' arrays differ in size.
+            ConfigError: Two models' arrays differ in size.
         """
-        anatomies = _compiled(configs)
         models = [anatomy.model for anatomy in anatomies]
         self._anatomy = anatomies[0]
-        self._batch = Batch(models[0], len(models), n_threads)
+        self._batch = Batch(models[0], len(models), nthread=1)
         if any(model is not models[0] for model in models):
             try:
                 self._batch.set_models(models)
@@ -170,8 +169,12 @@ class BatchWorm(Worm):
         return self._bodies.kinetic_energy_J(self._row)
 
 
-def _compiled(configs: Sequence[RunConfig]) -> list[Anatomy]:
-    """Compiles one model for each physical configuration."""
+def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
+    """Compiles one model for each physical configuration; returns the anatomy of every worm.
+
+    Raises:
+        ConfigError: The engine refuses a model.
+    """
     models: dict[str, Anatomy] = {}
     anatomies: list[Anatomy] = []
     for config in configs:

@@ -1,9 +1,10 @@
-"""The loop of a batch: all networks, then all bodies, then what each worm records, from one event to the next."""
+"""The loop of a batch: all networks, then all bodies, then what each worm records; one team of worms a thread."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -13,9 +14,9 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
-from annelid.simulation.anatomy import Forces, Posture
+from annelid.simulation.anatomy import Anatomy, Forces, Posture
 from annelid.simulation.assemble import build_controller
-from annelid.simulation.batch.body import BodyBatch
+from annelid.simulation.batch.body import BodyBatch, compile_worms
 from annelid.simulation.batch.controllers import ControllerBatch
 from annelid.simulation.batch.member import Member
 from annelid.simulation.batch.structure import checked_configs
@@ -99,27 +100,46 @@ def simulate_batch(
     folders = [Path(out) / f"worm-{number:03d}" for number in range(len(own))]
     for folder in folders:
         refuse_used_folder(folder, overwrite)
-    bodies = BodyBatch(own, threads_for(len(own), threads))
-    couplings = [
-        start(one, worm, build_controller(one, worm), None) for one, worm in zip(own, bodies.worms, strict=True)
-    ]
-    controllers = ControllerBatch(own, couplings)
+    anatomies = compile_worms(own)
     members: list[Member] = []
+    teams: list[_Team] = []
     try:
-        for one, coupling, worm, folder in zip(own, couplings, bodies.worms, folders, strict=True):
-            members.append(Member(len(members), one, coupling, worm, folder))
+        for numbers in np.array_split(np.arange(len(own)), threads_for(len(own), threads)):
+            share = slice(int(numbers[0]), int(numbers[-1]) + 1)
+            team = _Team(own[share], anatomies[share], folders[share], members)
+            teams.append(team)
     except BaseException as error:
         for member in members:
             member.end_with(error)
         raise
     with reporting(progress, 0.0, own[0].duration_s) as report:
-        wall_time_s = _Loop(members, bodies, controllers, report).run()
+        wall_time_s = _run_all(teams, report)
     return BatchResult(
         tuple(folders),
         tuple(member.status for member in members),
         tuple(member.message for member in members),
         wall_time_s,
     )
+
+
+def _run_all(teams: Sequence[_Team], report: ProgressCallback | None) -> float:
+    """Runs every team in a thread of its own to the end; returns the wall-clock time, s."""
+    began = perf_counter()
+    with Interruption() as interruption, ThreadPoolExecutor(len(teams)) as pool:
+        running = {pool.submit(team.run, began, interruption) for team in teams}
+        try:
+            left = running
+            while left:
+                _, left = wait(left, PROGRESS_INTERVAL_S)
+                if report is not None:
+                    report(min(team.simulated_s for team in teams), perf_counter() - began)
+        except BaseException:
+            # The executor waits for the teams, which end in good order once they are asked to.
+            interruption.requested = interruption.requested or "an error"
+            raise
+        for team in running:
+            team.result()
+    return perf_counter() - began
 
 
 def threads_for(n_worms: int, threads: int | None) -> int:
@@ -133,42 +153,64 @@ def threads_for(n_worms: int, threads: int | None) -> int:
     return min(n_worms, threads or os.cpu_count() or 1)
 
 
-class _Loop:
-    """The worms of a batch, from the start of the run to its end."""
+class _Team:
+    """Worms that one thread steps, from the start of the run to its end.
+
+    The engine steps without Python's lock, so that the networks and files of one team are served while the bodies of
+    another move.
+    """
 
     def __init__(
         self,
-        members: Sequence[Member],
-        bodies: BodyBatch,
-        controllers: ControllerBatch,
-        report: ProgressCallback | None,
+        configs: Sequence[RunConfig],
+        anatomies: Sequence[Anatomy],
+        folders: Sequence[Path],
+        all_members: list[Member],
     ) -> None:
-        self._members = members
-        self._rows = list(range(len(members)))
-        self._bodies = bodies
-        self._controllers = controllers
-        self._report = report
-        self._schedule = members[0].coupling.schedule
-        self._step = 0
-        self._began = perf_counter()
-        self._next = dict.fromkeys(("report", "flush", "checkpoint"), self._began)
+        """Lays out the worms' run files and adds each worm to ``all_members`` once its file is there.
 
-    def run(self) -> float:
-        """Runs to the end and sees to it that every file says how its worm ended; returns the wall-clock time, s."""
-        with Interruption() as interruption:
-            try:
-                self._each(lambda member: member.record(0.0))
-                while self._rows and self._step < self._schedule.end and interruption.requested is None:
-                    self._advance(self._steps_to_event())
-                    self._write_what_is_due()
-                self._controllers.settle()
-                early = self._step < self._schedule.end
-                self._each(lambda member: member.finish(interruption.requested if early else None))
-            except BaseException as error:
-                for row in self._rows:
-                    self._members[row].end_with(error)
-                raise
-        return perf_counter() - self._began
+        Raises:
+            ConfigError: Worms that do not fit into one batch.
+            RunFileError: A run file cannot be made.
+        """
+        self._bodies = BodyBatch(configs, anatomies)
+        couplings = [
+            start(config, worm, build_controller(config, worm), None)
+            for config, worm in zip(configs, self._bodies.worms, strict=True)
+        ]
+        self._controllers = ControllerBatch(configs, couplings)
+        self._members: list[Member] = []
+        for config, coupling, worm, folder in zip(configs, couplings, self._bodies.worms, folders, strict=True):
+            member = Member(len(self._members), config, coupling, worm, folder)
+            self._members.append(member)
+            all_members.append(member)
+        self._rows = list(range(len(self._members)))
+        self._schedule = couplings[0].schedule
+        self._step = 0
+        self._began = 0.0
+        self._next: dict[str, float] = {}
+
+    @property
+    def simulated_s(self) -> float:
+        """How far the team has come, s; a team whose worms have all ended has come to the end."""
+        return (self._step if self._rows else self._schedule.end) * self._schedule.timestep_s
+
+    def run(self, began: float, interruption: Interruption) -> None:
+        """Runs to the end and sees to it that every file says how its worm ended."""
+        self._began = began
+        self._next = dict.fromkeys(("flush", "checkpoint"), began)
+        try:
+            self._each(lambda member: member.record(0.0))
+            while self._rows and self._step < self._schedule.end and interruption.requested is None:
+                self._advance(self._steps_to_event())
+                self._write_what_is_due()
+            self._controllers.settle()
+            early = self._step < self._schedule.end
+            self._each(lambda member: member.finish(interruption.requested if early else None))
+        except BaseException as error:
+            for row in self._rows:
+                self._members[row].end_with(error)
+            raise
 
     def _steps_to_event(self) -> int:
         """Control steps up to the next one after which a body moves, something is recorded, or the run ends."""
@@ -204,7 +246,7 @@ class _Loop:
         return dict(zip(self._rows, moved, strict=True))
 
     def _write_what_is_due(self) -> None:
-        """Hands samples to the files, writes checkpoints and tells how far the batch is, each at its interval."""
+        """Hands samples to the files and writes checkpoints, each at its interval."""
         now = perf_counter()
         if now >= self._next["flush"]:
             self._each(lambda member: member.flush())
@@ -213,9 +255,6 @@ class _Loop:
             self._controllers.settle()
             self._each(lambda member: member.checkpoint())
             self._next["checkpoint"] = perf_counter() + CHECKPOINT_INTERVAL_S
-        if self._report is not None and now >= self._next["report"]:
-            self._report(self._step * self._schedule.timestep_s, now - self._began)
-            self._next["report"] = now + PROGRESS_INTERVAL_S
 
     def _each(self, action: Callable[[Member], None]) -> None:
         """Does something with every worm that is still running; one that fails ends, and the others go on."""

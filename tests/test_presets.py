@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import pytest
 
-from annelid.config import load_config
+from annelid.body import mesh_of
+from annelid.config import WormBody, load_config
 
 PUBLISHED = {
     "duration_s": 5.0,
@@ -105,3 +108,58 @@ def test_the_planar_worm_is_the_published_one(path: str) -> None:
 
 def test_the_peak_force_is_the_compiler_s_of_the_paper_s_time() -> None:
     assert value_at("riddle2023", "body.rings.peak_force_N") == pytest.approx(550_000 / 4678, abs=0.01)
+
+
+ROBOTS = {
+    "body.mesh.n_helices": 12,
+    "body.mesh.radius_m": 0.16,
+    "body.strands.radius_m": 0.00299,
+    "body.strands.young_modulus_Pa": 2.0e9,
+    "body.strands.shear_modulus_Pa": 1.33e9,
+    "body.springs.stiffness_N_per_m": 24.5,
+    "body.springs.rest_length_m": 0.065,
+    "body.springs.sensors": "sides",
+    "body.rings.kind": "servo",
+    "body.rings.layout": "halves",
+    "body.rings.length_range_m": (0.62, 0.96),
+    "body.rings.stiffness_N_per_m": 1000.0,
+    "body.rings.damping_Ns_per_m": 10.0,
+}
+
+
+@pytest.mark.parametrize("preset", ["wang", "riddle2025"])
+@pytest.mark.parametrize("path", ROBOTS)
+def test_the_robots_have_the_authors_mesh_and_servos(preset: str, path: str) -> None:
+    assert value_at(preset, path) == ROBOTS[path]
+
+
+@pytest.mark.parametrize(
+    ("preset", "n_segments", "n_crossings", "length_m"), [("wang", 4, 114, 0.71), ("riddle2025", 6, 120, 0.75)]
+)
+def test_the_robots_have_the_authors_size_density_and_weight(
+    preset: str, n_segments: int, n_crossings: int, length_m: float
+) -> None:
+    config = load_config(preset)
+    assert isinstance(config.body, WormBody)
+    geometry = mesh_of(config.body.mesh)
+    assert (geometry.n_segments, geometry.n_crossings) == (n_segments, n_crossings)
+    assert geometry.length_m == pytest.approx(length_m, abs=0.002)
+    strands = config.body.strands
+    assert strands.linear_density_kg_per_m == pytest.approx(571.6 * pi * strands.radius_m**2, rel=1e-3)
+    mass = strands.linear_density_kg_per_m * geometry.strand_length_m * geometry.n_strands
+    mass += config.body.pins.mass_kg * geometry.n_crossings
+    # 1.981 kg for six segments of 0.75 m, by length.
+    assert mass == pytest.approx(1.981 * length_m / 0.75, rel=0.005)
+
+
+def test_the_four_segment_robot_has_equal_servos() -> None:
+    assert isinstance(value_at("wang", "body.rings.force_limit_N"), float)
+    assert value_at("riddle2025", "body.rings.force_limit_N") == (16.0, 31.0, 31.0, 31.0, 31.0, 16.0)
+
+
+@pytest.mark.parametrize("preset", ["wang", "riddle2025"])
+@pytest.mark.parametrize(
+    "path", [p for p in PUBLISHED if p.startswith("controller.") and p != "controller.gate_time_constant_ms"]
+)
+def test_the_robots_have_the_published_network_but_for_its_speed(preset: str, path: str) -> None:
+    assert value_at(preset, path) == PUBLISHED[path]

@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 
 from annelid.arena.floor import add_floor
-from annelid.body.actuation import add_ring_muscles, add_springs
+from annelid.body.actuation import add_ring_actuators, add_springs
 from annelid.body.chain import add_chains
 from annelid.body.elimination import order_elimination
+from annelid.body.friction import add_joint_friction
 from annelid.body.rods import add_rods
 from annelid.config import Chain, Mesh, RunConfig, WormBody
 from annelid.errors import ConfigError
@@ -66,7 +67,9 @@ def build_spec(config: RunConfig) -> mujoco.MjSpec:
     else:
         add_rods(spec, geometry, body, body.formulation, arena)
     add_springs(spec, geometry, body.springs)
-    add_ring_muscles(spec, geometry, body.rings)
+    add_ring_actuators(spec, geometry, body.rings)
+    if body.joints is not None:
+        add_joint_friction(spec, geometry, body.joints)
     add_floor(spec, arena, geometry.length_m)
     return spec
 

@@ -1,10 +1,13 @@
 """The command line, a thin skin over the library. Heavy imports are inside the commands, so help is quick."""
 
 from annelid.cli.bench import bench_command
+from annelid.cli.calibrate import calibrate_command
 from annelid.cli.entry import app, main
+from annelid.cli.experiment import experiment
 from annelid.cli.limit_cycle import limit_cycle_command
 from annelid.cli.paper import paper_command
 from annelid.cli.results import plot, render, show
+from annelid.cli.robustness import robustness_command
 from annelid.cli.run import run_command
 from annelid.cli.worm import build, doctor, presets
 
@@ -20,7 +23,10 @@ for _name, _command in (
     ("limit-cycle", limit_cycle_command),
     ("paper", paper_command),
     ("bench", bench_command),
+    ("robustness", robustness_command),
+    ("calibrate", calibrate_command),
     ("presets", presets),
     ("doctor", doctor),
 ):
     app.command(_name)(_command)
+app.add_typer(experiment, name="experiment")

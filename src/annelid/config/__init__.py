@@ -13,6 +13,7 @@ from annelid.config.controllers import (
     HeteroclinicChannel,
     PhaseChain,
     Program,
+    RobustSns,
     SineWave,
     SnsController,
     StretchSensor,
@@ -23,7 +24,7 @@ from annelid.config.loading import load_config, parse_assignments, preset_names,
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
 from annelid.config.run import Arena, Clock, Guard, Record, RunConfig
 from annelid.config.sections import Section
-from annelid.config.worm import Chain, Mesh, Pins, Rings, Rods, Springs, Strands, WormBody
+from annelid.config.worm import Chain, Joints, Mesh, Pins, Rings, Rods, ServoRings, Springs, Strands, WormBody
 
 __all__ = [
     "LEVELS",
@@ -46,9 +47,11 @@ __all__ = [
     "Program",
     "Record",
     "Rings",
+    "RobustSns",
     "Rods",
     "RunConfig",
     "Section",
+    "ServoRings",
     "SineWave",
     "SnsController",
     "Springs",

@@ -71,6 +71,8 @@ _KINDS = {
     "boxerbaum2012",
     "rods",
     "chain",
+    "muscle",
+    "servo",
     "sns",
     "program",
     "sine",

@@ -210,6 +210,41 @@ class AdaptiveSns(Section):
     )
 
 
+class RobustSns(Section):
+    """A peristalsis network whose rhythm goes on whatever its sensors say: `annelid.nervous.robust`.
+
+    All contraction neurons suppress each other, a slow relay counts each turn, and the stretch sensors entrain it
+    within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used.
+    """
+
+    kind: Literal["sns-robust"] = "sns-robust"
+    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C of the fast neurons")
+    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
+    range_mV: Positive = Field(default=20.0, description="operating range R")
+    bifurcation_mV: Annotated[float, Field(lt=0)] = Field(
+        default=-1.0, description="delta: below 0, so that the half-centre stays in either state"
+    )
+    offset_mV: Positive = Field(default=0.1, description="how far beyond the range a held half-centre lies")
+    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
+    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
+    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
+    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
+        default=0.05, description="slope S of the sodium gates"
+    )
+    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; does not set the period here")
+    turn_ms: Positive = Field(default=875.0, description="time from one segment's contraction to the next one's")
+    push_nA: Positive = Field(
+        default=6.0, description="current of a full relay into the next contraction neuron at rest"
+    )
+    entrainment: Annotated[float, Field(ge=0, le=0.03)] = Field(
+        default=0.02, description="share of the relay's drive that the sensor may add or take; 0 for none"
+    )
+    habit_ms: Positive = Field(default=10000.0, description="time constant with which the sensor adapts")
+    full_stretch_m: Positive = Field(default=0.08, description="mean lengthening that drives a stretch neuron to R")
+    activation_slope_per_mV: Positive = Field(default=0.35, description="slope of the sigmoid, as in the paper")
+    scheme: Literal["euler", "heun"] = Field(default="euler", description="forward Euler, or second order")
+
+
 ControllerSection = Annotated[
     Annotated[SnsController, Tag("sns")]
     | Annotated[Program, Tag("program")]
@@ -217,6 +252,7 @@ ControllerSection = Annotated[
     | Annotated[TimedWave, Tag("timed")]
     | Annotated[HeteroclinicChannel, Tag("shc")]
     | Annotated[PhaseChain, Tag("phase-chain")]
-    | Annotated[AdaptiveSns, Tag("adaptive")],
+    | Annotated[AdaptiveSns, Tag("adaptive")]
+    | Annotated[RobustSns, Tag("sns-robust")],
     kind_or("sns"),
 ]

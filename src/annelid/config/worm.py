@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, Tag, field_validator, model_validator
 
 from annelid.config.sections import Impedance, NonNegative, Positive, Range, Section, kind_or
+from annelid.errors import ConfigError
 
 
 class Mesh(Section):
@@ -64,37 +65,40 @@ class Pins(Section):
     radius_m: Positive = Field(default=0.005, description="radius of the drawn sphere")
 
 
+class Joints(Section):
+    """Resistance of the crossings to a change of the angle between their two strands."""
+
+    dry_friction_Nm: NonNegative = Field(
+        default=0.0, description="Coulomb torque of one crossing, at the angle it has at rest"
+    )
+    viscous_friction_Nms_per_rad: NonNegative = Field(
+        default=0.0, description="torque of one crossing per angular velocity, at the angle it has at rest"
+    )
+
+
 class Springs(Section):
     """Axial springs between crossings two planes apart at the same angle."""
 
     stiffness_N_per_m: NonNegative = Field(default=19.9, description="spring rate")
     rest_length_m: Positive | None = Field(default=None, description="default: two plane spacings, unstretched at rest")
     tension_only: bool = Field(default=False, description="true: slack below rest length; false: pushes as well")
+    sensors: Literal["all", "sides"] = Field(
+        default="all",
+        description="which of the springs that span a ring carry a stretch sensor: all, or the leftmost (-y) and the "
+        "rightmost",
+    )
 
 
-class Rings(Section):
-    """Ring muscles: MuJoCo's force-length-velocity muscle on a closed ring (or two half-rings).
-
-    The muscle's optimal length is ``(length_range[1] - length_range[0]) / (1.05 - 0.75)``: MuJoCo scales the
-    given range to 0.75-1.05 of it. The force is ``peak_force_N * (activation * FL * FV + FP)``.
-    """
+class RingCables(Section):
+    """What ring actuators of all kinds have in common: how they lie, and between which lengths they work."""
 
     layout: Literal["whole", "halves"] = Field(
         default="whole",
-        description="one muscle round the body, or a left (-y: segment 1 leads towards -x) and a right one",
+        description="one actuator round the body, or a left (-y: segment 1 leads towards -x) and a right one",
     )
-    peak_force_N: Positive = Field(default=117.57, description="isometric force at the optimal length, F0")
     length_range_m: Range | tuple[Range, ...] = Field(
         default=(0.566, 1.067),
         description="operating range of a whole ring, one pair for all or one pair a segment",
-    )
-    minimum_length: Positive = Field(default=0.58, description="lmin, relative to the optimal length")
-    maximum_length: Positive = Field(default=1.6, description="lmax, relative to the optimal length")
-    maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
-    passive_peak: NonNegative = Field(default=1.3, description="fpmax, relative to the peak force")
-    lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
-    activation_dynamics: bool = Field(
-        default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
     )
 
     @field_validator("length_range_m")
@@ -113,6 +117,63 @@ class Rings(Section):
             return [(float(low), float(high)) for low, high in self.length_range_m]  # type: ignore[misc]
         low, high = self.length_range_m
         return [(float(low), float(high))] * n_segments  # type: ignore[arg-type]
+
+
+class Rings(RingCables):
+    """Ring muscles: MuJoCo's force-length-velocity muscle on a closed ring (or two half-rings).
+
+    The muscle's optimal length is ``(length_range[1] - length_range[0]) / (1.05 - 0.75)``: MuJoCo scales the
+    given range to 0.75-1.05 of it. The force is ``peak_force_N * (activation * FL * FV + FP)``.
+    """
+
+    kind: Literal["muscle"] = "muscle"
+    peak_force_N: Positive = Field(default=117.57, description="isometric force at the optimal length, F0")
+    minimum_length: Positive = Field(default=0.58, description="lmin, relative to the optimal length")
+    maximum_length: Positive = Field(default=1.6, description="lmax, relative to the optimal length")
+    maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
+    passive_peak: NonNegative = Field(default=1.3, description="fpmax, relative to the peak force")
+    lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
+    activation_dynamics: bool = Field(
+        default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
+    )
+
+
+class ServoRings(RingCables):
+    """Servos, each of which winds a cable that lies round a ring (or half of it) and can only pull.
+
+    Activation commands the cable's slack length, from the longest at 0 to the shortest at 1, and the servo winds or
+    pays out towards it at no more than its speed limit. The cable's tension is ``stiffness (length - slack length) +
+    damping rate``, kept between 0 and the force limit; at the limit the servo stalls, and winds on only as its ring
+    gives way.
+    """
+
+    kind: Literal["servo"] = "servo"
+    length_range_m: Range | tuple[Range, ...] = Field(
+        default=(0.62, 0.96),
+        description="shortest and longest cable of a whole ring (half-rings have half of it each), one pair for all or "
+        "one pair a segment",
+    )
+    force_limit_N: Positive | tuple[Positive, ...] = Field(
+        default=13.0, description="tension at which a servo stalls, one number for all or one a segment"
+    )
+    speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
+    stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
+    damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
+
+    @field_validator("force_limit_N")
+    @classmethod
+    def _given(cls, value: Any) -> Any:
+        if value == ():
+            raise ValueError("needs one number for all servos or one a segment")
+        return value
+
+    def force_limits(self, n_segments: int) -> list[float]:
+        """Returns the force limit of every segment's servos, N."""
+        limits = self.force_limit_N
+        return list(limits) if isinstance(limits, tuple) else [limits] * n_segments
+
+
+RingsSection = Annotated[Annotated[Rings, Tag("muscle")] | Annotated[ServoRings, Tag("servo")], kind_or("muscle")]
 
 
 class Rods(Section):
@@ -178,14 +239,26 @@ class WormBody(Section):
     mesh: Mesh = Mesh()
     strands: Strands = Strands()
     pins: Pins = Pins()
+    joints: Joints | None = None
     springs: Springs = Springs()
-    rings: Rings = Rings()
+    rings: RingsSection = Rings()
     formulation: Formulation = Rods()
 
     @property
     def n_segments(self) -> int:
         """Number of actuated segments."""
         return self.mesh.n_segments
+
+    @property
+    def muscles(self) -> Rings:
+        """The ring muscles.
+
+        Raises:
+            ConfigError: The rings have servos.
+        """
+        if isinstance(self.rings, ServoRings):
+            raise ConfigError("body.rings.kind = 'servo' has no muscles; this needs body.rings.kind = 'muscle'")
+        return self.rings
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
@@ -205,4 +278,11 @@ class WormBody(Section):
                 f"body.rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
                 "give one pair for each, or one for all, for example body.rings.length_range_m=[0.566,1.067]"
             )
+        if isinstance(self.rings, ServoRings):
+            n = len(self.rings.force_limits(self.mesh.n_segments))
+            if n != self.mesh.n_segments:
+                raise ValueError(
+                    f"body.rings.force_limit_N gives {n} limits for {self.mesh.n_segments} segments: "
+                    "give one for each, or one for all, for example body.rings.force_limit_N=13"
+                )
         return self

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body import mesh_of
-from annelid.body.actuation import crossing_site, ring_names
+from annelid.body.actuation import crossing_site, ring_names, stretch_sensors, winding_speed
 from annelid.body.rods import vertex_name
-from annelid.config import Chain, Rods, WormBody
+from annelid.config import Chain, Rods, ServoRings, WormBody
 from annelid.morphology import Array, MeshGeometry
 
 FLOOR = "floor"
@@ -103,6 +103,7 @@ class Anatomy:
         n_segments: Number of actuated segments.
         n_muscles: Number of ring muscles.
         rest_stretch_m: Lengths of the stretch sensors at rest, m, ``(n_segments, n_sensors)``.
+        first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
         outputs: Names of the engine's arrays that `forces` needs.
@@ -115,7 +116,11 @@ class Anatomy:
         self.muscle_names = ring_names(body.n_segments, body.rings)
         self.n_segments = self.geometry.n_segments
         self.n_muscles = len(self.muscle_names)
-        self.rest_stretch_m = self.geometry.spring_length_m[self.geometry.sensor_springs]
+        self._sensors = stretch_sensors(self.geometry, body.springs)
+        self.rest_stretch_m = self.geometry.spring_length_m[self._sensors]
+        self._servos = body.rings if isinstance(body.rings, ServoRings) else None
+        # Servos begin with their cables paid out.
+        self.first_act = np.zeros(model.na) if self._servos is None else model.actuator_actrange[:, 1].copy()
         self.has_edges = bool(model.nflexedge)
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
         self._ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
@@ -170,7 +175,22 @@ class Anatomy:
         spring = _norm(ends[..., 1, :] - ends[..., 0, :])
         corners = crossing.take(self._ring_path, axis=-2)
         ring = _norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
-        return Posture(crossing, center_of_mass, spring, spring.take(self.geometry.sensor_springs, axis=-1), ring)
+        return Posture(crossing, center_of_mass, spring, spring.take(self._sensors, axis=-1), ring)
+
+    def control(self, activation: Array, state: Array, ring_length_m: Array, time_s: float) -> Array:
+        """Tells what the engine's actuators get under an activation, ``(n_muscles,)``: the same, or for servos a speed.
+
+        Args:
+            activation: In [0, 1], ``(n_muscles,)``.
+            state: The engine's actuator states, ``(n_states,)``: slack lengths of the servos' cables, m.
+            ring_length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
+            time_s: Time for which it holds, s.
+        """
+        if self._servos is None:
+            return activation
+        model = self.model
+        limits = -model.actuator_forcerange[:, 0]
+        return winding_speed(activation, state, ring_length_m, model.actuator_actrange, limits, self._servos, time_s)
 
     def forces(self, engine: Mapping[str, Array]) -> Forces:
         """Reads what acted during the last physics step.

@@ -14,6 +14,7 @@ from annelid.config import (
     PhaseChain,
     PlanarBody,
     Program,
+    RobustSns,
     RunConfig,
     SineWave,
     SnsController,
@@ -57,6 +58,10 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
         from annelid.control.sns import SnsController as Controlled
 
         return Controlled(section, config.sensor, *size, timestep_s)
+    if isinstance(section, RobustSns):
+        from annelid.control.robust import RobustController
+
+        return RobustController(section, *size, timestep_s)
     if isinstance(section, Program):
         from annelid.control.program import ProgramController
 

@@ -119,6 +119,10 @@ class Worm(ABC):
         """
 
     @abstractmethod
+    def actuator_state(self) -> Array:
+        """Returns the engine's actuator states, ``(n_states,)``."""
+
+    @abstractmethod
     def locate(self) -> Posture:
         """Reads the posture from the engine's coordinates."""
 
@@ -189,6 +193,11 @@ class Worm(ABC):
         """Number of physics steps at the end of the next ``n_steps`` control steps, at most `steps_to_move` of them."""
         return self._ratio.physics_steps_due(self._control_step + n_steps)
 
+    def control(self, activation: Array, n_steps: int) -> Array:
+        """Tells what the engine's actuators get during the next physics steps under an activation, ``(n_muscles,)``."""
+        time_s = n_steps * self._config.clock.physics_timestep_s
+        return self.anatomy.control(activation, self.actuator_state(), self._posture.ring_length, time_s)
+
     def strode(self, n_steps: int, moved: tuple[Posture, Forces] | None) -> Sensation:
         """Takes note of control steps as `stride` does, where somebody else moves the body.
 
@@ -255,9 +264,8 @@ class Worm(ABC):
     def recordable(self) -> Recordable:
         """Names the signals of the body."""
         n, m, geometry = self.n_segments, self.n_muscles, self.geometry
-        sensors = geometry.sensor_springs.shape[1]
         stretch = ("segment", "sensor")
-        shape = (n, sensors)
+        shape = self.anatomy.rest_stretch_m.shape
         extremes: list[Signal] = []
         if self.anatomy.has_edges:
             extremes.append(Signal("edge_strain", (), (), "1", "largest strain of a rod's edge"))
@@ -351,6 +359,7 @@ class WormPlant(Worm):
     def reset_engine(self, state: Array | None = None) -> None:
         """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
         mujoco.mj_resetData(self.model, self.data)
+        self.data.act[:] = self.anatomy.first_act
         if state is not None:
             mujoco.mj_setState(self.model, self.data, state, STATE_PARTS)
 
@@ -360,12 +369,16 @@ class WormPlant(Worm):
         Raises:
             SimulationStopped: The engine gave up.
         """
-        self.data.ctrl[:] = activation
+        self.data.ctrl[:] = self.control(activation, n_steps)
         try:
             mujoco.mj_step(self.model, self.data, n_steps)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None
         return self.anatomy.forces(self._outputs)
+
+    def actuator_state(self) -> Array:
+        """Returns the engine's actuator states, ``(n_states,)``."""
+        return self.data.act
 
     def locate(self) -> Posture:
         """Reads the posture from the engine's coordinates."""

@@ -137,8 +137,8 @@ def _figure_5(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> st
     from annelid.view.figures.muscle_surface import caption, figure_5_muscle_surface
 
     assert isinstance(run.config.body, WormBody)
-    figure_5_muscle_surface(run.config.body.rings, stem, run.config.body.n_segments)
-    return caption(run.config.body.rings, run.config.body.n_segments)
+    figure_5_muscle_surface(run.config.body.muscles, stem, run.config.body.n_segments)
+    return caption(run.config.body.muscles, run.config.body.n_segments)
 
 
 def _figure_6(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:

@@ -50,6 +50,7 @@ class BodyBatch:
                 raise ConfigError(f"these worms differ too much for one batch: {error}") from None
         bind = self._batch.bind
         self._time, self._ctrl, self._qpos, self._qvel = (bind(name) for name in ("time", "ctrl", "qpos", "qvel"))
+        self._act: Array = bind("act") if models[0].na else np.empty((len(models), 0))
         self._mass_matrix = bind("M")
         self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
         self._scratch = mujoco.MjData(models[0])
@@ -61,6 +62,7 @@ class BodyBatch:
     def reset(self, row: int, state: Array | None) -> None:
         """Resets one body, and gives it a state of the engine if there is one."""
         self._batch.reset([row], stage=_NO_STAGE)
+        self._act[row] = self.worms[row].anatomy.first_act
         if state is not None:
             self._batch.state[row] = state
 
@@ -75,7 +77,8 @@ class BodyBatch:
         Returns:
             Why the engine gave up, for every body that it could not step.
         """
-        self._ctrl[rows] = activation
+        for row, own in zip(rows, activation, strict=True):
+            self._ctrl[row] = self.worms[row].control(own, n_steps)
         try:
             self._batch.step(rows, n_steps)
         except SimulationError as failure:
@@ -110,6 +113,10 @@ class BodyBatch:
         scratch.M[:] = self._mass_matrix[row]
         mujoco.mj_energyVel(self.worms[row].model, scratch)
         return float(scratch.energy[1])
+
+    def actuator_state(self, row: int) -> Array:
+        """Returns a body's actuator states, ``(n_states,)``."""
+        return self._act[row]
 
     def qpos(self, row: int) -> Array:
         """Returns a body's generalised positions, ``(nq,)``."""
@@ -147,6 +154,10 @@ class BatchWorm(Worm):
         if reasons:
             raise SimulationStopped(reasons[self._row])
         return self._bodies.forces([self._row]).each()[0]
+
+    def actuator_state(self) -> Array:
+        """Returns the engine's actuator states, ``(n_states,)``."""
+        return self._bodies.actuator_state(self._row)
 
     def locate(self) -> Posture:
         """Reads the posture from its row's coordinates."""

@@ -15,9 +15,11 @@ ALIKE = (
     "controller.kind",
     "body.mesh",
     "body.formulation",
+    "body.rings.kind",
     "body.rings.layout",
     "body.rings.activation_dynamics",
     "body.springs.tension_only",
+    "body.springs.sensors",
 )
 """What all worms of a batch must have in common; everything else may differ."""
 
@@ -80,7 +82,7 @@ def _refuse_differences(configs: Sequence[RunConfig]) -> None:
 def _at(tree: Mapping[str, Any], path: str) -> Any:
     value: Any = tree
     for key in path.split("."):
-        value = value[key]
+        value = value.get(key)
     return value
 
 

@@ -25,7 +25,7 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
     body, controller = main.config.body, main.config.controller
     assert isinstance(body, WormBody)
     assert isinstance(controller, SnsController)
-    difference = largest_difference(body.rings)
+    difference = largest_difference(body.muscles)
     median = outcome.summary.contraction_force_median_N or float("nan")
     peak = outcome.summary.contraction_force_peak_N or float("nan")
     verdict, within = nearness(median, 2.5)
@@ -68,7 +68,7 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
             "up to 2.5 N",
             f"median {median:.2f} N while contracted, peak {peak:.0f} N",
             "The muscle settles near its shortest length, where little force is left of its peak of "
-            f"{body.rings.peak_force_N:.0f} N: it limits length rather than force. The peak lasts a few milliseconds "
+            f"{body.muscles.peak_force_N:.0f} N: it limits length rather than force. The peak lasts a few milliseconds "
             "at the start of a contraction and depends on the time step.",
             MAIN.command,
             within,

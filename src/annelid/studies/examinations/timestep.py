@@ -127,7 +127,7 @@ def velocity_limit(config: RunConfig, segment: int = 0) -> float:
     """
     if not isinstance(config.body, WormBody):
         raise ValueError("a planar worm has no ring muscles")
-    rings = config.body.rings
+    rings = config.body.muscles
     low, high = rings.length_ranges(config.body.n_segments)[segment]
     return rings.maximum_velocity * (high - low) / 0.3
 

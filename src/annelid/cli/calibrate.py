@@ -1,0 +1,82 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `calibrate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import Assignments, Force, Preset, config_of, or_default, overrides_of, refuse_existing
+
+
+def calibrate_command(
+    preset: Preset = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("calibration"),
+    assignments: Assignments = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--free", metavar="PARAMETER", help="Fit only these; may be repeated.  [default: the first three]"
+        ),
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option("--data", help="Measured loop to fit.  [default: the one of annelid]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")] = False,
+    force: Force = False,
+) -> None:
+    """Fit the rod worm to a measured load-frame loop.
+
+    Strands of the stiffness-equivalent radius 0.00299 m and 571.6 kg/m^3, unless --set says otherwise. Takes a
+    few minutes. Writes calibration.json, calibration.png and .svg, and calibrated.toml: the fields to put into
+    a file of your own.
+
+    \b
+    --free young_modulus         of the strands; the shear modulus keeps its ratio to it
+    --free dry_friction          Coulomb torque of a crossing
+    --free cable_friction        of the cable round the ring: coefficient times angle
+    --free spring_rate           of the axial springs
+    --free spring_rest_length    of the axial springs
+    --free viscous_friction      torque of a crossing per angular velocity
+
+    \b
+    annelid calibrate
+    annelid calibrate --set body.strands.radius_m=0.002
+    annelid calibrate --set body.springs.stiffness_N_per_m=24.5 --set body.springs.rest_length_m=0.065
+    annelid calibrate --free young_modulus --free dry_friction --data mine.csv
+    """
+    from rich.console import Console
+
+    from annelid.studies.calibration.fit import DEFAULT_FREE, calibrate
+    from annelid.studies.calibration.loop import read_loop
+    from annelid.studies.calibration.report import EQUAL_STIFFNESS, fit_tables, write_calibration
+    from annelid.studies.progress import study_progress
+    from annelid.view.figures.load_frame import load_frame_figure
+
+    report = output / "calibration.json"
+    if output.is_dir():
+        refuse_existing(report, force)
+    measured = read_loop(data)
+    source, changes = or_default(preset), EQUAL_STIFFNESS | overrides_of(assignments)
+    config = config_of(source, dict(changes), None)
+    with study_progress(quiet=quiet) as progress:
+        fit = calibrate(
+            config,
+            measured,
+            free=free or DEFAULT_FREE,
+            progress=None
+            if progress is None
+            else lambda loops, rms: progress(f"calibrating, {rms:.2f} N off after {loops} loops", 0, 0, 0.0),
+        )
+    output.mkdir(parents=True, exist_ok=True)
+    if not quiet:
+        for table in fit_tables(fit):
+            Console().print(table)
+    loops = {
+        "fitted": (fit.simulated.displacement_m, fit.simulated.force_N),
+        "measured": (measured.displacement_m, measured.force_N),
+    }
+    for path in (*write_calibration(fit, source, changes, report), load_frame_figure(loops, report.with_suffix(""))):
+        typer.echo(path)

@@ -1,0 +1,242 @@
+"""A peristalsis network whose rhythm goes on whatever the sensors say: the paper's neurons, joined in another way.
+
+Each segment keeps the half-centre of the paper, contraction against expansion neuron, its hold and its relay. In the
+paper's network the stretch sensors hold segments expanded, so that a sensor that is on for good, or off too early,
+decides the order; with all of them on nothing contracts again. The changes, each with its reason:
+
+1. *Others hold, not the sensor.* The hold of a segment is excited by the contraction neurons of all other segments. So
+   a second contraction is suppressed by the first. The hold's synapses onto the half-centre saturate, which makes the
+   suppression the same for any number of segments.
+2. *A tonic neuron* excites the contraction neuron of segment 1, which therefore contracts whenever nobody holds it: so
+   silence is unstable. With a tonic drive to all segments they could contract and suppress each other in unison.
+3. *The half-centre is bistable* (delta < 0): it remembers whose turn it is. With the paper's delta > 0 the turn ends by
+   the escape of the expansion neuron, a time that depends on how long the segment had rested.
+4. *The relay is slow and counts the turn.* It is charged by its own segment's contraction neuron. When it has reached
+   half of its range, it ends the hold of the next segment and excites its contraction neuron. The next contraction
+   holds the present segment, and discharges the relay through a shunt, so that every turn begins alike.
+5. *The sensor entrains.* A stretch neuron and its slow copy, the habit, push the relay with opposite sign, each through
+   a saturating synapse: a segment that is longer than it is used to hands over earlier, a shorter one later. A constant
+   signal has almost no effect in the end, and no signal changes the relay's drive by more than the entrained share.
+
+**The turn.** A charging relay follows ``U(t) = R (1 - exp(-t / tau))``, ``tau = C / (Gm + g)`` with the conductance g
+of its charge. The hold yields at the relay's potential U* (`yield_mV`, closed), so ``tau = turn / ln(R / (R - U*))``.
+What the half-centre takes to flip comes on top, up to 2 % of the paper's 875 ms.
+
+**The bounds.** With entrainment e the relay's drive stays within ``(1 +- e) R`` and so does where it starts, within
+``+- e R``; since U* is about R / 2, a turn changes by at most about ``2 e / ln 2`` of itself: 6 % with e = 0.02.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import log, sqrt
+
+from annelid.errors import ConfigError
+from annelid.nervous import design
+from annelid.nervous.functional_subnetworks import Signals, transmission
+from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
+from annelid.nervous.network import Network
+from annelid.nervous.neurons import Neuron
+from annelid.nervous.synapses import Synapse
+
+ROLES = ("contraction", "expansion", "hold", "relay", "stretch", "habit")
+"""The six neurons of a segment, in order."""
+TONIC_NEURON = "tonic"
+"""The neuron that excites the first contraction neuron."""
+
+_THRESHOLD = 0.5
+"""The relay begins to end the next segment's hold at this share of R."""
+_WINDOW = 0.05
+"""It ends it altogether this share of R above."""
+_DISCHARGE = 4.0
+"""The next contraction multiplies the relay's conductance by one more than this."""
+
+
+@dataclass(frozen=True)
+class RobustParameters(HalfCentre):
+    """What the network is designed from: its half-centres, which are bistable, and what was added to them.
+
+    Attributes:
+        turn_ms: Time from one segment's contraction to the next one's.
+        push_nA: Current of a full relay into the next segment's contraction neuron at rest.
+        entrainment: Share of the relay's drive that the sensor may add or take.
+        habit_ms: Time constant with which the sensor adapts.
+
+    Raises:
+        ConfigError: As `HalfCentre`; a delta that is not negative, a time or push that is not positive, a negative
+            entrainment, or a push with which the hold would not yield to the relay, or not hold.
+    """
+
+    bifurcation_mV: float = -1.0
+    turn_ms: float = 875.0
+    push_nA: float = 6.0
+    entrainment: float = 0.02
+    habit_ms: float = 10000.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.bifurcation_mV < 0:
+            raise ConfigError(f"bifurcation_mV must be negative, not {self.bifurcation_mV}")
+        for name in ("turn_ms", "push_nA", "habit_ms"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(f"{name} must be positive, not {getattr(self, name)}")
+        if not self.entrainment >= 0:
+            raise ConfigError(f"entrainment must not be negative, not {self.entrainment}")
+        if not 0.0 < yielding_hold(self, self.push_nA) < 1.0:
+            least = -yielding_hold(self, 0.0) * self.hold_down_uS * -self.inhibitory_reversal_mV
+            most = least - self.hold_down_uS * self.inhibitory_reversal_mV
+            raise ConfigError(
+                f"push_nA = {self.push_nA:g} must be between {least:.4g} and {most:.4g} nA, so that a segment "
+                "contracts without its hold and not with it"
+            )
+
+    @property
+    def signals(self) -> Signals:
+        """How the neurons outside the half-centres carry signals."""
+        return Signals(
+            self.range_mV,
+            self.leak_conductance_uS,
+            self.capacitance_nF,
+            self.excitatory_reversal_mV,
+            self.inhibitory_reversal_mV,
+        )
+
+    @property
+    def charge_uS(self) -> float:
+        """Conductance with which a contraction neuron at R brings its relay, or another's hold, to R."""
+        return transmission(1.0, self.signals).conductance_uS
+
+    @property
+    def release_uS(self) -> float:
+        """Conductance with which a full relay cancels the excitation of a hold by one contraction neuron."""
+        return design.relay_silencing_conductance(
+            self.range_mV, 0.0, self.charge_uS, self.excitatory_reversal_mV, self.inhibitory_reversal_mV
+        )
+
+
+def yielding_hold(p: RobustParameters, excitation_nA: float) -> float:
+    """Activity of the hold at which the contraction neuron of an expanded segment comes to inhibit its partner.
+
+    Balance of the contraction neuron at 0 with its partner at R and a steady gate:
+    ``a g_hold E_inh + g_CPG E_inh + G_Na m(0) h(0) E_Na + I = 0``.
+
+    Args:
+        p: The design.
+        excitation_nA: I, what excites the contraction neuron, nA.
+
+    Returns:
+        a; the segment contracts without a hold if it is positive, and can be held if it is below 1.
+    """
+    drive = excitation_nA + p.sodium_uS * design.unit_channel_current(p.sodium_channel, 0.0)
+    return (drive + p.inhibition_uS * p.inhibitory_reversal_mV) / (-p.hold_down_uS * p.inhibitory_reversal_mV)
+
+
+def yield_opening(p: RobustParameters) -> float:
+    """Open share b of the relay's synapses at which the next segment's contraction neuron passes 0.
+
+    The hold, excited by one contraction neuron (g_1) and inhibited by the relay (b g_2), rests at
+    ``(g_1 E_ex + b g_2 E_inh) / (Gm + g_1 + b g_2)``. That this is R times `yielding_hold` under the push ``b I`` is a
+    quadratic equation for b.
+
+    Args:
+        p: The design.
+
+    Returns:
+        b, between 0 and 1.
+    """
+    reach, leak = p.range_mV, p.leak_conductance_uS + p.charge_uS
+    alone = yielding_hold(p, 0.0)
+    slope = yielding_hold(p, p.push_nA) - alone
+    square = reach * slope * p.release_uS
+    linear = p.release_uS * (reach * alone - p.inhibitory_reversal_mV) + reach * slope * leak
+    constant = reach * alone * leak - p.charge_uS * p.excitatory_reversal_mV
+    return (-linear + sqrt(linear**2 - 4.0 * square * constant)) / (2.0 * square)
+
+
+def yield_mV(p: RobustParameters) -> float:
+    """Potential U* of the relay at which the next segment's hold yields, mV, from `yield_opening`."""
+    return p.range_mV * (_THRESHOLD + _WINDOW * yield_opening(p))
+
+
+def tonic_nA(p: RobustParameters) -> float:
+    """Current of the tonic neuron into the first contraction neuron at rest.
+
+    It is what a relay pushes with when the hold yields, so that the first segment takes its turn as all others do.
+    """
+    return p.push_nA * yield_opening(p)
+
+
+def neuron_names(n_segments: int) -> list[str]:
+    """Returns the names of all neurons: those of every segment by `ROLES`, then the tonic neuron."""
+    return [*(f"{role}_{segment}" for segment in range(1, n_segments + 1) for role in ROLES), TONIC_NEURON]
+
+
+def robust_network(n_segments: int, parameters: RobustParameters | None = None) -> Network:
+    """Builds the robust peristalsis network in its initial state: segment 1 contracted, all others held expanded.
+
+    Inputs are ``stretch_1`` .. ``stretch_N``, currents into the stretch neurons and their habits; ``Gm R`` nA drives
+    them to R. Outputs are ``contraction_s`` and ``expansion_s`` of every segment.
+
+    Args:
+        n_segments: Number of segments, at least 3.
+        parameters: What to design it from; default: the paper's half-centres and interval.
+
+    Returns:
+        A network of ``6 n_segments + 1`` neurons, named by `neuron_names`.
+
+    Raises:
+        ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
+    """
+    if n_segments < 3:
+        raise ConfigError(f"n_segments must be at least 3, not {n_segments}")
+    p = RobustParameters() if parameters is None else parameters
+    network = Network(f"robust peristalsis of {n_segments} segments")
+    for segment in range(1, n_segments + 1):
+        _add_segment(network, p, segment)
+    leak_nA = p.leak_conductance_uS * p.range_mV
+    network.add_neuron(TONIC_NEURON, Neuron(p.capacitance_nF, p.leak_conductance_uS, bias_nA=leak_nA), p.range_mV)
+    network.add_synapse(TONIC_NEURON, "contraction_1", p.excitatory(tonic_nA(p) / p.excitatory_reversal_mV))
+    for segment in range(1, n_segments + 1):
+        _join_segment(network, p, segment, n_segments)
+    for segment in range(1, n_segments + 1):
+        network.add_input(f"stretch_{segment}", (f"stretch_{segment}", f"habit_{segment}"))
+        network.add_output(f"contraction_{segment}", f"contraction_{segment}")
+        network.add_output(f"expansion_{segment}", f"expansion_{segment}")
+    return network
+
+
+def _add_segment(network: Network, p: RobustParameters, segment: int) -> None:
+    """Adds the six neurons of a segment, and what joins them."""
+    contraction, expansion, hold, relay, stretch, habit = (f"{role}_{segment}" for role in ROLES)
+    leak, reach, first = p.leak_conductance_uS, p.range_mV, segment == 1
+    tau_ms = p.turn_ms / log(reach / (reach - yield_mV(p)))
+    contracted, held = (reach, p.bifurcation_mV), (-p.offset_mV, reach + p.offset_mV)
+    add_half_centre(network, contraction, expansion, p, contracted if first else held)
+    network.add_neuron(hold, p.signals.neuron, 0.0 if first else reach)
+    network.add_neuron(relay, Neuron(tau_ms * (leak + p.charge_uS), leak), 0.0)
+    network.add_neuron(stretch, p.signals.neuron, 0.0)
+    network.add_neuron(habit, Neuron(p.habit_ms * leak, leak), 0.0)
+    add_hold(network, hold, down=contraction, up=expansion, half_centre=p)
+    network.add_synapse(contraction, relay, p.excitatory(p.charge_uS))
+    # Both carry the same current into a relay at rest, e Gm R, so that a steady stretch cancels.
+    share_nA = p.entrainment * leak * reach
+    network.add_synapse(stretch, relay, p.excitatory(share_nA / p.excitatory_reversal_mV))
+    network.add_synapse(habit, relay, p.inhibitory(-share_nA / p.inhibitory_reversal_mV))
+
+
+def _join_segment(network: Network, p: RobustParameters, segment: int, n_segments: int) -> None:
+    """Adds the holds that a segment excites, and what passes between it and the next one."""
+    following = segment % n_segments + 1
+    contraction, relay = f"contraction_{segment}", f"relay_{segment}"
+    # Below R / 2 nobody is held: else many segments that all begin to contract could keep each other from it.
+    suppression = Synapse(p.charge_uS, p.excitatory_reversal_mV, 0.5 * p.range_mV, p.range_mV)
+    for other in range(1, n_segments + 1):
+        if other != segment:
+            network.add_synapse(contraction, f"hold_{other}", suppression)
+    opening = _THRESHOLD * p.range_mV, (_THRESHOLD + _WINDOW) * p.range_mV
+    network.add_synapse(relay, f"hold_{following}", Synapse(p.release_uS, p.inhibitory_reversal_mV, *opening))
+    if following != 1:
+        push_uS = p.push_nA / p.excitatory_reversal_mV
+        network.add_synapse(relay, f"contraction_{following}", Synapse(push_uS, p.excitatory_reversal_mV, *opening))
+    discharge = Synapse(_DISCHARGE * (p.leak_conductance_uS + p.charge_uS), 0.0, 0.0, p.range_mV)
+    network.add_synapse(f"contraction_{following}", relay, discharge)

@@ -1,0 +1,186 @@
+"""Servos wind cables that can only pull, no faster and no harder than they can; sensors sit where they are told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.body import mesh_of
+from annelid.body.actuation import stretch_sensors, winding_speed
+from annelid.config import Mesh, ServoRings, Springs, load_config
+from annelid.errors import ConfigError
+from annelid.simulation.worm import WormPlant
+
+SMALL = {
+    "body.mesh.n_segments": 3,
+    "body.mesh.elements_per_side": 1,
+    "arena.gravity_m_per_s2": 0.0,
+    "clock.control_timestep_s": 0.005,
+    "clock.physics_timestep_s": 0.005,
+    "record.signals_interval_s": 0.005,
+}
+STIFF = {"body.strands.young_modulus_Pa": 2e12, "body.strands.shear_modulus_Pa": 1.3e12}
+LIMIT_N, SPEED_M_PER_S, STIFFNESS_N_PER_M = 8.0, 0.05, 600.0
+SERVO = {
+    "body.rings.force_limit_N": LIMIT_N,
+    "body.rings.speed_limit_m_per_s": SPEED_M_PER_S,
+    "body.rings.stiffness_N_per_m": STIFFNESS_N_PER_M,
+}
+
+
+def worm(**changes: Any) -> WormPlant:
+    plant = WormPlant(load_config("wang", SMALL | SERVO | changes))
+    plant.reset(0)
+    return plant
+
+
+def speed(
+    activation: float, slack_m: float, length_m: float, time_s: float = 0.01, rings: ServoRings | None = None
+) -> float:
+    rings = rings or ServoRings(stiffness_N_per_m=STIFFNESS_N_PER_M, speed_limit_m_per_s=SPEED_M_PER_S)
+    command, slack, length = (np.array([value]) for value in (activation, slack_m, length_m))
+    span, limit = np.array([[0.31, 0.48]]), np.array([LIMIT_N])
+    return float(winding_speed(command, slack, length, span, limit, rings, time_s)[0])
+
+
+activations, lengths = st.floats(0.0, 1.0), st.floats(0.31, 0.48)
+
+
+@given(activation=activations, slack_m=lengths, length_m=st.floats(0.2, 0.6), time_s=st.floats(1e-4, 0.1))
+def test_a_cable_is_never_faster_than_its_limit_and_stays_between_command_and_stall(
+    activation: float, slack_m: float, length_m: float, time_s: float
+) -> None:
+    rate = speed(activation, slack_m, length_m, time_s)
+    commanded = 0.48 - 0.17 * activation
+    stalled = length_m - LIMIT_N / STIFFNESS_N_PER_M
+    after = slack_m + rate * time_s
+    assert abs(rate) <= SPEED_M_PER_S
+    if rate < 0.0:
+        assert after >= max(commanded, min(stalled, 0.48)) - 1e-12
+    elif rate > 0.0:
+        assert after <= max(commanded, stalled) + 1e-12
+    else:
+        assert slack_m == pytest.approx(max(commanded, min(stalled, 0.48)))
+
+
+@given(slack_m=st.floats(0.35, 0.45), load=st.floats(0.0, 0.9))
+def test_a_servo_winds_below_its_force_limit_holds_at_it_and_lets_go_at_once(slack_m: float, load: float) -> None:
+    taut_m, stretch_m = slack_m, LIMIT_N / STIFFNESS_N_PER_M
+    assert speed(1.0, slack_m, taut_m + load * stretch_m, 1e-4) == -SPEED_M_PER_S
+    assert speed(1.0, slack_m, taut_m + stretch_m) == pytest.approx(0.0, abs=1e-12)
+    assert speed(1.0, slack_m, taut_m + 1.2 * stretch_m, 1e-4) == SPEED_M_PER_S
+    assert speed(0.0, slack_m, taut_m + load * stretch_m) == SPEED_M_PER_S
+
+
+@pytest.mark.parametrize("layout", ["whole", "halves"])
+def test_without_load_a_cable_moves_at_the_speed_limit(layout: str) -> None:
+    """A cable that is longer than its way round the body is slack; until it is taut its force is zero."""
+    plant = worm(**{"body.rings.layout": layout, "body.rings.length_range_m": [0.62, 1.3]})
+    longest = 1.3 if layout == "whole" else 0.65
+    for _ in range(100):
+        felt = plant.step(np.ones(plant.n_muscles))
+        assert np.array_equal(felt.muscle_force_N, np.zeros(plant.n_muscles))
+    assert plant.actuator_state() == pytest.approx(longest - 0.5 * SPEED_M_PER_S, rel=1e-9)
+
+
+def test_a_slack_cable_changes_nothing() -> None:
+    """The engine's implicit treatment of stiffness and damping must not hold a body whose cables are slack."""
+    slack = {"body.rings.length_range_m": [0.62, 1.3]}
+    weak = {**slack, "body.rings.stiffness_N_per_m": 1e-6, "body.rings.damping_Ns_per_m": 0.0}
+    paths = []
+    for changes in (slack, weak):
+        plant = worm(**changes, **{"arena.gravity_m_per_s2": 9.81})
+        paths.append([plant.step(np.zeros(plant.n_muscles)).ring_length_m for _ in range(20)])
+    assert np.ptp(paths[0], axis=0).max() > 1e-4
+    assert np.allclose(paths[0], paths[1], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("timestep_s", [0.0025, 0.005])
+def test_against_a_stiff_ring_a_servo_stalls_at_its_force_limit(timestep_s: float) -> None:
+    """At a fixed length, tension rises by stiffness times speed a second up to the limit, and falls alike."""
+    changes = STIFF | {"body.rings.length_range_m": [0.62, 0.959], "body.springs.stiffness_N_per_m": 0.0}
+    plant = worm(**changes, **{f"clock.{name}_timestep_s": timestep_s for name in ("control", "physics")})
+    rate = STIFFNESS_N_PER_M * SPEED_M_PER_S
+    errors = []
+    felt = plant.feel()
+    for step in range(1, round(0.6 / timestep_s) + 1):
+        felt = plant.step(np.ones(plant.n_muscles))
+        assert np.ptp(felt.ring_length_m) < 1e-3
+        expected = min(LIMIT_N, rate * step * timestep_s)
+        errors.append(np.abs(felt.muscle_force_N - expected).max())
+    assert max(errors[10:]) < 0.06 * LIMIT_N
+    assert felt.muscle_force_N == pytest.approx(LIMIT_N, rel=0.01)
+    # Stalled, it has not wound on: told to let go, it does so at once.
+    for step in range(1, round(0.2 / timestep_s) + 1):
+        felt = plant.step(np.zeros(plant.n_muscles))
+        assert felt.muscle_force_N == pytest.approx(LIMIT_N - rate * step * timestep_s, abs=0.06 * LIMIT_N)
+
+
+@pytest.mark.parametrize("formulation", [{}, {"body.formulation.kind": "chain", "clock.physics_timestep_s": 0.001}])
+def test_a_servo_never_pushes_nor_pulls_above_its_limit(formulation: dict[str, Any]) -> None:
+    """Cables far too short, suddenly told to shorten or to let go."""
+    plant = worm(**formulation, **{"body.rings.length_range_m": [0.6, 0.9], "body.rings.speed_limit_m_per_s": 5.0})
+    rng = np.random.default_rng(0)
+    most = 0.0
+    for _ in range(20):
+        activation = rng.integers(0, 2, plant.n_muscles).astype(float)
+        for _ in range(5):
+            force = plant.step(activation).muscle_force_N
+            assert force.min() >= 0.0
+            assert force.max() <= LIMIT_N * (1.0 + 1e-12)
+            most = max(most, force.max())
+    assert most > 0.9 * LIMIT_N
+
+
+def test_servos_may_differ_from_segment_to_segment() -> None:
+    plant = worm(**{"body.rings.force_limit_N": [3.0, 5.0, 7.0]})
+    assert plant.model.actuator_forcerange[:, 0].tolist() == [-3.0, -3.0, -5.0, -5.0, -7.0, -7.0]
+
+
+@pytest.mark.parametrize("mesh", [Mesh(), Mesh(n_segments=5, planes_between_rings=3), Mesh(n_helices=8)])
+def test_side_sensors_are_the_leftmost_and_the_rightmost_springs(mesh: Mesh) -> None:
+    geometry = mesh_of(mesh)
+    every, sides = (stretch_sensors(geometry, Springs(sensors=which)) for which in ("all", "sides"))
+    assert every is geometry.sensor_springs
+    assert sides.shape == (mesh.n_segments, 2)
+    y = geometry.crossings_m[geometry.springs, 1].mean(axis=1)
+    for segment in range(mesh.n_segments):
+        assert set(sides[segment]) <= set(every[segment])
+        # Segment 1 leads towards -x: left is -y.
+        assert y[sides[segment, 0]] == y[every[segment]].min() < 0.0 < y[every[segment]].max() == y[sides[segment, 1]]
+
+
+def test_a_worm_feels_the_springs_that_have_sensors() -> None:
+    both = [worm(**{"body.springs.sensors": which}) for which in ("all", "sides")]
+    felt = [plant.step(np.linspace(0.0, 1.0, plant.n_muscles)) for plant in both]
+    assert [one.stretch_m.shape for one in felt] == [(3, 6), (3, 2)] == [one.rest_stretch_m.shape for one in felt]
+    for pair, all_six in zip(felt[1].stretch_m, felt[0].stretch_m, strict=True):
+        assert set(pair) <= set(all_six)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"body.rings.peak_force_N": 20.0}, "body.rings.peak_force_N"),
+        ({"body.rings.force_limit_N": [1.0, 2.0]}, "2 limits for 4 segments"),
+        ({"body.rings.force_limit_N": []}, "one number for all servos"),
+        ({"body.rings.speed_limit_m_per_s": 0.0}, "body.rings.speed_limit_m_per_s = 0"),
+        ({"body.rings.length_range_m": [0.96, 0.62]}, "lower bound below its upper bound"),
+        ({"body.rings.kind": "rope"}, "body.rings.kind = 'rope'"),
+        ({"body.springs.sensors": "front"}, "body.springs.sensors = 'front'"),
+    ],
+)
+def test_what_a_servo_cannot_be_is_refused_by_the_field_s_name(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        load_config("wang", changes)
+
+
+def test_muscles_refuse_the_fields_of_servos_and_may_become_servos() -> None:
+    with pytest.raises(ConfigError, match="speed_limit_m_per_s"):
+        load_config("riddle2023-rods", {"body.rings.speed_limit_m_per_s": 0.1})
+    changed = load_config("riddle2023", {"body.rings.kind": "servo"}).model_dump()["body"]["rings"]
+    assert changed == ServoRings().model_dump()

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from outcome import Command
+
+
+def test_load_frame_writes_a_table_and_its_picture(annelid: Command) -> None:
+    done = annelid("experiment", "load-frame", "--displacement", "90", "--cable-friction", "1.0", "-o", "frame")
+    assert done.exit_code == 0, done.err
+    assert "work lost" in done.out
+    assert done.out.splitlines()[-2:] == [str(Path("frame/load_frame.csv")), str(Path("frame/load_frame.png"))]
+    assert Path("frame/load_frame.svg").exists()
+    table = np.genfromtxt("frame/load_frame.csv", delimiter=",", names=True)
+    assert table["displacement_mm"].max() == pytest.approx(90, abs=2)
+    turn = int(table["displacement_mm"].argmax())
+    assert table["force_N"][turn] == pytest.approx(table["tension_N"][turn] / (1 - np.exp(-1.0)), rel=1e-4)
+    assert table["force_N"][-2] == pytest.approx(table["tension_N"][-2] / (np.exp(1.0) - 1), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("experiment", "load-frame", "riddle2022-planar"), "no ring cable"),
+        (("experiment", "load-frame", "--displacement", "2000"), "four fifths"),
+        (("experiment", "load-frame", "--cable-friction", "-1"), "must be a finite number"),
+        (("experiment", "load-frame", "--data", "none.csv"), "cannot read none.csv"),
+        (("calibrate", "--free", "yuong_modulus"), "did you mean 'young_modulus'"),
+        (("calibrate", "--data", "none.csv"), "cannot read none.csv"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence(annelid: Command, arguments: tuple[str, ...], says: str) -> None:
+    done = annelid(*arguments, "--quiet")
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not list(Path().iterdir())
+
+
+def test_results_are_kept_unless_forced(annelid: Command) -> None:
+    for folder, file, command in (
+        ("a", "load_frame.csv", ("experiment", "load-frame")),
+        ("b", "calibration.json", ("calibrate",)),
+    ):
+        Path(folder).mkdir()
+        Path(folder, file).write_text("mine")
+        assert "exists" in annelid(*command, "-o", folder, "--quiet").sentence()
+        assert Path(folder, file).read_text() == "mine"

@@ -1,0 +1,111 @@
+"""The robust controller on a body: what it reads, what it remembers, and that it walks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from annelid import load_config, open_run, simulate
+from annelid.analysis import rhythm_score
+from annelid.config import RobustSns, RunConfig
+from annelid.control.robust import RobustController
+from annelid.errors import ConfigError
+from annelid.nervous.robust import ROLES, neuron_names
+from annelid.protocols import Records, Sensation, Stateful, StridingController
+from annelid.simulation.assemble import build_controller, build_plant
+
+N, TIMESTEP_S, REST_M = 4, 0.001, 0.1
+
+
+def sensation(lengthening_m: np.ndarray, n_sensors: int = 6) -> Sensation:
+    rest = np.full((N, n_sensors), REST_M)
+    nothing = np.zeros(N)
+    return Sensation(0.0, rest + lengthening_m[:, np.newaxis], rest, nothing, nothing, np.zeros((N, 3)), np.zeros(3))
+
+
+def controller(n_muscles: int = N, full_stretch_m: float = 0.08) -> RobustController:
+    return RobustController(RobustSns(full_stretch_m=full_stretch_m), N, n_muscles, TIMESTEP_S)
+
+
+def planar(**changes: object) -> RunConfig:
+    return load_config("riddle2022-planar", {"controller": {"kind": "sns-robust"}, **changes})
+
+
+def test_it_has_the_capabilities() -> None:
+    made = controller()
+    assert isinstance(made, Records)
+    assert isinstance(made, Stateful)
+    assert isinstance(made, StridingController)
+
+
+def test_a_configuration_builds_it() -> None:
+    config = planar()
+    made = build_controller(config, build_plant(config))
+    assert isinstance(made, RobustController)
+
+
+def test_a_stride_is_its_steps_bit_for_bit() -> None:
+    felt = [sensation(np.linspace(-0.02, 0.05, N) * (1 + k)) for k in range(5)]
+    single, striding = controller(), controller()
+    for one in felt:
+        by_steps = [single.step(one) for _ in range(37)]
+        assert np.array_equal(by_steps[-1], striding.stride(one, 37))
+
+
+def test_it_continues_from_its_state_bit_for_bit() -> None:
+    first, second = controller(), controller()
+    first.stride(sensation(np.full(N, 0.03)), 500)
+    second.set_state(first.get_state())
+    later = sensation(np.array([0.0, 0.05, 0.01, 0.02]))
+    assert np.array_equal(first.stride(later, 300), second.stride(later, 300))
+    first.reset(1)
+    assert np.array_equal(first.stride(later, 300), controller().stride(later, 300))
+
+
+def test_the_stretch_neurons_follow_the_mean_lengthening_in_their_range() -> None:
+    made = controller(full_stretch_m=0.04)
+    made.stride(sensation(np.array([-0.02, 0.01, 0.04, 0.3])), 200)
+    assert made.read(frame=False)["stretch_activity"] == pytest.approx([0.0, 0.25, 1.0, 1.0], abs=1e-6)
+
+
+def test_what_it_names_it_reads() -> None:
+    made = controller()
+    named, values = made.recordable(), made.read(frame=False)
+    assert {signal.name: signal.shape for signal in named.signals} == {name: np.shape(v) for name, v in values.items()}
+    assert list(named.coords["neuron"]) == neuron_names(N)
+    gate = np.asarray(values["sodium_gate"])[:-1].reshape(N, len(ROLES))
+    assert np.isfinite(gate[:, :2]).all()
+    assert np.isnan(gate[:, 2:]).all()
+    assert made.read(frame=True) == {}
+
+
+def test_one_segment_is_contracted_at_the_start_and_half_rings_are_alike() -> None:
+    activation = controller(n_muscles=2 * N).stride(sensation(np.zeros(N)), 100).reshape(N, 2)
+    assert np.array_equal(activation[:, 0], activation[:, 1])
+    assert activation[0, 0] > 0.99
+    assert activation[1:].max() < 0.01
+
+
+@pytest.mark.parametrize("n", [3, 6])
+def test_it_walks_the_planar_worm(n: int, tmp_path: Path) -> None:
+    period_s = n * 0.875
+    simulate(planar(**{"body.n_segments": n, "duration_s": 2.6 * period_s}), tmp_path / "run", progress=False)
+    found = rhythm_score(open_run(tmp_path / "run"))
+    assert found.verdict == "ordered"
+    assert (found.direction, found.wave_fronts) == (1, 1)
+    assert found.period_s == pytest.approx(period_s, rel=0.1)
+
+
+def test_a_control_step_that_is_too_long_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"clock.control_timestep_s = 0.005 must be at most 0.00"):
+        RobustController(RobustSns(), 24, 24, 0.005)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [("turn_ms", 0), ("bifurcation_mV", 0.01), ("entrainment", 0.2), ("full_stretch_m", -1)]
+)
+def test_bad_fields_are_refused(field: str, value: float) -> None:
+    with pytest.raises(ConfigError, match=field):
+        planar(**{f"controller.{field}": value})

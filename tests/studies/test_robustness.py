@@ -1,0 +1,114 @@
+"""The robustness study: its sample, its verdicts, and its shares."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from annelid.analysis.score import RhythmScore
+from annelid.errors import ConfigError
+from annelid.studies import robustness as study
+from annelid.studies.robustness import CONTROLLERS, Judged, draw, judge, points, shares, wilson
+
+WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
+
+
+def test_the_committed_sample_is_the_one_that_was_drawn() -> None:
+    assert points() == tuple(draw())
+
+
+def test_the_sample_is_a_latin_hypercube() -> None:
+    """Spread quantities have one point a stratum; rounded ones as many points a value as its share of the range."""
+    sample = points()
+    n = len(sample)
+    assert n == 300
+    shares_of = {
+        "noise_m": [p.noise_m / 0.005 for p in sample],
+        "friction": [np.log(p.friction / 0.05) / np.log(30.0) for p in sample],
+        "young_modulus_Pa": [np.log(p.young_modulus_Pa / 0.3e9) / np.log(2.0 / 0.3) for p in sample],
+    }
+    for values in shares_of.values():
+        # Values are rounded when written, by less than a tenth of a stratum.
+        assert np.abs(np.sort(values) - (np.arange(n) + 0.5) / n).max() <= 0.6 / n
+    segments = np.array([p.n_segments for p in sample])
+    assert set(segments) == set(range(3, 25))
+    assert np.abs(np.bincount(segments)[3:] - n / 22).max() <= 1.0
+    assert {p.physics_timestep_ms for p in sample} == set(range(1, 11))
+    assert len({p.seed for p in sample}) == n
+
+
+def test_a_point_becomes_a_run_under_either_controller() -> None:
+    point = replace(points()[3], n_segments=5)
+    configs = [point.case(kind).config for kind in CONTROLLERS]
+    assert [config.controller.kind for config in configs] == list(CONTROLLERS)
+    for config in configs:
+        assert config.body.n_segments == 5
+        assert config.sensor.noise_m == point.noise_m
+        assert config.duration_s >= 2.5 * 5 * 0.875
+        assert config.seed == point.seed
+
+
+@pytest.mark.parametrize(
+    ("change", "walked", "in_time"),
+    [
+        ({}, True, True),
+        ({"period_s": 2.625 * 1.11}, True, False),
+        ({"period_s": 2.625 * 0.89}, True, False),
+        ({"direction": -1}, False, False),
+        ({"wave_fronts": 2}, False, False),
+        ({"verdict": "disordered"}, False, False),
+        ({"verdict": None}, False, False),
+    ],
+)
+def test_verdicts(change: dict[str, object], walked: bool, in_time: bool) -> None:
+    point = replace(points()[0], n_segments=3)
+    found = judge(0, point, "sns", replace(WAVE, **change))  # type: ignore[arg-type]
+    assert (found.walked, found.in_time) == (walked, in_time)
+
+
+def test_a_run_that_a_guard_stopped_did_not_walk() -> None:
+    found = judge(0, replace(points()[0], n_segments=3), "sns", WAVE, "too much energy")
+    assert (found.walked, found.in_time, found.reason) == (False, False, "too much energy")
+
+
+def test_shares_count_by_controller() -> None:
+    judged = [Judged(i, "sns", "", None, i < 3, i < 2) for i in range(4)]
+    judged += [Judged(0, "sns-robust", "", None, True, True)]
+    found = shares(judged)
+    assert (found["sns"]["points"], found["sns"]["walked"], found["sns"]["in_time"]) == (4, 3, 2)
+    assert found["sns"]["share"] == 0.5
+    assert found["sns-robust"]["share"] == 1.0
+
+
+@pytest.mark.parametrize(("successes", "n"), [(0, 10), (7, 10), (10, 10), (285, 300)])
+def test_the_interval_holds_the_shares_that_a_score_test_accepts(successes: int, n: int) -> None:
+    low, high = wilson(successes, n)
+    for share in (low, high):
+        if 1e-9 < share < 1.0 - 1e-9:
+            assert abs(successes / n - share) == pytest.approx(1.959964 * np.sqrt(share * (1.0 - share) / n))
+    assert low >= 0.0
+    assert high <= 1.0
+
+
+@pytest.mark.parametrize("n_points", [0, 301])
+def test_points_beyond_the_sample_are_refused(n_points: int, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"points must be in 1 \.\. 300"):
+        study.robustness(tmp_path, n_points)
+
+
+def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    short = (replace(points()[0], n_segments=3, physics_timestep_ms=20, noise_m=0.0),)
+    monkeypatch.setattr(study, "points", lambda: short)
+    monkeypatch.setattr(study, "CYCLES", 0.05)
+    first = study.robustness(tmp_path, 1, jobs=1)
+    runs = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")}
+    assert study.robustness(tmp_path, 1, jobs=1) == first
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == runs
+    assert len(runs) == 2
+    content = json.loads((tmp_path / "robustness.json").read_text())
+    assert [one["controller"] for one in content["judged"]] == list(CONTROLLERS)
+    assert content["shares"]["sns"]["in_time"] == 0

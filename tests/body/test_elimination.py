@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from itertools import pairwise
 
 import mujoco
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.body import build_spec, compile_spec
+from annelid.body import assemble, build_spec, compile_spec
 from annelid.body.elimination import minimum_degree, nested_dissection, order_elimination
 from annelid.config import load_config
 from annelid.morphology import Array, Indices
 
+SHORT = {"body.mesh.elements_per_side": 1}
 LONG = {"body.mesh.n_segments": 12, "body.mesh.elements_per_side": 3}
 
 
@@ -101,3 +104,15 @@ def test_short_worms_and_chains_keep_the_engines_order() -> None:
         before = model.efmC_perm.copy()
         order_elimination(model)
         assert np.array_equal(model.efmC_perm, before)
+
+
+def test_a_worm_beyond_the_engines_limit_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = build_spec(load_config("riddle2023-rods", SHORT))
+    moving = sum(len(body.joints) > 0 for body in spec.worldbody.bodies)
+    monkeypatch.setattr(assemble, "MOST_ORDERED_BODIES", moving)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compile_spec(spec)
+    monkeypatch.setattr(assemble, "MOST_ORDERED_BODIES", moving - 1)
+    with pytest.warns(UserWarning, match=f"{moving} moving bodies"):
+        compile_spec(spec)

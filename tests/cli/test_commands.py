@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from outcome import Command
 
-from annelid.config import field_paths, preset_names
+from annelid.config import field_paths, load_config, preset_names
 from annelid.simulation.runfile import open_run
 
 
@@ -109,6 +109,18 @@ def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> Non
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 3)
     assert np.all(np.isfinite(data.qpos))
+
+
+def test_a_level_of_fidelity_resolves_the_worm_as_asked(annelid: Command) -> None:
+    run = ("run", "--fidelity", "accurate", "--duration", "0.02", "--no-video", "--out", "accurate")
+    done = annelid(*run)
+    assert done.exit_code == 0, done.err
+    config = open_run(Path("accurate")).config
+    assert config.name == "riddle2023-rods"
+    assert config == load_config("riddle2023-rods", {"duration_s": 0.02}, fidelity="accurate")
+    done = annelid("run", "--fidelity", "paper", "--duration", "0.01", "--no-video", "--out", "paper")
+    assert done.exit_code == 0, done.err
+    assert open_run(Path("paper")).config == load_config("riddle2023", {"duration_s": 0.01})
 
 
 def test_presets_lists_prints_and_explains(annelid: Command) -> None:

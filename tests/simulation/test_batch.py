@@ -172,8 +172,11 @@ def test_a_full_disk_ends_one_worm(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def interrupt_at(time_s: float) -> Any:
+    sent: list[float] = []
+
     def interrupt(simulated_s: float, wall_s: float) -> None:
-        if simulated_s >= time_s:
+        if simulated_s >= time_s and not sent:
+            sent.append(simulated_s)
             os.kill(os.getpid(), signal.SIGINT)
 
     return interrupt

@@ -44,7 +44,7 @@ def test_a_killed_run_keeps_all_but_its_last_second_and_can_be_continued(tmp_pat
     live = open_run(tmp_path / "run")
     assert live.status == "running_or_killed"
     assert live.data.sizes["time"] > 50
-    time.sleep(0.3)
+    time.sleep(0.7)
     child.send_signal(signal.SIGKILL)
     killed = time.monotonic()
     child.communicate()

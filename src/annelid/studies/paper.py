@@ -291,7 +291,8 @@ def _summary(variants: Mapping[str, Outcome], claims: Sequence[Claim]) -> list[s
     paragraphs.append(
         f"Three worms stand side by side in what follows: the paper's chain (preset {CHAIN}, in the examinations at "
         f"steps of 2 ms), whose pins give; sprung rods ({FAST}), the same robot in seconds with pins of the same "
-        f"stiffness; and tight rods ({RODS}), whose pins hold."
+        f"stiffness; and tight rods ({RODS}, with the paper's three elements a side and steps of 5 ms), whose pins "
+        "hold."
     )
     return paragraphs
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.config import Program, RunConfig, load_config, parse_assignments
+from annelid.config import Program, RunConfig, WormBody, load_config, parse_assignments
 from annelid.studies.case import CHAIN, PLANAR, RODS, Case, chain, fast, one_after_the_other, rods
 
 
@@ -97,7 +97,10 @@ def test_the_chain_is_the_papers_at_twice_the_step() -> None:
 
 
 def test_the_rods_have_the_papers_mesh() -> None:
-    assert rods().config.body.mesh.elements_per_side == load_config(CHAIN).body.mesh.elements_per_side
+    ours, papers = rods().config.body, load_config(CHAIN).body
+    assert isinstance(ours, WormBody)
+    assert isinstance(papers, WormBody)
+    assert ours.mesh.elements_per_side == papers.mesh.elements_per_side
 
 
 def test_costs_order_the_runs_by_their_work() -> None:

@@ -17,7 +17,7 @@ from annelid.errors import SimulationStopped
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("run", "riddle2032"), "did you mean 'riddle2023'"),
+        (("run", "ridle2023"), "did you mean 'riddle2023'"),
         (("run", "--set", "arena.fricton=1"), "did you mean"),
         (("run", "--set", "arena.friction"), "not of the form field=value"),
         (("run", "--set", "body.mesh.n_helices=7"), "must be even"),
@@ -36,7 +36,7 @@ from annelid.errors import SimulationStopped
         (("show", "nothere"), "there is no run file nothere"),
         (("plot", "nothere"), "there is no run file nothere"),
         (("render", "nothere", "--time", "1"), "there is no run file nothere"),
-        (("presets", "riddle2032"), "did you mean 'riddle2023'"),
+        (("presets", "ridle2023"), "did you mean 'riddle2023'"),
     ],
 )
 def test_bad_input_ends_in_one_sentence_and_leaves_nothing(

@@ -101,7 +101,7 @@ def test_figure_1_needs_planar_bodies() -> None:
 def rings() -> Rings:
     body = load_config("riddle2023").body
     assert isinstance(body, WormBody)
-    return body.rings
+    return body.muscles
 
 
 @pytest.mark.parametrize("activation", [0.0, 0.4, 1.0])

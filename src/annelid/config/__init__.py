@@ -39,6 +39,7 @@ __all__ = [
     "Fidelity",
     "Guard",
     "HeteroclinicChannel",
+    "Joints",
     "Mesh",
     "PhaseChain",
     "Pins",

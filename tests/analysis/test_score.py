@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from synthetic import wave_activation, wave_data
 
-from annelid.analysis import RhythmScore, rhythm_score
+from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.rhythm import contractions, rhythm
 from annelid.analysis.score import score
 from annelid.config import load_config
@@ -372,3 +373,30 @@ def test_sensors_that_never_switch_off_silence_the_worm(tmp_path: Path) -> None:
     found = rhythm_score(simulate(config, tmp_path, progress=False))
     assert (found.verdict, found.order) == ("silent", (1, 2))
     assert found.reason == "no contraction begins after 0.74 s"
+
+
+def lengthened(peaks_m: list[float]) -> RhythmScore:
+    """The score of segments that lengthen up to these lengths in an even wave 1-2-3, and swing a little between."""
+    time = np.arange(0.0, 8.0, 0.01)
+    onsets = [np.arange(0.1 + place / 3 * 2.625, 8.0, 2.625) for place in range(3)]
+    swing = 0.2 * np.sin(2 * np.pi * 4.0 * time)
+    stretch = np.stack([p * (pulses(time, o, 0.8) + swing) for p, o in zip(peaks_m, onsets, strict=True)], axis=1)
+    data = wave_data(duration_s=float(time[-1]), interval_s=0.01)
+    data = data.assign(stretch_length=data["stretch_rest_length"] + xr.DataArray(stretch, dims=("time", "segment")))
+    return lengthening_score(Run(Path("run.nc"), data, load_config("riddle2023-rods"), "complete", ""))
+
+
+def test_lengthening_is_scored_whatever_its_size() -> None:
+    found = lengthened([0.08, 0.01, 0.03])
+    assert (found.verdict, found.direction, found.wave_fronts) == ("ordered", 1, 1)
+    assert found.period_s == pytest.approx(2.625, rel=0.02)
+
+
+def test_a_segment_that_hardly_lengthens_has_no_part_in_the_wave() -> None:
+    assert lengthened([0.08, 0.002, 0.08]).verdict != "ordered"
+
+
+def test_a_run_without_stretch_sensors_has_no_score_of_lengthening() -> None:
+    data = wave_data().drop_vars("stretch_length")
+    with pytest.raises(ValueError, match="holds no stretch_length"):
+        lengthening_score(Run(Path("run.nc"), data, load_config("riddle2023-rods"), "complete", ""))

@@ -70,6 +70,31 @@ def test_the_stretch_neurons_follow_the_mean_lengthening_in_their_range() -> Non
     assert made.read(frame=False)["stretch_activity"] == pytest.approx([0.0, 0.25, 1.0, 1.0], abs=1e-6)
 
 
+def test_it_starts_as_it_is_told() -> None:
+    def start(name: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        made = RobustController(RobustSns(start=name), N, N, TIMESTEP_S)  # type: ignore[arg-type]
+        made.reset(seed)
+        state = made.get_state()
+        return np.asarray(state["potential"]), np.asarray(state["gate"])
+
+    potential, gate = start("silent", 1)
+    assert not potential.any()
+    assert gate == pytest.approx(1.0 / 1.5)  # 1 / (1 + 0.5 exp(S 0))
+    drawn, again, other = start("random", 1), start("random", 1), start("random", 2)
+    assert all(np.array_equal(a, b) for a, b in zip(drawn, again, strict=True))
+    assert not np.array_equal(drawn[0], other[0])
+    assert np.ptp(drawn[0]) > 50.0
+    assert drawn[0].min() >= -40.0
+    assert drawn[0].max() <= 60.0
+
+
+@pytest.mark.parametrize("start", ["silent", "random"])
+def test_it_walks_from_any_start_after_two_turns(start: str, tmp_path: Path) -> None:
+    run = simulate(planar(controller={"kind": "sns-robust", "start": start}, duration_s=8.5), tmp_path, progress=False)
+    score = rhythm_score(open_run(run.path), 1.75)
+    assert (score.verdict, score.direction, score.wave_fronts) == ("ordered", 1, 1)
+
+
 def test_what_it_names_it_reads() -> None:
     made = controller()
     named, values = made.recordable(), made.read(frame=False)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from annelid.analysis.score import RhythmScore
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, RunFileError
 from annelid.studies import robustness as study
-from annelid.studies.robustness import CONTROLLERS, Judged, draw, judge, points, shares, wilson
+from annelid.studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, wilson
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
 
@@ -48,8 +48,13 @@ def test_a_point_becomes_a_run_under_either_controller() -> None:
     for config in configs:
         assert config.body.n_segments == 5
         assert config.sensor.noise_m == point.noise_m
-        assert config.duration_s >= 2.5 * 5 * 0.875
+        assert config.duration_s >= 2 * 0.875 + 2.2 * 5 * 0.875
         assert config.seed == point.seed
+
+
+def test_the_robust_network_starts_in_every_way_equally_often() -> None:
+    starts = [point.case("sns-robust").config.controller.start for point in points()]  # type: ignore[union-attr]
+    assert {start: starts.count(start) for start in STARTS} == dict.fromkeys(STARTS, 100)
 
 
 @pytest.mark.parametrize(
@@ -66,20 +71,23 @@ def test_a_point_becomes_a_run_under_either_controller() -> None:
 )
 def test_verdicts(change: dict[str, object], walked: bool, in_time: bool) -> None:
     point = replace(points()[0], n_segments=3)
-    found = judge(0, point, "sns", replace(WAVE, **change))  # type: ignore[arg-type]
-    assert (found.walked, found.in_time) == (walked, in_time)
+    changed = replace(WAVE, **change)  # type: ignore[arg-type]
+    found = judge(0, point, "sns", changed, WAVE)
+    assert (found.walked, found.in_time, found.lengthened) == (walked, in_time, True)
+    assert judge(0, point, "sns", WAVE, changed).lengthened == walked
 
 
 def test_a_run_that_a_guard_stopped_did_not_walk() -> None:
-    found = judge(0, replace(points()[0], n_segments=3), "sns", WAVE, "too much energy")
-    assert (found.walked, found.in_time, found.reason) == (False, False, "too much energy")
+    found = judge(0, replace(points()[0], n_segments=3), "sns", WAVE, WAVE, "too much energy")
+    assert (found.walked, found.in_time, found.lengthened) == (False, False, False)
+    assert found.reason == "too much energy"
 
 
 def test_shares_count_by_controller() -> None:
-    judged = [Judged(i, "sns", "", None, i < 3, i < 2) for i in range(4)]
-    judged += [Judged(0, "sns-robust", "", None, True, True)]
+    judged = [Judged(i, "sns", 3, "", None, i < 3, i < 2, i != 1, "") for i in range(4)]
+    judged += [Judged(0, "sns-robust", 3, "", None, True, True, True, "")]
     found = shares(judged)
-    assert (found["sns"]["points"], found["sns"]["walked"], found["sns"]["in_time"]) == (4, 3, 2)
+    assert [found["sns"][name] for name in ("points", "walked", "in_time", "lengthened")] == [4, 3, 2, 1]
     assert found["sns"]["share"] == 0.5
     assert found["sns-robust"]["share"] == 1.0
 
@@ -100,15 +108,49 @@ def test_points_beyond_the_sample_are_refused(n_points: int, tmp_path: Path) -> 
         study.robustness(tmp_path, n_points)
 
 
-def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    short = (replace(points()[0], n_segments=3, physics_timestep_ms=20, noise_m=0.0),)
-    monkeypatch.setattr(study, "points", lambda: short)
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sample of one worm that stands for a moment."""
+    sample = (replace(points()[0], n_segments=3, physics_timestep_ms=20, noise_m=0.0),)
+    monkeypatch.setattr(study, "points", lambda: sample)
     monkeypatch.setattr(study, "CYCLES", 0.05)
-    first = study.robustness(tmp_path, 1, jobs=1)
+
+
+@pytest.mark.usefixtures("short")
+def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path) -> None:
+    ours = study.robustness(tmp_path, 1, controllers=["sns-robust"], jobs=1)
+    assert [one.controller for one in ours] == ["sns-robust"]
+    both = study.robustness(tmp_path, 1, jobs=1)
+    assert both[1:] == ours
     runs = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")}
-    assert study.robustness(tmp_path, 1, jobs=1) == first
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == runs
     assert len(runs) == 2
+    assert study.robustness(tmp_path, 1, jobs=1) == both
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == runs
     content = json.loads((tmp_path / "robustness.json").read_text())
     assert [one["controller"] for one in content["judged"]] == list(CONTROLLERS)
     assert content["shares"]["sns"]["in_time"] == 0
+
+
+@pytest.mark.usefixtures("short")
+def test_points_that_other_code_ran_are_kept_only_when_asked(tmp_path: Path) -> None:
+    study.robustness(tmp_path, 1, controllers=["sns"], jobs=1)
+    path = tmp_path / "robustness.json"
+    content = json.loads(path.read_text())
+    content["judged"][0] |= {"code": "older", "reason": "as it was"}
+    path.write_text(json.dumps(content))
+    [kept] = study.robustness(tmp_path, 1, controllers=["sns"], keep=True, jobs=1)
+    assert kept.reason == "as it was"
+    path.write_text(json.dumps(content))
+    [again] = study.robustness(tmp_path, 1, controllers=["sns"], jobs=1)
+    assert again.reason != "as it was"
+
+
+def test_damaged_results_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "robustness.json").write_text('{"judged": [{"point": 1}]}')
+    with pytest.raises(RunFileError, match=r"robustness\.json is not what"):
+        study.robustness(tmp_path, 1)
+
+
+def test_an_unknown_controller_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="unknown controller 'shc'"):
+        study.robustness(tmp_path, 1, controllers=["shc"])

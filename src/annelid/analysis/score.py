@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 SHORTEST_S = 0.02
 """Contractions, and interruptions of one, that are shorter do not count, s."""
+LEAST_LENGTHENING_M = 0.0025
+"""Segments that lengthen by less than twice this are not moved, m."""
 DESIGN_INTERVAL_S = 0.875
 """Interval of successive onsets by design at a gate time constant of 300 ms, whatever N (Riddle et al. 2022), s."""
 SILENCE = 2.0
@@ -97,6 +99,32 @@ def rhythm_score(run: Run, after_s: float = 0.0) -> RhythmScore:
     judged = times >= after_s
     activation = segment_activation(run.data["activation"].values, run.config.body.n_segments)
     return score(times[judged], activation[judged], DESIGN_INTERVAL_S * gate_ms / _DESIGN_GATE_MS)
+
+
+def lengthening_score(run: Run, after_s: float = 0.0) -> RhythmScore:
+    """Scores the rhythm in which a worm's segments lengthen, as `score` does; the muscles' word is not taken.
+
+    A segment counts as contracted while its mean lengthening is at least half of its own largest, and not at all if
+    that is below 5 mm.
+
+    Args:
+        run: A run, opened with `annelid.open_run`.
+        after_s: Judge only what comes after this simulated time, as if the run continued another, s.
+
+    Returns:
+        The score.
+
+    Raises:
+        ValueError: The run file holds no stretch sensors.
+    """
+    if "stretch_length" not in run.data:
+        raise ValueError(f"{run.path} holds no stretch_length")
+    times = run.data["time"].values
+    judged = times >= after_s
+    lengthening = (run.data["stretch_length"] - run.data["stretch_rest_length"]).mean("sensor")
+    lengthening = lengthening.transpose("time", "segment").values[judged]
+    largest = np.maximum(lengthening.max(axis=0, initial=0.0), 2.0 * LEAST_LENGTHENING_M)
+    return score(times[judged], lengthening / largest)
 
 
 def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_INTERVAL_S) -> RhythmScore:

@@ -19,6 +19,13 @@ def robustness_command(
     segments: Annotated[
         int | None, typer.Option(min=3, help="Give every worm this many segments.  [default: as drawn, 3 to 24]")
     ] = None,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option("--controller", metavar="KIND", help="Only this one; may be repeated.  [default: both]"),
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
     ] = None,
@@ -27,25 +34,37 @@ def robustness_command(
     """Compare how often controllers walk over a designed sample of worms.
 
     The sample varies sensor noise, friction, physics step, number of segments and stiffness. Every point is walked
-    by the paper's controller and by sns-robust. Writes robustness.json and robustness.md after every point; runs
-    are kept, so that a second call goes on where the first was stopped. All 300 points take days of one core.
+    by the paper's controller and by sns-robust. Writes robustness.json and robustness.md after every few points, and
+    keeps runs, so that a second call goes on where the first was stopped. All 300 points take about 20 hours of one
+    core for each controller.
 
     \b
     annelid robustness --points 10 -o draft     the first ten points
     annelid robustness --segments 3             short worms only
+    annelid robustness --controller sns-robust  only ours
     annelid robustness --points 300             all
     """
     from annelid.studies.progress import study_progress
-    from annelid.studies.robustness import robustness, shares, shares_table
+    from annelid.studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
     if output.exists() and not output.is_dir():
         raise RunFileError(f"{output} is a file: name a folder with -o")
     try:
         with study_progress(quiet=quiet) as progress:
-            judged = robustness(output, points, n_segments=segments, jobs=jobs, progress=progress)
+            judged = robustness(
+                output,
+                points,
+                controllers=tuple(controller or CONTROLLERS),
+                n_segments=segments,
+                keep=keep,
+                jobs=jobs,
+                progress=progress,
+            )
     except KeyboardInterrupt:
         words = ["annelid", "robustness", "-o", str(output), "--points", str(points)]
         words += ["--segments", str(segments)] if segments else []
+        words += [word for kind in controller or () for word in ("--controller", kind)]
+        words += ["--keep"] if keep else []
         again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
         complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
         raise typer.Exit(EXIT_INTERRUPTED) from None

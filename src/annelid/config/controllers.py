@@ -243,6 +243,10 @@ class RobustSns(Section):
     full_stretch_m: Positive = Field(default=0.08, description="mean lengthening that drives a stretch neuron to R")
     activation_slope_per_mV: Positive = Field(default=0.35, description="slope of the sigmoid, as in the paper")
     scheme: Literal["euler", "heun"] = Field(default="euler", description="forward Euler, or second order")
+    start: Literal["design", "silent", "random"] = Field(
+        default="design",
+        description="state of the network at the start: segment 1 contracted, all neurons at rest, or drawn by seed",
+    )
 
 
 ControllerSection = Annotated[

@@ -57,8 +57,27 @@ class RobustController:
         self.reset(0)
 
     def reset(self, seed: int) -> None:
-        """Returns to the initial state: segment 1 contracted, the others held; nothing here is random."""
+        """Returns to the state that ``start`` names.
+
+        It is segment 1 contracted and the others held (``"design"``); all potentials at rest, gates steady there
+        (``"silent"``); or potentials drawn evenly from the inhibitory reversal to three ranges and gates from 0 to 1
+        (``"random"``).
+
+        Args:
+            seed: Of what is drawn.
+        """
         self._state = self._stepper.initial_state()
+        potential, gate = self._state.potential, self._state.gate
+        if self._config.start == "silent":
+            potential[...] = 0.0
+            [inactivation] = self._parameters.sodium_channel.slow_gates
+            gate[...] = inactivation.steady(0.0)
+        elif self._config.start == "random":
+            rng = np.random.default_rng(seed)
+            potential[...] = rng.uniform(
+                self._config.inhibitory_reversal_mV, 3.0 * self._config.range_mV, potential.shape
+            )
+            gate[...] = rng.random(gate.shape)
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step.

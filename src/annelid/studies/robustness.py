@@ -3,7 +3,8 @@
 The sample is a Latin hypercube of 300 points over sensor noise, friction, physics step, number of segments, stiffness
 and seeds. It was drawn once, by `draw`, and lies in ``robustness.csv``. The worms are the tight rods. A point is
 *walked* if the rhythm is ordered, in one wave from front to rear, and *in time* if its period is also within 10 % of
-design.
+design. The robust controller's network starts from its design, from silence, and from random states in turn; the
+paper's from its own start, its best case. The first two turns are not judged.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from importlib.resources import files
 from math import sqrt
 from pathlib import Path
@@ -20,18 +22,26 @@ from typing import Any
 
 import numpy as np
 
-from annelid.analysis.score import DESIGN_INTERVAL_S, RhythmScore
-from annelid.errors import ConfigError
+from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
+from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.studies.case import RODS, Case
 from annelid.studies.markdown import table
-from annelid.studies.store import Store, case_key
+from annelid.studies.store import Store, case_key, physics_fingerprint
 from annelid.view.output import whole_file
 
 CONTROLLERS = ("sns", "sns-robust")
 """The paper's and ours, by their kinds."""
 TABLE = "robustness.csv"
-CYCLES = 2.6
-"""Length of a run in design periods: the score needs two cycles of every segment."""
+RESULTS = "robustness.json"
+SETTLING_S = 2.0 * DESIGN_INTERVAL_S
+"""Not judged at the start of a run: within two turns the robust network has found its rhythm from any state, s."""
+CYCLES = 2.3
+"""How long a run is judged, in design periods: the score needs two cycles of every segment."""
+STARTS = ("design", "silent", "random")
+"""How the robust network starts, in turn."""
+TOGETHER = 8
+"""Points computed as one lot for each process, so that no process waits long for the lot's last run."""
 PERIOD_TOLERANCE = 0.1
 SHEAR_OVER_YOUNG = 2.0 / 3.0
 """The paper's ratio of the strands' shear and Young's moduli."""
@@ -50,7 +60,7 @@ class Point:
         physics_timestep_ms: Step of the body, whole ms.
         n_segments: Number of segments.
         young_modulus_Pa: Of the strands, Pa.
-        seed: Of the noise.
+        seed: Of the noise, and of the network's start.
     """
 
     noise_m: float
@@ -65,6 +75,11 @@ class Point:
         """The period by design, s."""
         return self.n_segments * DESIGN_INTERVAL_S
 
+    @property
+    def start(self) -> str:
+        """How the robust network starts."""
+        return STARTS[self.seed % len(STARTS)]
+
     def case(self, controller: str) -> Case:
         """Returns the run of this point under a controller, given by its kind."""
         return Case(
@@ -77,8 +92,8 @@ class Point:
                 "body.strands.young_modulus_Pa": self.young_modulus_Pa,
                 "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG * self.young_modulus_Pa,
                 "seed": self.seed,
-                "duration_s": round(CYCLES * self.design_period_s, 1),
-                **({} if controller == "sns" else {"controller": {"kind": controller}}),
+                "duration_s": round(SETTLING_S + CYCLES * self.design_period_s, 1),
+                **({} if controller == "sns" else {"controller": {"kind": controller, "start": self.start}}),
             },
         )
 
@@ -90,18 +105,24 @@ class Judged:
     Attributes:
         point: Number of the point, from 0 in the order drawn.
         controller: Kind of the controller.
+        n_segments: Segments of the worm that was run.
         reason: What the score says, or why the run ended before its time.
         period_s: Mean period, s; None if no segment repeats.
         walked: Ordered, in one wave from front to rear, to the end.
         in_time: Walked, with a period within 10 % of design.
+        lengthened: The segments lengthened in one wave from front to rear as well.
+        code: Mark of the code and the engine that ran it.
     """
 
     point: int
     controller: str
+    n_segments: int
     reason: str
     period_s: float | None
     walked: bool
     in_time: bool
+    lengthened: bool
+    code: str
 
 
 def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
@@ -157,77 +178,133 @@ def points() -> tuple[Point, ...]:
     )
 
 
-def judge(number: int, point: Point, controller: str, rhythm: RhythmScore, message: str = "") -> Judged:
-    """Judges the score of one run.
+def judge(
+    number: int, point: Point, controller: str, rhythm: RhythmScore, lengthening: RhythmScore, message: str = ""
+) -> Judged:
+    """Judges the scores of one run.
 
     Args:
         number: Number of the point.
         point: The point.
         controller: Kind of the controller.
-        rhythm: The score of its run.
+        rhythm: The score of its activation.
+        lengthening: The score of its segments' lengthening.
         message: Why the run ended before its time; empty if it did not.
     """
-    walked = not message and rhythm.verdict == "ordered" and rhythm.direction == 1 and rhythm.wave_fronts == 1
+    walked = not message and _is_one_wave(rhythm)
     period = rhythm.period_s
-    in_time = walked and period is not None and abs(period / point.design_period_s - 1.0) <= PERIOD_TOLERANCE
-    return Judged(number, controller, message or rhythm.reason, period, walked, in_time)
+    return Judged(
+        point=number,
+        controller=controller,
+        n_segments=point.n_segments,
+        reason=message or rhythm.reason,
+        period_s=period,
+        walked=walked,
+        in_time=walked and period is not None and abs(period / point.design_period_s - 1.0) <= PERIOD_TOLERANCE,
+        lengthened=not message and _is_one_wave(lengthening),
+        code=physics_fingerprint(),
+    )
 
 
 def robustness(
     folder: Path,
     n_points: int,
     *,
+    controllers: Sequence[str] = CONTROLLERS,
     n_segments: int | None = None,
+    keep: bool = False,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> list[Judged]:
-    """Walks the first points of the sample under every controller, as far as they are not in the folder.
+    """Walks the first points of the sample under each controller, as far as the folder does not tell how that goes.
 
     Args:
-        folder: Folder of the results; runs go to ``runs`` within it. Written after every point, so that a stopped study
-            shows what it has: ``robustness.json`` and ``robustness.md``.
+        folder: Folder of the results; runs go to ``runs`` within it. Written after every few points, so that a stopped
+            study shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
         n_points: How many points, in the order drawn.
+        controllers: Kinds of controllers, of `CONTROLLERS`.
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
             that costs less; None for the sample as it is.
+        keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
         jobs: Processes; default: one a core.
-        progress: Called before the first and after every point.
+        progress: Called before the first and after every run.
 
     Returns:
-        The judgements, point by point.
+        The judgements that the folder holds now, by controller and point.
 
     Raises:
-        ConfigError: No points, or more than the sample has.
+        ConfigError: No points, more than the sample has, or an unknown controller.
+        RunFileError: ``robustness.json`` is damaged.
         AnnelidError: A run cannot be built or written.
     """
     sample = points()
     if not 1 <= n_points <= len(sample):
         raise ConfigError(f"points must be in 1 .. {len(sample)}, the size of the sample, not {n_points}")
-    store, chosen = Store(folder / "runs"), sample[:n_points]
-    if n_segments is not None:
-        chosen = tuple(replace(point, n_segments=n_segments) for point in chosen)
-    cases = {(i, controller): point.case(controller) for i, point in enumerate(chosen) for controller in CONTROLLERS}
-    costs = [sum(cases[i, controller].cost_s for controller in CONTROLLERS) for i in range(n_points)]
-    # As many points together as keep all processes busy.
-    together = max(1, (jobs or os.cpu_count() or 1) // len(CONTROLLERS))
-    judged: list[Judged] = []
-    for first in range(0, n_points, together):
-        if progress is not None:
-            progress("robustness", first, n_points, sum(costs[:first]) / sum(costs))
-        batch = {key: case for key, case in cases.items() if first <= key[0] < first + together}
-        found = store.compute(batch.values(), jobs=jobs)
-        for (i, controller), case in batch.items():
-            outcome = found[case_key(case)]
-            judged.append(judge(i, chosen[i], controller, outcome.rhythm, outcome.message))
-        _write(judged, folder)
-    return judged
+    for controller in controllers:
+        if controller not in CONTROLLERS:
+            raise ConfigError(f"unknown controller {controller!r}: {suggest(controller, CONTROLLERS)}")
+    chosen = sample if n_segments is None else tuple(replace(point, n_segments=n_segments) for point in sample)
+    judged = {
+        (one.controller, one.point): one
+        for one in read_judged(folder)
+        if one.n_segments == chosen[one.point].n_segments and (keep or one.code == physics_fingerprint())
+    }
+    missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
+    cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
+    total_s = sum(case.cost_s for case in cases.values())
+    store, before_s = Store(folder / "runs"), 0.0
+    lot = TOGETHER * (jobs or os.cpu_count() or 1)
+    for first in range(0, len(missing), lot):
+        keys = missing[first : first + lot]
+        lot_s = sum(cases[key].cost_s for key in keys)
+
+        share_of = partial(_report, progress, first, len(missing), before_s / total_s, lot_s / total_s)
+        found = store.compute([cases[key] for key in keys], jobs=jobs, progress=share_of)
+        before_s += lot_s
+        for kind, i in keys:
+            run = store.run(cases[kind, i])
+            scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+            judged[kind, i] = judge(i, chosen[i], kind, *scores, found[case_key(cases[kind, i])].message)
+        _write(_sorted(judged), folder)
+    return _sorted(judged)
+
+
+def _report(
+    progress: Progress | None,
+    before: int,
+    total: int,
+    share_before: float,
+    share_of_lot: float,
+    done: int,
+    _: int,
+    share: float,
+) -> None:
+    """Tells how far the study has come, from how far a lot of its runs has."""
+    if progress is not None:
+        progress("robustness", before + done, total, share_before + share * share_of_lot)
+
+
+def read_judged(folder: Path) -> list[Judged]:
+    """Reads the judgements that a folder holds; none if it has no ``robustness.json``.
+
+    Raises:
+        RunFileError: The file is damaged.
+    """
+    path = folder / RESULTS
+    if not path.exists():
+        return []
+    try:
+        return [Judged(**one) for one in json.loads(path.read_text(encoding="utf-8"))["judged"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise RunFileError(f"{path} is not what this version of annelid writes; move it away") from error
 
 
 def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
     """Counts by controller.
 
     Returns:
-        For every controller the number of points, of those walked and of those in time, and the share in time with its
-        95 % interval after Wilson.
+        For every controller the number of points, of those walked, in time, and in time with their segments lengthening
+        in the same order, and the share in time with its 95 % interval after Wilson.
     """
     found: dict[str, dict[str, Any]] = {}
     for controller in dict.fromkeys(one.controller for one in judged):
@@ -235,7 +312,14 @@ def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
         n, good = len(of_it), sum(one.in_time for one in of_it)
         low, high = wilson(good, n)
         walked = sum(one.walked for one in of_it)
-        found[controller] = {"points": n, "walked": walked, "in_time": good, "share": good / n, "interval": [low, high]}
+        found[controller] = {
+            "points": n,
+            "walked": walked,
+            "in_time": good,
+            "lengthened": sum(one.in_time and one.lengthened for one in of_it),
+            "share": good / n,
+            "interval": [low, high],
+        }
     return found
 
 
@@ -255,18 +339,28 @@ def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
             str(of["points"]),
             str(of["walked"]),
             str(of["in_time"]),
+            str(of["lengthened"]),
             f"{100 * of['share']:.0f} ({100 * of['interval'][0]:.0f} .. {100 * of['interval'][1]:.0f})",
         ]
         for controller, of in found.items()
     ]
-    return table(["controller", "points", "walked 1-2-..-N", "and within 10 % of the period", "share (%)"], rows)
+    head = ["controller", "points", "walked 1-2-..-N", "in time: within 10 % of the period", "and so lengthened"]
+    return table([*head, "share in time (%)"], rows)
+
+
+def _is_one_wave(found: RhythmScore) -> bool:
+    return found.verdict == "ordered" and found.direction == 1 and found.wave_fronts == 1
+
+
+def _sorted(judged: Mapping[tuple[str, int], Judged]) -> list[Judged]:
+    return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
 
 
 def _write(judged: Sequence[Judged], folder: Path) -> None:
     found = shares(judged)
     content = {"shares": found, "judged": [asdict(one) for one in judged]}
     folder.mkdir(parents=True, exist_ok=True)
-    texts = {"robustness.json": json.dumps(content, indent=1), "robustness.md": shares_table(found)}
+    texts = {RESULTS: json.dumps(content, indent=1), "robustness.md": shares_table(found)}
     for name, text in texts.items():
         with whole_file(folder / name) as draft:
             draft.write_text(text + "\n", encoding="utf-8")

@@ -114,10 +114,6 @@ ROBOTS = {
     "body.mesh.n_helices": 12,
     "body.mesh.radius_m": 0.16,
     "body.strands.radius_m": 0.00299,
-    "body.strands.young_modulus_Pa": 2.0e9,
-    "body.strands.shear_modulus_Pa": 1.33e9,
-    "body.springs.stiffness_N_per_m": 24.5,
-    "body.springs.rest_length_m": 0.065,
     "body.springs.sensors": "sides",
     "body.rings.kind": "servo",
     "body.rings.layout": "halves",
@@ -125,6 +121,31 @@ ROBOTS = {
     "body.rings.stiffness_N_per_m": 1000.0,
     "body.rings.damping_Ns_per_m": 10.0,
 }
+
+
+OWN_SPRINGS_AND_RODS = {
+    "riddle2025": {
+        "body.strands.young_modulus_Pa": 2.0e9,
+        "body.strands.shear_modulus_Pa": 1.33e9,
+        "body.springs.stiffness_N_per_m": 24.5,
+        "body.springs.rest_length_m": 0.065,
+    },
+    "wang": {"body.springs.stiffness_N_per_m": 19.9, "body.springs.rest_length_m": None},
+}
+
+
+@pytest.mark.parametrize("preset", OWN_SPRINGS_AND_RODS)
+def test_the_robots_have_their_own_springs(preset: str) -> None:
+    own = OWN_SPRINGS_AND_RODS[preset]
+    assert {path: value_at(preset, path) for path in own} == own
+
+
+def test_the_four_segment_robot_s_modulus_lies_between_the_two_fits() -> None:
+    """With friction (docs/calibration.md), and the authors' without."""
+    young, shear = (value_at("wang", f"body.strands.{name}_modulus_Pa") for name in ("young", "shear"))
+    assert isinstance(young, float)
+    assert 0.437e9 < young < 2.0e9
+    assert shear == pytest.approx(young * 2.0 / 3.0)
 
 
 @pytest.mark.parametrize("preset", ["wang", "riddle2025"])

@@ -13,7 +13,7 @@ from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
 from annelid.analysis import Summary, summary
 from annelid.analysis.paper import published
-from annelid.config import check_config
+from annelid.config import check_config, load_config
 from annelid.simulation.runfile import Run
 
 PROMISED = {
@@ -50,6 +50,8 @@ def test_numbers_of_a_written_down_run() -> None:
     assert numbers.middle_deficit_mean == pytest.approx(0.5)
     assert numbers.end_difference == pytest.approx(0.25)
     assert numbers.contraction_force_median_N == HOLDING_FORCE_N
+    assert numbers.segment_force_median_N == [HOLDING_FORCE_N] * 3
+    assert numbers.segment_force_peak_N == [HOLDING_FORCE_N] * 3
     assert numbers.travel_m == pytest.approx(-0.06)
     assert numbers.travel_path_m == pytest.approx(0.06)
     assert numbers.ring_length_min_m == pytest.approx(0.36)
@@ -121,3 +123,26 @@ def test_planar_periods(n_segments: int, tau_ms: float, gain: float, period_s: f
     )
     entry = published(config).get("period_s")
     assert (entry.value if entry else None) == period_s
+
+
+def test_loads_are_told_segment_by_segment() -> None:
+    """Two muscles a segment; force and length on a circle, whose area is the work of a cycle."""
+    data = wave_data()
+    phase = 2.0 * np.pi * data["time"].values / 6.0
+    size = np.array([1.0, 2.0, 3.0]).repeat(2)
+    shape = ("time", "muscle")
+    data = data.drop_dims("muscle").assign(
+        muscle_force=(shape, 5.0 + size * np.sin(phase)[:, None]),
+        ring_length=(shape, 0.4 + 0.1 * np.cos(phase)[:, None] * np.ones(6)),
+        activation=(shape, np.ones((phase.size, 6))),
+    )
+    numbers = summary(run_of(data))
+    assert numbers.muscle_work_J == pytest.approx([2 * np.pi * 0.1 * k for k in (1, 2, 3)], rel=1e-5)
+    assert numbers.segment_force_peak_N == pytest.approx([6.0, 7.0, 8.0], rel=1e-6)
+    assert numbers.segment_force_median_N == pytest.approx([5.0, 5.0, 5.0], abs=1e-6)
+    assert numbers.contraction_force_peak_N == pytest.approx(8.0)
+
+
+def test_the_robot_stands_beside_its_preset_only() -> None:
+    assert published(load_config("wang"))["elongation_mean_max_m"].value == (0.0615, 0.0382, 0.0478, 0.0598)
+    assert published(load_config("wang", {"body.mesh.n_segments": 5})) == {}

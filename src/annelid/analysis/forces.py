@@ -23,3 +23,17 @@ def contraction_forces(force_N: ArrayLike, activation: ArrayLike) -> NDArray[np.
     """
     force = np.asarray(force_N, dtype=float)
     return force[np.asarray(activation, dtype=float) > CONTRACTED]
+
+
+def muscle_work(force_N: ArrayLike, length_m: ArrayLike) -> NDArray[np.float64]:
+    """Integrates each muscle's force over its shortening, by the trapezoidal rule.
+
+    Args:
+        force_N: Muscle forces, N, positive when pulling, shape ``(n_times, n_muscles)``.
+        length_m: Their lengths, m, same shape.
+
+    Returns:
+        The work that each has done on the body, J, shape ``(n_muscles,)``; what it took back is subtracted.
+    """
+    force, length = np.asarray(force_N, dtype=float), np.asarray(length_m, dtype=float)
+    return -(0.5 * (force[1:] + force[:-1]) * np.diff(length, axis=0)).sum(axis=0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.config import PlanarBody, RunConfig, SnsController
 
 PAPER_2023 = "Riddle et al. 2023"
@@ -29,13 +30,16 @@ def published(config: RunConfig) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
     Numbers are given for the configurations named after a paper, whatever else was overridden but the kind of
-    controller: the three-segment worm of ``riddle2023`` and its rods, and the planar worms of ``riddle2022`` with the
-    gate time constants and gains that go together. For all others the result is empty.
+    controller: the three-segment worm of ``riddle2023`` and its rods, the four-segment robot ``wang``, and the planar
+    worms of ``riddle2022`` with the gate time constants and gains that go together. For all others the result is
+    empty.
     """
     if not isinstance(config.controller, SnsController):
         return {}
     if config.name.startswith("riddle2023") and config.body.n_segments == 3:
         return dict(_RIDDLE_2023)
+    if config.name == "wang" and config.body.n_segments == len(ROBOT_ELONGATION_M):
+        return dict(_ROBOT)
     if config.name.startswith("riddle2022") and isinstance(config.body, PlanarBody):
         key = (
             config.body.n_segments,
@@ -61,6 +65,11 @@ _RIDDLE_2023 = {
     "travel_m": Published("negligible", PAPER_2023, "section 5"),
     # 5000 steps of 1 ms in 3.5 min.
     "real_time_factor": Published(5.0 / 210.0, PAPER_2023, "section 3"),
+}
+
+_ROBOT = {
+    "order": Published("1-2-3-4", PAPER_2023, "Fig. 9"),
+    "elongation_mean_max_m": Published(ROBOT_ELONGATION_M, PAPER_2023, "section 4"),
 }
 
 # (segments, tau_h,max in ms, gain): period in s.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from annelid.analysis.elongation import elongation, end_difference, middle_deficit
-from annelid.analysis.forces import contraction_forces
+from annelid.analysis.forces import contraction_forces, muscle_work
 from annelid.analysis.rhythm import Rhythm, rhythm, segment_activation
 from annelid.analysis.travel import net_travel, path_travel
 
@@ -43,6 +44,9 @@ class Summary:
         end_difference: Last segment below the first, first reading, a fraction.
         contraction_force_median_N: Median muscle force while contracted, N.
         contraction_force_peak_N: Largest muscle force while contracted, N.
+        segment_force_median_N: Per segment: median force of its muscles while contracted, N.
+        segment_force_peak_N: Per segment: largest force of its muscles while contracted, N.
+        muscle_work_J: Per segment: force over shortening of its muscles, J.
         travel_m: Displacement of the centre of mass along x, m.
         travel_path_m: Its way forth and back along x, m.
         ring_length_min_m: Shortest ring during the run, m (planar worm: height of a rhombus).
@@ -68,6 +72,9 @@ class Summary:
     end_difference: float | None
     contraction_force_median_N: float | None
     contraction_force_peak_N: float | None
+    segment_force_median_N: list[float | None] | None
+    segment_force_peak_N: list[float | None] | None
+    muscle_work_J: list[float | None] | None
     travel_m: float | None
     travel_path_m: float | None
     ring_length_min_m: float | None
@@ -96,7 +103,8 @@ def summary(run: Run) -> Summary:
     n_segments = run.config.body.n_segments
     beat = _rhythm(data, n_segments)
     first_helix, mean = _elongations(data)
-    forces = _contraction_forces(data)
+    forces = _contraction_forces(data, n_segments)
+    pulling = np.concatenate([np.empty(0), *forces])
     position = data["center_of_mass"].sel(axis="x").values if "center_of_mass" in data else np.empty(0)
     return Summary(
         name=run.config.name,
@@ -115,8 +123,11 @@ def summary(run: Run) -> Summary:
         middle_deficit=_number(middle_deficit(first_helix)) if first_helix is not None else None,
         middle_deficit_mean=_number(middle_deficit(mean)) if mean is not None else None,
         end_difference=_number(end_difference(first_helix)) if first_helix is not None else None,
-        contraction_force_median_N=_number(np.median(forces)) if forces.size else None,
-        contraction_force_peak_N=_number(forces.max()) if forces.size else None,
+        contraction_force_median_N=_number(np.median(pulling)) if pulling.size else None,
+        contraction_force_peak_N=_number(pulling.max()) if pulling.size else None,
+        segment_force_median_N=_of_each(forces, np.median),
+        segment_force_peak_N=_of_each(forces, np.max),
+        muscle_work_J=_work(data, n_segments),
         travel_m=_number(net_travel(position)),
         travel_path_m=_number(path_travel(position)),
         ring_length_min_m=_shortest_ring(data, n_segments),
@@ -138,10 +149,24 @@ def _elongations(data: xr.Dataset) -> tuple[np.ndarray | None, np.ndarray | None
     return read.first_helix_pp_m, read.mean_max_m
 
 
-def _contraction_forces(data: xr.Dataset) -> np.ndarray:
+def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[np.ndarray]:
+    """Forces while contracted, an array a segment; empty without muscles that have forces."""
     if "muscle_force" not in data or "activation" not in data:
-        return np.empty(0)
-    return contraction_forces(data["muscle_force"].values, data["activation"].values)
+        return []
+    force, activation = data["muscle_force"].values, data["activation"].values
+    by_segment = np.split(np.arange(force.shape[1]), n_segments)
+    return [contraction_forces(force[:, muscles], activation[:, muscles]) for muscles in by_segment]
+
+
+def _of_each(forces: list[np.ndarray], number: Callable[[np.ndarray], Any]) -> list[float | None] | None:
+    return [_number(number(of_segment)) if of_segment.size else None for of_segment in forces] or None
+
+
+def _work(data: xr.Dataset, n_segments: int) -> list[float | None] | None:
+    if "muscle_force" not in data or "ring_length" not in data or not data.sizes.get("time"):
+        return None
+    work = muscle_work(data["muscle_force"].values, data["ring_length"].values)
+    return _numbers(work.reshape(n_segments, -1).sum(axis=1))
 
 
 def _shortest_ring(data: xr.Dataset, n_segments: int) -> float | None:

@@ -142,7 +142,7 @@ def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str
     left_out: dict[str, str] = {}
     errors = dict(zip(spread.names, spread.relative_error.tolist(), strict=True))
     for name in FIELDS:
-        if not any(_scaled(config, name)):
+        if not any(scaled_fields(config, name)):
             left_out[name] = ABSENT
         elif not errors.get(name):
             left_out[name] = EXACT if name in errors else UNMEASURED
@@ -188,13 +188,13 @@ def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any
         if name == CABLE and spread.cable_exponent is not None:
             pulled, drawn = (wrap_factors(m)[0] for m in (spread.cable_exponent, spread.cable_exponent * factor))
             factor = pulled / drawn
-        for path, value in _scaled(config, name):
+        for path, value in scaled_fields(config, name):
             changed[path] = [factor * each for each in value] if isinstance(value, tuple) else factor * value
     return changed
 
 
-def _scaled(config: RunConfig, name: str) -> Iterator[tuple[str, Any]]:
-    """Fields that a parameter scales in this worm, with their values."""
+def scaled_fields(config: RunConfig, name: str) -> Iterator[tuple[str, Any]]:
+    """Gives the fields that a parameter scales in this worm by dotted path, and their values."""
     for path in FIELDS[name]:
         value = _value(config, path)
         if value:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from annelid.studies.uncertainty.combine import Quantity
-from annelid.studies.uncertainty.parameters import FIELDS, UNMEASURED
+from annelid.studies.uncertainty.parameters import UNMEASURED, scaled_fields
 from annelid.studies.uncertainty.study import Uncertainty, VariantRun
 from annelid.view.figures.uncertainty import Panel, uncertainty_figure
 from annelid.view.output import whole_file
@@ -127,7 +127,7 @@ def as_json(result: Uncertainty) -> dict[str, Any]:
         "ordered": result.n_ordered,
         "too_short_to_tell": result.n_untold,
         "varied": {
-            name: {"relative_error": float(error), "fields": list(FIELDS[name])}
+            name: {"relative_error": float(error), "fields": [path for path, _ in scaled_fields(result.config, name)]}
             for name, error in zip(spread.names, spread.relative_error, strict=True)
         },
         "correlation": spread.correlation.tolist(),

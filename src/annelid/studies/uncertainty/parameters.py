@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
-from math import exp, inf
+from math import exp, inf, sqrt
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -150,26 +150,36 @@ def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str
 
 
 def draw(n: int, spread: Spread, seed: int) -> Array:
-    """Draws relative changes in the logarithm: a Latin hypercube of normal numbers, correlated and scaled.
+    """Draws relative changes in the logarithm: normal numbers with exactly the errors and correlations asked for.
+
+    They are the numbers nearest to a Latin hypercube of independent normal ones whose sample has mean 0 and covariance
+    1, then correlated and scaled. An answer that is linear in them scatters exactly as linear propagation says, where a
+    few independent draws correlate by chance. Fewer than p + 1 worms cannot have such a sample: theirs lies in a
+    subspace drawn at random and has the same total variance.
 
     Args:
-        n: How many worms.
+        n: How many worms, at least 2.
         spread: Errors and correlations of p parameters.
         seed: Of the draw.
 
     Returns:
-        Shape ``(n, p)``; before it is correlated each column has one number in each of n strata of equal weight.
+        Shape ``(n, p)``.
     """
-    normal = np.vectorize(NormalDist().inv_cdf, otypes=[float])
-    independent = hypercube(n, len(spread.names), np.random.default_rng(seed))
+    p = len(spread.names)
+    if not p:
+        return np.empty((n, 0))
+    normal = np.vectorize(NormalDist().inv_cdf, otypes=[float])(hypercube(n, p, np.random.default_rng(seed)))
+    left, _, right = np.linalg.svd(normal - normal.mean(axis=0), full_matrices=False)
+    rank = min(n - 1, p)
+    independent = sqrt((n - 1) * p / rank) * left[:, :rank] @ right[:rank]
     values, vectors = np.linalg.eigh(spread.correlation)
     root = vectors * np.sqrt(values.clip(min=0.0)) @ vectors.T
-    return normal(independent) @ root * spread.relative_error if independent.size else independent
+    return independent @ root * spread.relative_error
 
 
 def hypercube(n: int, p: int, rng: np.random.Generator) -> Array:
-    """Draws a Latin hypercube in (0, 1), shape ``(n, p)``: in every column one number in each n-th."""
-    strata = np.column_stack([rng.permutation(n) for _ in range(p)]) if p else np.empty((n, 0))
+    """Draws a Latin hypercube in (0, 1), shape ``(n, p)``, p at least 1: in every column one number in each n-th."""
+    strata = np.column_stack([rng.permutation(n) for _ in range(p)])
     # Open at both ends, where the normal numbers are infinite.
     return (strata + rng.uniform(1e-6, 1.0 - 1e-6, strata.shape)) / n
 

@@ -2,8 +2,8 @@
 
 What the error bars are:
 
-* parameters: the sample standard deviation over n worms, a Latin hypercube of normal numbers in the logarithm of the
-  calibrated parameters about the run's own values, with the errors and the correlation of a fit to the load frame;
+* parameters: the sample standard deviation over n worms. The logarithms of their calibrated parameters are normal about
+  the run's own values, with exactly the errors and the correlation of a fit to the load frame (`parameters.draw`);
 * time step: the largest difference between the run and the same at half and, where that is a whole multiple of the
   control step, at a quarter of its physics step, its signals recorded as much more often, since onsets and maxima are
   read from the record;
@@ -29,6 +29,7 @@ from annelid.studies.store import Progress, Store, case_key
 from annelid.studies.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
 from annelid.studies.uncertainty.parameters import Spread, applicable, changes, draw, read_spread
 from annelid.studies.uncertainty.readings import Reading, readings
+from annelid.view.output import whole_file
 
 RUNS = "uncertainty"
 """Subfolder of the runs."""
@@ -151,6 +152,7 @@ def uncertainty(
 
     Raises:
         ConfigError: The body is planar, n is below 2, or the folder is in use.
+        RunFileError: A file cannot be written.
         SimulationStopped: A guard stopped the run itself; its file is kept.
         KeyboardInterrupt: Runs in progress are dropped, all others kept for a later call.
     """
@@ -164,7 +166,8 @@ def uncertainty(
     outcomes = store.compute(variants, jobs=jobs, progress=progress)
     done = [_done(variant, outcomes[case_key(variant)]) for variant in variants]
     nominal = outcomes[case_key(variants[0])]
-    shutil.copyfile(nominal.path / FILE_NAME, folder / FILE_NAME)
+    with whole_file(folder / FILE_NAME) as draft:
+        shutil.copyfile(nominal.path / FILE_NAME, draft)
     if nominal.message:
         raise SimulationStopped(nominal.message)
     return Uncertainty(config, chosen, left_out, combine(readings(nominal.summary), done), tuple(done), folder)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
@@ -107,11 +108,13 @@ class Store:
         self.folder.mkdir(parents=True, exist_ok=True)
         n_workers = min(jobs or os.cpu_count() or 1, len(missing))
         with _single_threaded(), ProcessPoolExecutor(n_workers, mp_context=get_context("spawn")) as pool:
-            running: dict[Future[None], Work] = {
-                pool.submit(compute_case, case, self.path(case)): case for case in missing
-            }
+            # No more than the workers take at once: what lies in the pool's own queue could not be taken back.
+            waiting, running = deque(missing), dict[Future[None], Work]()
             try:
-                while running:
+                while waiting or running:
+                    while waiting and len(running) < n_workers:
+                        case = waiting.popleft()
+                        running[pool.submit(compute_case, case, self.path(case))] = case
                     done, _ = wait(running, return_when=FIRST_COMPLETED)
                     for future in done:
                         case = running.pop(future)

@@ -22,6 +22,7 @@ from annelid.cli.common import (
     print_table,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.cli.uncertainty import command_words, report_error_bars, run_with_error_bars
 from annelid.errors import SimulationStopped
 
 if TYPE_CHECKING:
@@ -36,12 +37,39 @@ def run_command(
     duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of every random draw.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the results  [default: runs/NAME-NNN, the next free number]")
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for the results  [default: runs/NAME-NNN, the next free number]"),
     ] = None,
     resume: Annotated[
         Path | None,
         typer.Option(metavar="RUN", help="Continue this run from where it ended; --duration counts from its start."),
     ] = None,
+    uncertainty: Annotated[
+        int | None,
+        typer.Option(
+            min=2,
+            metavar="N",
+            help="Give the numbers error bars: from N worms drawn about this one, from finer steps and more elements.",
+        ),
+    ] = None,
+    uncertainty_from: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Errors of the parameters: a calibration.json of annelid calibrate  [default: annelid's own]",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PARAMETER=ERROR",
+            help="Relative error of a parameter, for example floor_friction=0.2; 0 leaves it out; may be repeated.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time with --uncertainty  [default: as many as cores]")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run that the folder holds.")] = False,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars and no table.")] = False,
 ) -> None:
@@ -56,9 +84,26 @@ def run_command(
     annelid run riddle2023-rods --set arena.friction=0.3     any field of any preset
     annelid run my.toml --duration 20 --out long             your own file, your own folder
     annelid run --resume long --duration 40                  twenty seconds more
+
+    With --uncertainty it also writes uncertainty.json, .csv and .png, and prints every number with its error. N worms
+    are drawn with the errors and correlations of a fit to the load frame; the run is repeated at a half and a
+    quarter of its physics step, and with one and two more elements a side (docs/uncertainty.md). All runs are kept
+    below the folder: the same command with the same --out goes on where it was stopped.
+
+    \b
+    annelid run --uncertainty 8 --out walk                   13 runs, a few seconds each
+    annelid run wang --uncertainty 8 --out wang              the robot: several minutes
+    annelid run --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
+    annelid run --uncertainty 8 --uncertainty-from calibration/calibration.json
     """
     from annelid.simulation.loop import simulate
+    from annelid.simulation.runfile import open_run
     from annelid.view.gallery import draw_all
+
+    if uncertainty is None and (uncertainty_from, vary, jobs) != (None, None, None):
+        raise typer.BadParameter("--uncertainty-from, --vary and --jobs need --uncertainty N")
+    if uncertainty is not None and resume is not None:
+        raise typer.BadParameter("--uncertainty makes whole runs: it does not go with --resume")
 
     overrides = overrides_of(assignments, duration_s=duration, seed=seed)
     if resume is None:
@@ -69,7 +114,22 @@ def run_command(
         raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments or --fidelity with it")
     with _run_folder(out, config.name) as folder:
         try:
-            done = simulate(config, folder, resume=resume, progress=False if quiet else None)
+            if uncertainty is None:
+                result = None
+                done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
+            else:
+                result = run_with_error_bars(
+                    config,
+                    uncertainty,
+                    folder,
+                    source=uncertainty_from,
+                    vary=vary,
+                    jobs=jobs,
+                    overwrite=force,
+                    quiet=quiet,
+                    given=command_words(preset, assignments, segments, fidelity, duration, seed),
+                )
+                done = open_run(folder)
         except SimulationStopped as stop:
             raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
     if not quiet:
@@ -78,6 +138,8 @@ def run_command(
         complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
         raise typer.Exit(EXIT_INTERRUPTED)
     typer.echo(done.path)
+    if result is not None:
+        report_error_bars(result, quiet=quiet)
     for path in draw_all(done, folder, video=video, quiet=quiet, complain=complain):
         typer.echo(path)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -26,32 +27,27 @@ _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
 _COST_MS = {"chain": 3.8, "rods": 4.5, "planar": 0.05}
 
 
-@dataclass(frozen=True)
-class Case:
-    """One run of a study.
+class Work(ABC):
+    """One run that a store computes and keeps."""
 
-    Attributes:
-        preset: The preset that it starts from.
-        changes: Fields that differ from it, by their dotted paths.
-    """
+    @property
+    @abstractmethod
+    def stem(self) -> str:
+        """What the name of its folder begins with."""
 
-    preset: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    @property
+    @abstractmethod
+    def command(self) -> str:
+        """The command line that makes it."""
+
+    @abstractmethod
+    def configured(self) -> RunConfig:
+        """Makes its configuration."""
 
     @cached_property
     def config(self) -> RunConfig:
-        """The configuration; sparsely recorded unless the case says otherwise."""
-        config = load_config(self.preset, dict(self.changes))
-        if any(path.startswith("record.") for path in self.changes):
-            return config
-        return load_config(config.model_dump(), _SPARSE)
-
-    @property
-    def command(self) -> str:
-        """The command line that makes the same run."""
-        changes = {path: value for path, value in self.changes.items() if not path.startswith("record.")}
-        words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in changes.items()]
-        return " ".join(["annelid run", self.preset, *words])
+        """Its configuration."""
+        return self.configured()
 
     @property
     def cost_s(self) -> float:
@@ -67,9 +63,46 @@ class Case:
         size = body.mesh.n_segments / 3 * body.mesh.elements_per_side / 3
         return evaluations * size * _COST_MS["chain" if chain else "rods"] / 1e3
 
+
+@dataclass(frozen=True)
+class Case(Work):
+    """One run of a study.
+
+    Attributes:
+        preset: The preset that it starts from.
+        changes: Fields that differ from it, by their dotted paths.
+    """
+
+    preset: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+    def configured(self) -> RunConfig:
+        """Makes its configuration; sparsely recorded unless the case says otherwise."""
+        config = load_config(self.preset, dict(self.changes))
+        if any(path.startswith("record.") for path in self.changes):
+            return config
+        return load_config(config.model_dump(), _SPARSE)
+
+    @property
+    def stem(self) -> str:
+        """What the name of its folder begins with."""
+        return self.preset
+
+    @property
+    def command(self) -> str:
+        """The command line that makes the same run."""
+        return run_command(self.preset, self.changes)
+
     def but(self, changes: Mapping[str, Any]) -> Case:
         """Returns the case with further changes."""
         return Case(self.preset, {**self.changes, **changes})
+
+
+def run_command(preset: str, changes: Mapping[str, Any]) -> str:
+    """Returns the command line that runs a preset or file with changes, but for those of the record."""
+    told = {path: value for path, value in changes.items() if not path.startswith("record.")}
+    words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in told.items()]
+    return " ".join(["annelid run", preset, *words])
 
 
 def chain(changes: Mapping[str, Any] | None = None) -> Case:

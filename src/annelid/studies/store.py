@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
@@ -19,7 +20,7 @@ from pathlib import Path
 import annelid
 from annelid.errors import SimulationStopped
 from annelid.simulation.runfile import Run, open_run
-from annelid.studies.case import Case
+from annelid.studies.case import Work
 from annelid.studies.outcome import Outcome, outcome, read_outcome, write_outcome
 
 PHYSICS = ("morphology.py", "clock.py", "arena", "body", "nervous", "control", "planar", "simulation")
@@ -42,21 +43,21 @@ class Store:
         """Opens a store; the folder is made when the first run is computed."""
         self.folder = folder
 
-    def path(self, case: Case) -> Path:
+    def path(self, case: Work) -> Path:
         """Folder of a case's run."""
-        return self.folder / f"{case.preset}-{case_key(case)}"
+        return self.folder / f"{case.stem}-{case_key(case)}"
 
-    def __contains__(self, case: Case) -> bool:
+    def __contains__(self, case: Work) -> bool:
         return self._stored(case) is not None
 
-    def __getitem__(self, case: Case) -> Outcome:
+    def __getitem__(self, case: Work) -> Outcome:
         """Outcome of a case that has been computed; KeyError if it has not."""
         found = self._stored(case)
         if found is None:
             raise KeyError(case.command)
         return found
 
-    def run(self, case: Case) -> Run:
+    def run(self, case: Work) -> Run:
         """Opens the run of a case that has been computed.
 
         Raises:
@@ -64,7 +65,7 @@ class Store:
         """
         return open_run(self.path(case))
 
-    def _stored(self, case: Case) -> Outcome | None:
+    def _stored(self, case: Work) -> Outcome | None:
         folder = self.path(case)
         try:
             return read_outcome(folder / OUTCOME_NAME, code_fingerprint(*READERS))
@@ -74,7 +75,7 @@ class Store:
             return keep_outcome(folder)
 
     def compute(
-        self, cases: Iterable[Case], *, jobs: int | None = None, progress: Progress | None = None
+        self, cases: Iterable[Work], *, jobs: int | None = None, progress: Progress | None = None
     ) -> Mapping[str, Outcome]:
         """Runs those cases that are not there yet, the longest first, several at a time.
 
@@ -107,11 +108,13 @@ class Store:
         self.folder.mkdir(parents=True, exist_ok=True)
         n_workers = min(jobs or os.cpu_count() or 1, len(missing))
         with _single_threaded(), ProcessPoolExecutor(n_workers, mp_context=get_context("spawn")) as pool:
-            running: dict[Future[None], Case] = {
-                pool.submit(compute_case, case, self.path(case)): case for case in missing
-            }
+            # No more than the workers take at once: what lies in the pool's own queue could not be taken back.
+            waiting, running = deque(missing), dict[Future[None], Work]()
             try:
-                while running:
+                while waiting or running:
+                    while waiting and len(running) < n_workers:
+                        case = waiting.popleft()
+                        running[pool.submit(compute_case, case, self.path(case))] = case
                     done, _ = wait(running, return_when=FIRST_COMPLETED)
                     for future in done:
                         case = running.pop(future)
@@ -125,7 +128,7 @@ class Store:
         return found
 
 
-def compute_case(case: Case, folder: Path) -> None:
+def compute_case(case: Work, folder: Path) -> None:
     """Runs one case into a folder and writes its outcome; what an earlier, killed attempt left is replaced."""
     from annelid.simulation.loop import simulate
 
@@ -146,7 +149,7 @@ def keep_outcome(folder: Path) -> Outcome:
     return read
 
 
-def case_key(case: Case) -> str:
+def case_key(case: Work) -> str:
     """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
     text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from outcome import Command
+
+from annelid.simulation.runfile import open_run
+from annelid.studies import uncertainty as package
+
+TINY = ("--duration", "0.1", "--no-video", "--jobs", "1")
+
+
+def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command) -> None:
+    command = ("run", "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")
+    done = annelid(*command)
+    assert done.exit_code == 0, done.err
+    assert "drawn worms kept an ordered rhythm" in done.out
+    assert "+-" in done.out
+    printed = [Path(line).name for line in done.out.splitlines() if line.startswith("walk")]
+    assert printed[:4] == ["run.nc", "uncertainty.json", "uncertainty.csv", "uncertainty.png"]
+    assert all(Path("walk", name).exists() for name in printed)
+    assert open_run("walk").config.duration_s == 0.1
+    content = json.loads(Path("walk/uncertainty.json").read_text())
+    assert list(content["varied"]) == ["young_modulus", "dry_friction", "cable_friction"]
+    assert [run["kind"] for run in content["runs"]].count("drawn") == 2
+
+    before = {path: path.stat().st_mtime_ns for path in Path("walk/uncertainty").glob("*/run.nc")}
+    assert len(before) == 7
+    again = annelid(*command, "-q")
+    assert again.exit_code == 0, again.err
+    assert {path: path.stat().st_mtime_ns for path in Path("walk/uncertainty").glob("*/run.nc")} == before
+    assert json.loads(Path("walk/uncertainty.json").read_text()) == content
+    assert "holds another run" in annelid(*command, "--seed", "3").sentence()
+
+
+def test_an_interrupted_study_names_the_command_that_goes_on(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[dict[str, Any]] = []
+
+    def interrupted(config: object, n: int, folder: Path, **options: Any) -> None:
+        seen.append({"config": config, "n": n, "folder": folder, "errors": options["spread"].relative_error.tolist()})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(package, "uncertainty", interrupted)
+    words = ("--segments", "4", "--set", "controller={kind='sns-robust'}", "--vary", "floor_friction=0.2")
+    done = annelid("run", "riddle2023-rods", *words, "--seed", "5", "--uncertainty", "3", "-o", "my walk")
+    assert done.exit_code == 130
+    sentence = done.sentence()
+    assert "finished runs are kept in my walk" in sentence
+    program, *again = shlex.split(sentence.partition("go on with: ")[2])
+    assert program == "annelid"
+    annelid(*again)
+    assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("riddle2022-planar",), "body.kind = 'riddle2022' has no calibrated parameters"),
+        (("--vary", "floor_frction=0.1"), "did you mean 'floor_friction'"),
+        (("--vary", "floor_friction=much"), "the relative error must be a number"),
+        (("--vary", "floor_friction=true"), "the relative error must be a number"),
+        (("--vary", "floor_friction"), "not of the form field=value"),
+        (("--vary", "spring_rate=2"), "below 1"),
+        (("--uncertainty-from", "none.json"), "cannot read none.json"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
+    annelid: Command, arguments: tuple[str, ...], says: str
+) -> None:
+    done = annelid("run", *arguments, "--uncertainty", "2", "--duration", "0.1")
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not list(Path().iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--uncertainty", "1"), "greater than or equal to 2"),
+        (("--vary", "spring_rate=0.1"), "need --uncertainty"),
+        (("--jobs", "2"), "need --uncertainty"),
+        (("--uncertainty-from", "c.json"), "need --uncertainty"),
+        (("--uncertainty", "2", "--resume", "walk"), "does not go with --resume"),
+    ],
+)
+def test_wrong_usage_says_what_is_missing(annelid: Command, arguments: tuple[str, ...], says: str) -> None:
+    done = annelid("run", *arguments)
+    assert done.exit_code == 2
+    assert "Usage:" in done.err
+    assert says in done.err
+
+
+def test_force_replaces_a_run(annelid: Command) -> None:
+    command = ("run", "riddle2022-planar", "--duration", "0.1", "--no-video", "-q", "-o", "here")
+    assert annelid(*command).exit_code == 0
+    assert "is not empty" in annelid(*command, "--seed", "4").sentence()
+    assert open_run("here").config.seed == 0
+    assert annelid(*command, "--seed", "4", "--force").exit_code == 0
+    assert open_run("here").config.seed == 4

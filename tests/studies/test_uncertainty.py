@@ -1,0 +1,555 @@
+"""Error bars: the draw, how errors are joined, and what a study does with its runs."""
+
+from __future__ import annotations
+
+import json
+import statistics
+from collections.abc import Mapping
+from math import exp, hypot, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.analysis import summary
+from annelid.config import RunConfig, load_config
+from annelid.errors import ConfigError, SimulationStopped
+from annelid.simulation.loop import simulate
+from annelid.simulation.runfile import open_run
+from annelid.studies import store as store_module
+from annelid.studies.calibration.fit import calibrate
+from annelid.studies.calibration.loop import read_loop
+from annelid.studies.calibration.report import EQUAL_STIFFNESS
+from annelid.studies.case import RODS
+from annelid.studies.store import case_key
+from annelid.studies.uncertainty import Spread, Uncertainty, VariantRun, read_spread, study, uncertainty
+from annelid.studies.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
+from annelid.studies.uncertainty.parameters import (
+    ABSENT,
+    CALIBRATION,
+    EXACT,
+    FIELDS,
+    UNMEASURED,
+    applicable,
+    changes,
+    draw,
+    hypercube,
+)
+from annelid.studies.uncertainty.readings import readings
+from annelid.studies.uncertainty.report import as_json, headline, remarks, with_error, write_uncertainty
+from annelid.studies.uncertainty.study import Variant, combine, finer_steps, more_elements, plan
+
+SHORT = {"duration_s": 0.1, "record.signals_interval_s": 0.02}
+NOTHING: dict[str, float] = {"young_modulus": 0.0, "dry_friction": 0.0, "cable_friction": 0.0}
+
+
+def spread(errors: Mapping[str, float], correlation: Any = None, exponent: float | None = None) -> Spread:
+    matrix = np.eye(len(errors)) if correlation is None else np.asarray(correlation, dtype=float)
+    return Spread(tuple(errors), np.array(list(errors.values())), matrix, "a test", exponent)
+
+
+# The draw
+
+
+@settings(deadline=None, max_examples=50)
+@given(n=st.integers(2, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
+def test_a_hypercube_has_one_point_in_every_stratum_of_every_parameter(n: int, p: int, seed: int) -> None:
+    points = hypercube(n, p, np.random.default_rng(seed))
+    assert points.shape == (n, p)
+    assert (np.sort(np.floor(points * n), axis=0) == np.arange(n)[:, None]).all()
+
+
+@settings(deadline=None, max_examples=20)
+@given(n=st.integers(2, 20), seed=st.integers(0, 10**6))
+def test_draws_are_reproducible_and_depend_on_the_seed(n: int, seed: int) -> None:
+    known = read_spread()
+    assert (draw(n, known, seed) == draw(n, known, seed)).all()
+    assert (draw(n, known, seed) != draw(n, known, seed + 1)).any()
+
+
+NAMES = ("young_modulus", "dry_friction", "spring_rate", "floor_friction")
+
+
+@st.composite
+def spreads(draw_from: st.DrawFn) -> Spread:
+    """Errors of one to four parameters, with any correlations, singular ones among them."""
+    p = draw_from(st.integers(1, 4))
+    rows = np.random.default_rng(draw_from(st.integers(0, 10**6))).normal(size=(p, draw_from(st.integers(1, 5))))
+    rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+    errors = [draw_from(st.floats(0.01, 0.3)) for _ in range(p)]
+    return spread(dict(zip(NAMES, errors, strict=False)), rows @ rows.T)
+
+
+def covariance(known: Spread) -> np.ndarray:
+    return known.correlation * np.outer(known.relative_error, known.relative_error)
+
+
+@settings(deadline=None, max_examples=100)
+@given(known=spreads(), more=st.integers(1, 20), seed=st.integers(0, 10**6))
+def test_a_sample_has_the_mean_errors_and_correlation_that_were_asked_for(known: Spread, more: int, seed: int) -> None:
+    drawn = draw(len(known.names) + more, known, seed)
+    assert drawn.mean(axis=0) == pytest.approx(0.0, abs=1e-9)
+    assert np.atleast_2d(np.cov(drawn.T)) == pytest.approx(covariance(known), abs=1e-7)
+
+
+@settings(deadline=None, max_examples=50)
+@given(p=st.integers(1, 4), n=st.integers(2, 5), seed=st.integers(0, 10**6))
+def test_too_few_worms_have_the_same_total_variance(p: int, n: int, seed: int) -> None:
+    drawn = draw(n, spread(dict.fromkeys(NAMES[:p], 0.1)), seed)
+    assert drawn.var(axis=0, ddof=1).sum() == pytest.approx(p * 0.1**2)
+
+
+def test_too_few_worms_have_the_right_covariance_on_average() -> None:
+    known, n_samples = read_spread(), 2000
+    samples = [np.cov(draw(2, known, seed).T) for seed in range(n_samples)]
+    largest = 5.0 * np.std(samples, axis=0) / sqrt(n_samples)
+    assert (np.abs(np.mean(samples, axis=0) - covariance(known)) < largest).all()
+
+
+def test_many_draws_are_normal() -> None:
+    """Shares of a normal distribution; the hypercube keeps them within a few draws."""
+    drawn = draw(1000, spread({"young_modulus": 0.1, "spring_rate": 0.2}), 0)
+    for column, error in zip(drawn.T, (0.1, 0.2), strict=True):
+        levels = np.array([statistics.NormalDist(sigma=error).cdf(value) for value in np.sort(column)])
+        assert levels == pytest.approx((np.arange(1000) + 0.5) / 1000, abs=0.02)
+
+
+@settings(deadline=None, max_examples=20)
+@given(slope=st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), seed=st.integers(0, 10**6))
+def test_the_scatter_of_a_linear_answer_is_that_of_linear_propagation(slope: list[float], seed: int) -> None:
+    known = read_spread()
+    answers = 7.0 + draw(8, known, seed) @ slope
+    assert scatter(answers.tolist()) == pytest.approx(sqrt(np.array(slope) @ covariance(known) @ slope), abs=1e-9)
+
+
+# The parameters
+
+
+@settings(deadline=None, max_examples=20)
+@given(change=st.floats(-0.5, 0.5))
+def test_the_shear_modulus_keeps_its_ratio(change: float) -> None:
+    config = load_config("wang")
+    strands = config.body.strands  # type: ignore[union-attr]
+    fields = changes(config, spread({"young_modulus": 0.1}), np.array([change]))
+    assert fields["body.strands.young_modulus_Pa"] == pytest.approx(strands.young_modulus_Pa * exp(change))
+    ratio = strands.shear_modulus_Pa / strands.young_modulus_Pa
+    assert fields["body.strands.shear_modulus_Pa"] / fields["body.strands.young_modulus_Pa"] == pytest.approx(ratio)
+
+
+@pytest.mark.parametrize(
+    ("preset", "field"), [("wang", "force_limit_N"), ("riddle2025", "force_limit_N"), (RODS, "peak_force_N")]
+)
+def test_friction_of_the_cable_scales_the_force_of_rings(preset: str, field: str) -> None:
+    config = load_config(preset)
+    m, change = 2.15, 0.3
+    fields = changes(config, spread({"cable_friction": 0.05}, exponent=m), np.array([change]))
+
+    def mean_over_pulled(exponent: float) -> float:
+        """Mean of exp(-x) over the wrap."""
+        return float(np.exp(-np.linspace(0.0, exponent, 20001)).mean())
+
+    factor = mean_over_pulled(m * exp(change)) / mean_over_pulled(m)
+    before = getattr(config.body.rings, field)  # type: ignore[union-attr]
+    assert list(fields) == [f"body.rings.{field}"]
+    assert np.asarray(fields[f"body.rings.{field}"]) == pytest.approx(factor * np.asarray(before), rel=1e-4)
+    load_config(config.model_dump(), fields)
+
+
+def test_what_a_worm_lacks_is_left_out_with_its_reason() -> None:
+    chosen, left_out = applicable(load_config(RODS), read_spread())
+    assert chosen.names == ("young_modulus", "cable_friction")
+    known = read_spread()
+    assert chosen.correlation[0, 1] == known.correlation[0, known.names.index("cable_friction")]
+    assert left_out["dry_friction"] == ABSENT
+    assert left_out["floor_friction"] == UNMEASURED
+    assert set(chosen.names) | set(left_out) == set(FIELDS)
+    rubbing = load_config(RODS, {"body.joints.dry_friction_Nm": 0.0083})
+    assert applicable(rubbing, read_spread())[0].names == ("young_modulus", "dry_friction", "cable_friction")
+    assert applicable(rubbing, read_spread().but({"young_modulus": 0.0}))[1]["young_modulus"] == EXACT
+
+
+def test_given_errors_stand_beside_those_of_the_fit() -> None:
+    known = read_spread()
+    both = known.but({"floor_friction": 0.2, "dry_friction": 0.5})
+    assert both.names == (*known.names, "floor_friction")
+    assert dict(zip(both.names, both.relative_error, strict=True))["dry_friction"] == 0.5
+    assert (both.correlation[:3, :3] == known.correlation).all()
+    assert both.correlation[3].tolist() == [0.0, 0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("errors", "says"),
+    [
+        ({"floor_frction": 0.1}, "did you mean 'floor_friction'"),
+        ({"spring_rate": -0.1}, "spring_rate = -0.1 must be at least 0 and below 1"),
+        ({"spring_rate": 1.0}, "below 1"),
+        ({"spring_rate": float("nan")}, "below 1"),
+        ({"cable_friction": 0.1}, "has no value of it"),
+    ],
+)
+def test_errors_out_of_range_are_refused(errors: dict[str, float], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        spread({"young_modulus": 0.1}).but(errors)
+
+
+def calibration() -> dict[str, Any]:
+    path = Path(store_module.__file__).parent / "uncertainty" / CALIBRATION
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def test_the_fit_that_comes_along_is_whole() -> None:
+    """Errors and correlations follow from the singular values, the directions and the residual."""
+    content, known = calibration(), read_spread()
+    directions, singular = np.array(content["directions"]), np.array(content["singular_values_N"])
+    residual = np.array(content["fitted_N"]) - np.array(content["measured_N"])
+    covariance = (residual**2).mean() * directions.T @ np.diag(singular**-2.0) @ directions
+    assert known.relative_error == pytest.approx(np.sqrt(np.diag(covariance)))
+    assert known.correlation * np.outer(known.relative_error, known.relative_error) == pytest.approx(covariance)
+    assert known.cable_exponent == content["parameters"]["cable_friction"]["value"]
+
+
+@pytest.mark.slow
+def test_the_fit_that_comes_along_is_the_one_that_calibrate_makes() -> None:
+    pytest.importorskip("scipy")
+    fit = calibrate(load_config(RODS, EQUAL_STIFFNESS), read_loop())
+    known = read_spread()
+    assert fit.names == known.names
+    # The optimiser stops where a step changes parameters by less than 1e-3.
+    assert fit.identifiability.relative_error == pytest.approx(known.relative_error, rel=0.02)
+    assert fit.identifiability.correlation == pytest.approx(known.correlation, abs=0.02)
+
+
+def test_another_fit_is_read_as_it_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(calibration()))
+    mine, ours = read_spread(path), read_spread()
+    assert mine.names == ours.names
+    assert (mine.correlation == ours.correlation).all()
+    assert mine.source == str(path)
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lambda c: c["parameters"]["dry_friction"].update(relative_error=None), "does not tell dry_friction"),
+        (lambda c: c["parameters"].update(mass=c["parameters"].pop("dry_friction")), "unknown parameter 'mass'"),
+        (lambda c: c["correlation"][0].__setitem__(1, 0.9), "correlation must be symmetric"),
+        (lambda c: c["correlation"].pop(), "no calibration.json"),
+        (lambda c: c.pop("parameters"), "no calibration.json"),
+    ],
+)
+def test_a_damaged_fit_is_refused(damage: Any, says: str, tmp_path: Path) -> None:
+    content = calibration()
+    damage(content)
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ConfigError, match=says):
+        read_spread(path)
+
+
+def test_a_missing_or_garbled_fit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot read"):
+        read_spread(tmp_path / "none.json")
+    for text in ("{", "[]", "3"):
+        (tmp_path / "bad.json").write_text(text)
+        with pytest.raises(ConfigError, match=r"no calibration\.json"):
+            read_spread(tmp_path / "bad.json")
+
+
+# Joining errors
+
+errors = st.one_of(st.none(), st.floats(0.0, 1e6))
+
+
+def quantity(
+    value: float | None, parameters: float | None, time_step: float | None, elements: float | None
+) -> Quantity:
+    return Quantity("q", "q", "m", value, parameters, time_step, elements, None, 8, "cm", 100.0, 2)
+
+
+@given(errors, errors, errors)
+def test_the_total_is_the_root_of_the_sum_of_squares(a: float | None, b: float | None, c: float | None) -> None:
+    known = [error for error in (a, b, c) if error is not None]
+    total = quantity(1.0, a, b, c).total
+    if known:
+        assert total == pytest.approx(hypot(*known))
+    else:
+        assert total is None
+
+
+@pytest.mark.parametrize(
+    ("of_it", "converged", "note"),
+    [
+        ((1.0, 9.0, 0.5, 0.5), True, ""),
+        ((-1.0, 0.0, 0.51, 0.0), False, "not converged: time step"),
+        ((1.0, 0.0, 2.0, 2.0), False, "not converged: time step and elements"),
+        ((1.0, None, 0.0, 0.6), False, "not converged: elements; without parameters"),
+        ((1.0, 0.1, None, 0.1), None, "without time step"),
+        ((None, 0.1, None, None), None, "not told by this run"),
+    ],
+)
+def test_what_is_wrong_with_a_quantity_is_said_in_words(
+    of_it: tuple[float | None, float | None, float | None, float | None], converged: bool | None, note: str
+) -> None:
+    found = quantity(*of_it)
+    assert (found.converged, found.note) == (converged, note)
+
+
+@given(st.lists(st.one_of(st.none(), st.floats(-1e3, 1e3)), max_size=12))
+def test_scatter_is_the_sample_standard_deviation_of_what_is_known(values: list[float | None]) -> None:
+    known = [value for value in values if value is not None]
+    if len(known) < 2:
+        assert scatter(values) is None
+    else:
+        assert scatter(values) == pytest.approx(np.std(known, ddof=1), abs=1e-9)
+
+
+def test_differences_take_the_largest_that_is_known() -> None:
+    assert largest_difference(1.0, [1.5, None, 0.2]) == 0.8
+    assert largest_difference(None, [1.0]) is None
+    assert largest_difference(1.0, [None]) is None
+
+
+@given(order=st.floats(0.5, 4.0), limit=st.floats(-10.0, 10.0), slope=st.floats(0.1, 10.0))
+def test_the_order_of_an_error_that_is_a_power_of_the_step(order: float, limit: float, slope: float) -> None:
+    values = [limit + slope * step**order for step in (1.0, 0.5, 0.25)]
+    assert order_of_convergence(*values) == pytest.approx(order, rel=1e-6)
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.0, 1.0), (None, 1.0, 2.0), (1.0, 2.0, 2.0)])
+def test_no_order_where_halvings_disagree(values: tuple[float | None, float | None, float | None]) -> None:
+    assert order_of_convergence(*values) is None
+
+
+def test_values_are_written_to_two_digits_of_their_error() -> None:
+    assert with_error(quantity(0.0615, 0.0021, 0.0, 0.0)) == "6.15 +- 0.21 cm"
+    assert with_error(quantity(-0.1159, 0.117, 0.0, 0.0)) == "-12 +- 12 cm"
+    assert with_error(quantity(0.0615, None, None, None)) == "6.15 cm"
+    assert with_error(quantity(None, None, None, None)) == "-"
+
+
+# The runs of a study
+
+
+@settings(deadline=None, max_examples=50)
+@given(
+    control_ms=st.integers(1, 5),
+    ratio=st.integers(1, 24),
+    faster=st.booleans(),
+    record=st.integers(1, 20),
+)
+def test_finer_steps_fit_the_control_step(control_ms: int, ratio: int, faster: bool, record: int) -> None:
+    control = control_ms / 1e3
+    step = control / ratio if faster else control * ratio
+    config = load_config(
+        RODS,
+        {
+            "clock.control_timestep_s": control,
+            "clock.physics_timestep_s": step,
+            "record.signals_interval_s": control * record,
+            "record.frames_interval_s": control * 20,
+            "duration_s": control * 200,
+        },
+    )
+    finer = finer_steps(config)
+    assert len(finer) == (2 if not faster and ratio % 4 == 0 else 1)
+    for divisor, of_it in zip((2, 4), finer, strict=False):
+        refined = load_config(config.model_dump(), of_it)
+        shorter = refined.clock.physics_timestep_s
+        exact = step / divisor
+        assert shorter <= exact * (1 + 1e-9) or (shorter == control < step)
+        assert shorter > exact - control * (1 - 1e-9)
+        assert shorter < step
+        assert refined.record.signals_interval_s <= config.record.signals_interval_s * (1 + 1e-9)
+    if len(finer) == 2:
+        assert finer[1]["clock.physics_timestep_s"] == pytest.approx(step / 4)
+
+
+def test_elements_end_where_the_mesh_does() -> None:
+    assert more_elements(load_config(RODS)) == [3, 4]
+    assert more_elements(load_config(RODS, {"body.mesh.elements_per_side": 31})) == [32]
+    assert more_elements(load_config("riddle2023")) == [4, 5]
+
+
+def test_an_unchanged_variant_is_the_run_itself() -> None:
+    for preset in (RODS, "wang", "riddle2023"):
+        config = load_config(preset)
+        assert Variant(config, "drawn", {}).config == config
+        assert case_key(Variant(config, "drawn", {})) == case_key(Variant(config, "nominal", {}))
+
+
+def test_a_plan_changes_only_what_it_says() -> None:
+    config = load_config(RODS)
+    known, _ = applicable(config, read_spread())
+    variants = plan(config, 4, known)
+    assert [variant.kind for variant in variants] == ["nominal", *["drawn"] * 4, *["time step"] * 2, *["elements"] * 2]
+    for variant in variants:
+        sections = {path: getattr_path(variant.config, path) for path in variant.changes}
+        assert sections == variant.changes
+        back = {path: getattr_path(config, path) for path in variant.changes}
+        assert load_config(variant.config.model_dump(), back) == config
+
+
+def getattr_path(config: RunConfig, path: str) -> Any:
+    value: Any = config
+    for key in path.split("."):
+        value = getattr(value, key)
+    return value
+
+
+def done(kind: Any, value: float | None, message: str = "") -> VariantRun:
+    return VariantRun(kind, {}, Path(), "ordered", "", message, {"period_s": value})
+
+
+def test_runs_that_were_stopped_have_no_part_in_the_errors(tiny: Uncertainty) -> None:
+    nominal = [reading for reading in readings(summary(open_run(tiny.folder))) if reading.name == "period_s"]
+    runs = [
+        done("drawn", 1.0),
+        done("drawn", 3.0),
+        done("drawn", 99.0, "too much energy"),
+        done("time step", 99.0, "too much energy"),
+        done("elements", 2.0),
+    ]
+    [found] = combine(nominal, runs)
+    assert found.parameters == pytest.approx(sqrt(2.0))
+    assert found.n_drawn == 2
+    assert found.time_step is None
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Uncertainty:
+    """The first moments of a worm with two others drawn about it."""
+    return uncertainty(load_config(RODS, SHORT), 2, tmp_path_factory.mktemp("tiny") / "run", jobs=1)
+
+
+def test_the_run_itself_is_the_plain_run(tiny: Uncertainty, tmp_path: Path) -> None:
+    plain, ours = simulate(tiny.config, tmp_path, progress=False), open_run(tiny.folder)
+    assert ours.config == plain.config
+    assert ours.data.drop_vars("wall_time").equals(plain.data.drop_vars("wall_time"))
+
+
+def test_error_bars_are_those_of_the_runs(tiny: Uncertainty) -> None:
+    """The force of a ring pulls from the start, and so do the drawn differences of it."""
+    force = {kind: [reading_of(run, "contraction_force_median_N") for run in tiny.of(kind)] for kind in KINDS}
+    [found] = [each for each in tiny.quantities if each.name == "contraction_force_median_N"]
+    [nominal] = force["nominal"]
+    assert found.value == nominal
+    assert found.parameters == pytest.approx(abs(force["drawn"][0] - force["drawn"][1]) / sqrt(2.0))
+    assert found.time_step == max(abs(nominal - other) for other in force["time step"])
+    assert found.discretization == max(abs(nominal - other) for other in force["elements"])
+    assert all(error is not None and error > 0.0 for error in found.errors.values())
+
+
+KINDS = ("nominal", "drawn", "time step", "elements")
+
+
+def reading_of(run: VariantRun, name: str) -> float:
+    """Reads the run's file anew."""
+    value = {each.name: each.value for each in readings(summary(open_run(run.path)))}[name]
+    assert value is not None
+    return value
+
+
+def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> None:
+    json_path, csv_path, png_path = write_uncertainty(tiny)
+    content = json.loads(json_path.read_text(encoding="utf-8"))
+    assert content == json.loads(json.dumps(as_json(tiny)))
+    assert len(content["runs"]) == 7
+    assert all((tiny.folder / run["path"] / "run.nc").exists() for run in content["runs"])
+    assert content["too_short_to_tell"] == 2
+    lines = csv_path.read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 1 + len(content["quantities"])
+    assert png_path.read_bytes().startswith(b"\x89PNG")
+    assert "0 of 2 drawn worms kept an ordered rhythm (2 too short to tell)" in headline(tiny)
+    words = "\n".join(remarks(tiny))
+    assert "20 ms against 10 and 5 ms; elements a side: 2 against 3 and 4" in words
+    assert f"dry_friction, spring_rest_length, viscous_friction ({ABSENT})" in words
+
+
+def files(folder: Path) -> dict[Path, int]:
+    return {path: path.stat().st_mtime_ns for path in (folder / "uncertainty").glob("*/run.nc")}
+
+
+def test_no_error_of_the_parameters_is_no_error_bar_and_costs_no_run(tiny: Uncertainty) -> None:
+    before = files(tiny.folder)
+    exact = uncertainty(tiny.config, 3, tiny.folder, spread=read_spread().but(NOTHING), jobs=1)
+    assert files(tiny.folder) == before
+    assert len(exact.of("drawn")) == 3
+    told = [each for each in exact.quantities if each.value is not None]
+    assert [each.parameters for each in told] == [0.0] * len(told)
+    for ours, theirs in zip(exact.quantities, tiny.quantities, strict=True):
+        assert (ours.time_step, ours.discretization) == (theirs.time_step, theirs.discretization)
+
+
+def test_a_worm_without_weight_feels_its_strands_and_not_the_floor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "finer_steps", lambda _: [])
+    monkeypatch.setattr(study, "more_elements", lambda _: [])
+    config = load_config(RODS, SHORT | {"arena.gravity_m_per_s2": 0.0, "arena.floor_gap_m": 0.5})
+    lengths = {}
+    for name, field in (("floor_friction", "arena.friction"), ("young_modulus", "body.strands.young_modulus_Pa")):
+        found = uncertainty(config, 2, tmp_path / "run", spread=read_spread().but(NOTHING | {name: 0.3}), jobs=1)
+        first, second = (run.changes[field] for run in found.of("drawn"))
+        assert first != second
+        assert found.of("elements") == found.of("time step") == ()
+        lengths[name] = [each.parameters for each in found.quantities if each.name.startswith("elongation_mean_max_m")]
+    assert lengths["floor_friction"] == [0.0] * 3
+    assert (lengths["young_modulus"][0] or 0.0) > 0.0
+
+
+def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
+    config, folder = load_config(RODS, SHORT), tmp_path / "run"
+
+    def stop_after_two(finished: int, _total: int, _share: float) -> None:
+        if finished >= 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        uncertainty(config, 2, folder, jobs=1, progress=stop_after_two)
+    kept = {path: stamp for path, stamp in files(folder).items() if (path.parent / "outcome.json").exists()}
+    assert len(kept) >= 2
+    found = uncertainty(config, 2, folder, jobs=1)
+    after = files(folder)
+    assert {path: after[path] for path in kept} == kept
+    assert len(after) == len(found.runs) == 7
+
+
+@pytest.mark.parametrize(
+    ("preset", "n", "says"),
+    [
+        ("riddle2022-planar", 2, "body.kind = 'riddle2022' has no calibrated parameters"),
+        ("daltorio2013", 2, "for the 3D worm"),
+        (RODS, 1, "n = 1 worms have no standard deviation"),
+    ],
+)
+def test_what_cannot_have_error_bars_is_refused(preset: str, n: int, says: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=says):
+        uncertainty(load_config(preset), n, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_in_use_is_refused_and_left_alone(tiny: Uncertainty, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ConfigError, match="is not empty"):
+        uncertainty(tiny.config, 2, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+    other = load_config(tiny.config.model_dump(), {"arena.friction": 0.5})
+    before = files(tiny.folder)
+    with pytest.raises(ConfigError, match="holds another run"):
+        uncertainty(other, 2, tiny.folder)
+    assert files(tiny.folder) == before
+    assert open_run(tiny.folder).config == tiny.config
+
+
+def test_a_run_that_a_guard_stops_has_no_error_bars_but_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "plan", lambda config, n, spread: [Variant(config, "nominal", {})])
+    config = load_config(RODS, SHORT | {"guard.edge_strain": 1e-6})
+    with pytest.raises(SimulationStopped, match="strain"):
+        uncertainty(config, 2, tmp_path / "run", jobs=1)
+    assert open_run(tmp_path / "run").status == "stopped_by_guard"

@@ -88,6 +88,11 @@ class Springs(Section):
         "rightmost",
     )
 
+    @property
+    def first_sensor(self) -> str:
+        """Where the first stretch sensor of a segment lies, in words."""
+        return "first helix" if self.sensors == "all" else "left side"
+
 
 class RingCables(Section):
     """What ring actuators of all kinds have in common: how they lie, and between which lengths they work."""

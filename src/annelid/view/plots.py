@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.rhythm import CONTRACTED, segment_activation
+from annelid.config import WormBody
 from annelid.errors import RunFileError
 from annelid.view.canvas import canvas, save
 from annelid.view.output import with_suffix
@@ -27,7 +28,7 @@ def figure7(run: Run, path: str | Path) -> Path:
 
     Three panels over time: potentials of the half-centres (contraction neurons solid, expansion neurons
     dashed), the phases in which each segment contracts, and the stretch sensors' lengths (thick: mean of the
-    segment's sensors, thin: the one on the first helix, dotted: rest length). One colour a segment.
+    segment's sensors, thin: the first of them, dotted: rest length). One colour a segment.
 
     Args:
         run: The run.
@@ -113,7 +114,7 @@ def _phases(axes: Axes, run: Run, colors: list) -> None:
 
 
 def _lengths(axes: Axes, run: Run, colors: list) -> None:
-    """Lengths of the stretch sensors: thick their mean, thin the first helix, dotted at rest."""
+    """Lengths of the stretch sensors: thick their mean, thin the first of them, dotted at rest."""
     data = run.data
     panel_title(axes, "Stretch sensors")
     axes.set_ylabel("length (cm)")
@@ -127,15 +128,15 @@ def _lengths(axes: Axes, run: Run, colors: list) -> None:
         axes.plot(time, stretch[:, i].mean(axis=1), "-", color=color, linewidth=2.0)
     axes.axhline(float(rest.mean()), color="0.35", linestyle=":", linewidth=1.0)
     entries = [("0.25", "-", 2.0, "mean of the segment's sensors" if several else "sensor")]
-    if several:
-        entries.append(("0.25", "-", 0.7, "first helix"))
+    if several and isinstance(run.config.body, WormBody):
+        entries.append(("0.25", "-", 0.7, run.config.body.springs.first_sensor))
     _legend(axes, [*entries, ("0.35", ":", 1.0, "rest length")])
 
 
 def _segment_entries(colors: list) -> list[tuple]:
     """Legend entries of the segments, only the ends and the middle where there are many."""
     n = len(colors)
-    shown = range(n) if n <= 4 else (0, n // 2, n - 1)
+    shown = range(n) if n <= 3 else (0, n // 2, n - 1)
     return [(colors[i], "-", 3.0, f"segment {i + 1}") for i in shown]
 
 

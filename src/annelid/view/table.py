@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarWorm, fields_of, toml_value
+from annelid.config import WormBody, fields_of, toml_value
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -66,7 +66,8 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
     table.add_column("this run", min_width=_NARROWEST_OURS, overflow="fold")
     if beside:
         table.add_column("published", overflow="fold")
-    for label, ours, field in _cells(numbers, planar=isinstance(config.body, PlanarWorm)):
+    first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
+    for label, ours, field in _cells(numbers, first_sensor):
         theirs = _theirs(field, beside.get(field))
         if ours != UNKNOWN or theirs:
             table.add_row(label, ours, *([theirs] if beside else []))
@@ -99,16 +100,16 @@ def field_lines(config: RunConfig) -> list[str]:
     return lines
 
 
-def _cells(numbers: Summary, planar: bool) -> list[tuple[str, str, str]]:
-    """Label, our value and field of every row. The planar worm has no helices and one sensor a segment."""
+def _cells(numbers: Summary, first_sensor: str | None) -> list[tuple[str, str, str]]:
+    """Label, our value and field of every row. A planar worm has one sensor a segment, and no name for it."""
     cells = [
         ("segment at onset (s)", _onsets(numbers), "order"),
         ("wave 1-2-..-N", _wave(numbers), "wave"),
     ]
     for field, (label, factor, digits, unit) in _ROWS.items():
-        if planar and ", mean" in label:
+        if first_sensor is None and ", mean" in label:
             continue
-        label = label.replace(", first helix", "") if planar else label
+        label = label.replace(", first helix", f", {first_sensor}" if first_sensor else "")
         text = _quantity(getattr(numbers, field), factor, digits, unit)
         if field == "period_s" and numbers.period_std_s is not None:
             text += f" (std {numbers.period_std_s:.3f} s)"

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+SLACK_S = 5e-7
+"""Half the shortest time step: sums of time steps, rounded, miss a given moment by less than this."""
+
 
 @dataclass(frozen=True, slots=True)
 class StepRatio:

@@ -30,6 +30,34 @@ class SimulationStopped(AnnelidError):
     """A guard stopped the simulation because energy, height or edge strain ran away."""
 
 
+def require_positive(**values: float) -> None:
+    """Refuses values that are not positive, NaN among them.
+
+    Args:
+        values: By the names that the sentence is to use.
+
+    Raises:
+        ConfigError: Of the first such value.
+    """
+    for name, value in values.items():
+        if not value > 0:
+            raise ConfigError(f"{name} must be positive, not {value}")
+
+
+def require_negative(**values: float) -> None:
+    """Refuses values that are not negative, as `require_positive` does those that are not positive."""
+    for name, value in values.items():
+        if not value < 0:
+            raise ConfigError(f"{name} must be negative, not {value}")
+
+
+def require_at_least(least: float, **values: float) -> None:
+    """Refuses values below the least one, as `require_positive` does those that are not positive."""
+    for name, value in values.items():
+        if not value >= least:
+            raise ConfigError(f"{name} must be at least {least:g}, not {value}")
+
+
 def suggest(name: str, valid: Iterable[str]) -> str:
     """Completes an error sentence with the nearest valid name and the list of all.
 

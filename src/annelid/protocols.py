@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 State = dict[str, NDArray[np.generic]]
 """Named arrays whose shapes and dtypes never change during a run."""
+Values = Mapping[str, NDArray[np.generic] | float]
+"""Present values of signals, by name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +155,7 @@ class Records(Protocol):
         """Names every signal that `read` returns."""
         ...
 
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+    def read(self, frame: bool) -> Values:
         """Reads the present values: of the frame signals if ``frame``, else of all others."""
         ...
 

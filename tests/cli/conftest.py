@@ -21,6 +21,12 @@ def annelid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     return invoke
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs draw nothing, for tests of what they compute and where they write it."""
+    monkeypatch.setattr("annelid.view.gallery.draw_all", lambda *_, **__: [])
+
+
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a planar run of one second, without pictures."""

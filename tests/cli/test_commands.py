@@ -25,6 +25,7 @@ def test_run_ends_with_table_file_and_pictures(annelid: Command) -> None:
     assert (config.body.n_segments, config.duration_s, config.seed) == (4, 0.5, 7)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_runs_without_a_folder_are_numbered(annelid: Command) -> None:
     assert annelid("run", "riddle2022-planar", "--duration", "0.1", "--no-video", "-q").exit_code == 0
     Path("runs/riddle2022-planar-007").mkdir()
@@ -38,6 +39,7 @@ def test_quiet_prints_paths_only(annelid: Command) -> None:
     assert done.err == ""
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_file_of_ones_own_runs_under_its_name(annelid: Command) -> None:
     Path("mine.toml").write_text('extends = "riddle2022-planar"\nname = "mine"\nduration_s = 0.2\n')
     assert annelid("run", "mine.toml", "--no-video", "-q", "--set", "body.gain=1.9").exit_code == 0
@@ -111,6 +113,7 @@ def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> Non
     assert np.all(np.isfinite(data.qpos))
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_level_of_fidelity_resolves_the_worm_as_asked(annelid: Command) -> None:
     run = ("run", "--fidelity", "accurate", "--duration", "0.02", "--no-video", "--out", "accurate")
     done = annelid(*run)

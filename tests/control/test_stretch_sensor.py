@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from annelid import config
 from annelid.control import StretchSensor
+from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 
 REST_M = np.full((3, 6), 0.07)
@@ -18,6 +19,18 @@ def sensor(tolerance_m=0.01, hysteresis_m=0.0, startup_hold_s=0.0, n_segments=3)
 
 
 excesses = st.lists(st.lists(st.floats(-0.03, 0.05), min_size=6, max_size=6), min_size=3, max_size=3)
+
+
+@given(n_worms=st.integers(1, 4), n_sensors=st.integers(1, 40), seed=st.integers(0, 99))
+def test_lengthening_is_the_mean_and_the_same_bits_in_any_memory_layout(n_worms, n_sensors, seed):
+    rng = np.random.default_rng(seed)
+    stretch, rest = rng.uniform(0.01, 0.2, (2, n_worms, 3, n_sensors))
+    together = lengthening_m(stretch, rest)
+    assert together == pytest.approx(stretch.mean(axis=-1) - rest.mean(axis=-1), abs=1e-14)
+    for layout in (np.asfortranarray, np.ascontiguousarray):
+        alone = [lengthening_m(layout(stretch[i]), layout(rest[i])) for i in range(n_worms)]
+        assert np.array_equal(together, alone)
+        assert np.array_equal(together, lengthening_m(layout(stretch), layout(rest)))
 
 
 @given(excess_m=excesses)

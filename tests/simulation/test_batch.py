@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
-import xarray as xr
 from mujoco.batch import Batch, SimulationError
 
 from annelid import RunConfig, load_config, open_run, simulate, simulate_batch, summary
@@ -47,13 +46,25 @@ def config(**changes: Any) -> RunConfig:
     return load_config("riddle2023-rods", FAST | changes)
 
 
-def raw(folder: Path) -> Iterator[tuple[str, xr.DataArray]]:
-    with xr.open_dataset(folder / "run.nc", engine="h5netcdf", decode_times=False) as data:
-        yield from data.load().variables.items()  # type: ignore[misc]
+def stored(folder: Path) -> tuple[dict[str, str], dict[str, tuple[list[Any], dict[str, str], Any]]]:
+    """What a run file holds: its attributes, and of every variable the dimensions, the attributes and the values."""
+    # Read as plain HDF5, ten times as fast as through xarray, since a test compares a dozen files.
+    with h5py.File(folder / "run.nc") as file:
+        variables = {
+            name: (
+                [scale.name for axis in item.dims for scale in axis.values()],
+                {key: str(value) for key, value in item.attrs.items() if not key.endswith("_LIST")},
+                item[()],
+            )
+            for name, item in file.items()
+            if isinstance(item, h5py.Dataset)
+        }
+        return {key: str(value) for key, value in file.attrs.items() if key != "created"}, variables
 
 
-def bits(values: np.ndarray) -> np.ndarray:
+def bits(values: Any) -> np.ndarray:
     """Numbers as their bits, so that NaN equals NaN and 0 differs from -0."""
+    values = np.asarray(values)
     return values.view(np.int64) if values.dtype == np.float64 else values
 
 
@@ -63,15 +74,14 @@ def parts(checkpoint: Checkpoint) -> dict[str, Any]:
 
 
 def assert_the_same(alone: Path, batched: Path) -> None:
-    of_alone, of_batched = dict(raw(alone)), dict(raw(batched))
-    assert list(of_alone) == list(of_batched)
-    for name, variable in of_alone.items():
-        assert str(variable.attrs) == str(of_batched[name].attrs)
+    (attributes, expected), (attributes_batched, actual) = stored(alone), stored(batched)
+    assert attributes == attributes_batched
+    assert list(expected) == list(actual)
+    for name, (dims, described, values) in expected.items():
+        dims_batched, described_batched, values_batched = actual[name]
+        assert (dims, described) == (dims_batched, described_batched), name
         if name != "wall_time":
-            expected, actual = (bits(np.asarray(values)) for values in (variable, of_batched[name]))
-            assert np.array_equal(expected, actual), name
-    attrs = [{**open_run(folder).data.attrs, "created": ""} for folder in (alone, batched)]
-    assert attrs[0] == attrs[1]
+            assert np.array_equal(bits(values), bits(values_batched)), name
 
 
 def run_alone(one: RunConfig, folder: Path) -> str:

@@ -14,6 +14,7 @@ from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import open_run
 from annelid.studies.case import Case, chain, fast, one_after_the_other, rods
 from annelid.studies.examination import Results
+from annelid.studies.examinations import friction, ranges, springs
 from annelid.studies.examinations.friction import FRICTION
 from annelid.studies.examinations.pins import PINS, tie_stiffness_N_per_m
 from annelid.studies.examinations.radius import RADIUS
@@ -41,6 +42,13 @@ def short(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "short"
     simulate(rods({"duration_s": 0.02}).config, folder, progress=False)
     return outcome(open_run(folder))
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Leaves the figures unwritten, for tests of what is said."""
+    for module in (friction, ranges, springs):
+        monkeypatch.setattr(module, "save_both", lambda figure, stem: None)
 
 
 def synthetic(short: Outcome, case: Case, deficit: float, rhythm: RhythmScore) -> Outcome:
@@ -98,6 +106,7 @@ def test_the_quick_effort_has_a_part_of_the_cases(examination):
     assert sum(case.preset == "riddle2023" and key not in shared for key, case in quick.items()) <= 1
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_ranges_reports_what_equal_ranges_leave(short, tmp_path):
     def make(case):
         body = case.config.body
@@ -116,6 +125,7 @@ def test_equal_ranges_are_the_mean_of_those_compiled():
     np.testing.assert_allclose(np.mean(compiled_ranges(), axis=0), EQUAL, atol=1e-3)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_answers_follow_the_rhythm(short, tmp_path):
     walking = SPRINGS.examine(
         results(SPRINGS, "full", lambda c: synthetic(short, c, 0.4, WAVE)), "full", tmp_path / "a"
@@ -129,6 +139,7 @@ def test_answers_follow_the_rhythm(short, tmp_path):
     assert silent.numbers["verdict_tension_only_chain"] == "silent after 0.70 s"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_friction_tells_its_share_of_the_deficit(short, tmp_path):
     def make(case):
         return synthetic(short, case, 0.2 if case.config.arena.friction == 1.0 else 0.05, WAVE)

@@ -1,7 +1,8 @@
 """Everything that turns sensation into activation."""
 
+from annelid.control.adaptive import AdaptiveController
 from annelid.control.callable import CallableController
-from annelid.control.oscillators import AdaptiveController, HeteroclinicController, PhaseChainController
+from annelid.control.oscillators import HeteroclinicController, PhaseChainController
 from annelid.control.program import ProgramController
 from annelid.control.sns import CopySettings, SnsController
 from annelid.control.stretch_sensor import StretchSensor

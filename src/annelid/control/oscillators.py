@@ -1,40 +1,26 @@
-"""Oscillators as controllers: a stable heteroclinic channel, a phase chain, and a nervous system with a drive."""
+"""Oscillators as controllers: a stable heteroclinic channel, and a phase chain."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid import config as settings
 from annelid.control.muscles import muscles_a_segment
-from annelid.control.stretch_sensor import StretchSensor
+from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import (
     HeteroclinicRing,
     HeteroclinicStepper,
-    PeristalsisParameters,
     PhaseState,
     PhaseStepper,
-    adaptive_peristalsis_network,
-    drive_conductance_uS,
     handover_input,
     largest_gain_per_s,
-    neuron_names,
     phase_chain,
 )
-from annelid.nervous.adaptive import DRIVE_NEURON
 from annelid.nervous.phase_chain import BODY
-from annelid.protocols import Array, Recordable, Sensation, Signal, State
-
-Values = Mapping[str, NDArray[np.generic] | float]
-
-
-def lengthening_m(sensation: Sensation) -> Array:
-    """Returns by how much each segment's mean length exceeds that at rest, m, ``(n_segments,)``."""
-    return (sensation.stretch_m - sensation.rest_stretch_m).mean(axis=1)
+from annelid.protocols import Array, Recordable, Sensation, Signal, State, Values
 
 
 class HeteroclinicController:
@@ -98,7 +84,8 @@ class HeteroclinicController:
 
     def _cues(self, sensation: Sensation) -> Array:
         if self._config.feedback == "stretch":
-            return (lengthening_m(sensation) >= self._config.stretch_cue_m).astype(float)
+            longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+            return (longer_m >= self._config.stretch_cue_m).astype(float)
         if self._config.feedback == "contact":
             load = np.linalg.norm(sensation.contact_force_N, axis=1)
             return np.roll(load >= self._config.contact_cue_N, 1).astype(float)
@@ -233,133 +220,4 @@ class PhaseChainController:
         """Restores what `get_state` returned."""
         arrays = {field.name: np.array(state[field.name], dtype=float) for field in fields(PhaseState)}
         self._state = PhaseState(**arrays)
-        self._n_steps = int(state["n_steps"])
-
-
-class AdaptiveController:
-    """Drives a worm by the peristalsis network with a descending neuron that sets the rate of its half-centres.
-
-    Order of a step, sensors, kick and activation are those of `annelid.control.SnsController`.
-
-    Raises:
-        ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, or network parameters
-            for which a design rule has no solution.
-    """
-
-    def __init__(
-        self,
-        config: settings.AdaptiveSns,
-        sensor: settings.StretchSensor,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
-    ) -> None:
-        """Builds the controller in its initial state, its descending neuron silent.
-
-        Args:
-            config: Its section of the configuration.
-            sensor: Section of the stretch sensors; their noise is the simulation's business, not used here.
-            n_segments: Segments, at least 3.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-            control_timestep_s: Step of the network, s.
-        """
-        self._config, self._sns = config, config.network
-        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
-        self._n_segments = n_segments
-        self._timestep_s = control_timestep_s
-        self._parameters = PeristalsisParameters(
-            **{field.name: getattr(self._sns, field.name) for field in fields(PeristalsisParameters)}
-        )
-        network = adaptive_peristalsis_network(n_segments, self._parameters, 1e3 * config.drive_time_constant_s)
-        if not control_timestep_s <= config.drive_time_constant_s:
-            raise ConfigError(
-                f"controller.drive_time_constant_s = {config.drive_time_constant_s:g}: must be at least "
-                f"{control_timestep_s:g}, the control timestep"
-            )
-        self._stepper = network.compile(timestep_ms=1e3 * control_timestep_s, scheme=self._sns.scheme)
-        self._sensor = StretchSensor(sensor, n_segments)
-        self.reset(0)
-
-    def reset(self, seed: int) -> None:
-        """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
-        self._state = self._stepper.initial_state(self._sns.gate_start)
-        self._sensor.reset()
-        self._n_steps = 0
-
-    def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step.
-
-        Args:
-            sensation: What the body feels at the beginning of the step; lengths and time are used.
-
-        Returns:
-            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
-        """
-        n = self._n_segments
-        inputs = np.zeros(n + 2)
-        on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, sensation.time_s)
-        inputs[:n] = self._sns.sensor_current_nA * on
-        inputs[n] = self._sns.kick_nA if self._n_steps == 0 else 0.0
-        inputs[n + 1] = self._wanted_drive(sensation) * self._parameters.leak_conductance_uS * self._parameters.range_mV
-        self._stepper.advance(self._state, inputs)
-        self._n_steps += 1
-        return self._segment_activation().repeat(self._muscles_a_segment)
-
-    def _wanted_drive(self, sensation: Sensation) -> float:
-        manual = self._config.drive + self._config.drive_slope_per_s * self._n_steps * self._timestep_s
-        sensory = self._config.stretch_gain_per_m * float(lengthening_m(sensation).mean())
-        return min(max(manual + sensory, 0.0), 1.0)
-
-    def _segment_activation(self) -> Array:
-        by_segment = self._state.potential[0, :-1].reshape(self._n_segments, -1)
-        difference = by_segment[:, 0] - by_segment[:, 1]
-        if self._sns.activation == "linear":
-            reach = self._parameters.range_mV
-            return 0.5 + np.clip(difference, -reach, reach) / (2.0 * reach)
-        return 1.0 / (1.0 + np.exp(-self._sns.activation_slope_per_mV * difference))
-
-    def recordable(self) -> Recordable:
-        """Names potentials, sensors and the drive."""
-        names = [*neuron_names(self._n_segments), DRIVE_NEURON]
-        return Recordable(
-            signals=(
-                Signal("potential", ("neuron",), (len(names),), "mV", "membrane potential relative to rest"),
-                Signal(
-                    "sensor_on",
-                    ("segment",),
-                    (self._n_segments,),
-                    "1",
-                    "stretch sensor during the last control step: 1 while the segment is at rest length",
-                ),
-                Signal("drive", (), (), "1", "activity of the descending neuron"),
-            ),
-            coords={"neuron": names, "segment": list(range(1, self._n_segments + 1))},
-            attrs={
-                "controller": "synthetic nervous system with a descending drive",
-                "conductance_drive_uS": drive_conductance_uS(self._parameters),
-            },
-        )
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
-        potential = self._state.potential[0]
-        drive = min(max(float(potential[-1]) / self._parameters.range_mV, 0.0), 1.0)
-        return {"potential": potential.copy(), "sensor_on": self._sensor.on.astype(np.float64), "drive": drive}
-
-    def get_state(self) -> State:
-        """Returns copies of potentials (mV), gates, sensors and the number of steps taken."""
-        return {
-            "potential": self._state.potential.copy(),
-            "gate": self._state.gate.copy(),
-            "sensor_on": self._sensor.on.copy(),
-            "n_steps": np.array(self._n_steps),
-        }
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._state.potential[...] = state["potential"]
-        self._state.gate[...] = state["gate"]
-        self._sensor.on[...] = state["sensor_on"]
         self._n_steps = int(state["n_steps"])

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
-
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid import config as settings
-from annelid.control.muscles import muscles_a_segment
+from annelid.control.neural import NeuralController, design_of
+from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous.robust import ROLES, RobustParameters, neuron_names, robust_network
-from annelid.protocols import Array, Recordable, Sensation, Signal, State
-
-_CONTRACTION, _EXPANSION = ROLES.index("contraction"), ROLES.index("expansion")
+from annelid.nervous.robust import ROLES, RobustParameters, robust_network
+from annelid.protocols import Array, Recordable, Sensation, Signal, Values
 
 
-class RobustController:
+class RobustController(NeuralController):
     """Drives a worm by `annelid.nervous.robust`.
 
     One step, from t to t + dt: the segments' mean lengthening at t, graded and clipped, drives the stretch neurons
@@ -39,11 +34,7 @@ class RobustController:
             control_timestep_s: Step of the network, s.
         """
         self._config = config
-        self._n_segments = n_segments
-        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
-        self._parameters = RobustParameters(
-            **{field.name: getattr(config, field.name) for field in fields(RobustParameters)}
-        )
+        self._parameters = design_of(RobustParameters, config)
         network = robust_network(n_segments, self._parameters)
         longest_s = network.stable_timestep_ms() / 1e3
         if control_timestep_s > longest_s:
@@ -51,9 +42,16 @@ class RobustController:
                 f"clock.control_timestep_s = {control_timestep_s:g} must be at most {longest_s:.3g}, beyond which the "
                 f"network of {n_segments} segments may be unstable"
             )
-        self._stepper = network.compile(1e3 * control_timestep_s, config.scheme)
+        super().__init__(
+            network,
+            ROLES,
+            n_segments,
+            n_muscles,
+            control_timestep_s,
+            scheme=config.scheme,
+            slope_per_mV=config.activation_slope_per_mV,
+        )
         self._full_nA = config.leak_conductance_uS * config.range_mV
-        self._no_gates = np.full(len(self._stepper.arrays.neurons), np.nan)
         self.reset(0)
 
     def reset(self, seed: int) -> None:
@@ -101,54 +99,32 @@ class RobustController:
             Activation after the last step, as `step` returns it.
         """
         self._stepper.advance(self._state, self._full_nA * self._stretch(sensation), n_steps)
-        by_segment = self._state.potential[0, :-1].reshape(self._n_segments, -1)
-        difference = by_segment[:, _CONTRACTION] - by_segment[:, _EXPANSION]
-        activation = 1.0 / (1.0 + np.exp(-self._config.activation_slope_per_mV * difference))
-        return activation.repeat(self._muscles_a_segment)
+        return self._activation(self._state.potential[0])
 
     def _stretch(self, sensation: Sensation) -> Array:
         """Mean lengthening of every segment over its full scale, in [0, 1], ``(n_segments,)``."""
-        lengthening_m = (sensation.stretch_m - sensation.rest_stretch_m).mean(axis=1)
-        return np.clip(lengthening_m / self._config.full_stretch_m, 0.0, 1.0)
+        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        return np.clip(longer_m / self._config.full_stretch_m, 0.0, 1.0)
 
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and the stretch neurons' activity."""
-        names = neuron_names(self._n_segments)
-        return Recordable(
-            signals=(
-                Signal("potential", ("neuron",), (len(names),), "mV", "membrane potential relative to rest"),
-                Signal(
-                    "sodium_gate",
-                    ("neuron",),
-                    (len(names),),
-                    "1",
-                    "inactivation gate h of the persistent sodium channel; NaN for neurons without one",
-                ),
-                Signal("stretch_activity", ("segment",), (self._n_segments,), "1", "activity of the stretch neuron"),
-            ),
-            coords={"neuron": names, "segment": list(range(1, self._n_segments + 1))},
-            attrs={"controller": "robust synthetic nervous system", "turn_ms": self._parameters.turn_ms},
+        stretch = Signal("stretch_activity", ("segment",), (self._n_segments,), "1", "activity of the stretch neuron")
+        return self._named(
+            self._potential_signal(),
+            self._sodium_gate_signal(),
+            stretch,
+            controller="robust synthetic nervous system",
+            turn_ms=self._parameters.turn_ms,
         )
 
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+    def read(self, frame: bool) -> Values:
         """Reads the signals that `recordable` names; there are none at frame rate."""
         if frame:
             return {}
-        potential = self._state.potential[0]
-        gate = self._no_gates.copy()
-        gate[self._stepper.arrays.channel_neuron] = self._state.gate[0, 0]
-        stretch = potential[:-1].reshape(self._n_segments, -1)[:, ROLES.index("stretch")]
+        potential = self._potential()
+        stretch = potential[self._of_role["stretch"]]
         return {
-            "potential": potential.copy(),
-            "sodium_gate": gate,
+            "potential": potential,
+            "sodium_gate": self._sodium_gate(),
             "stretch_activity": np.clip(stretch / self._parameters.range_mV, 0.0, 1.0),
         }
-
-    def get_state(self) -> State:
-        """Returns copies of potentials (mV) and gates."""
-        return {"potential": self._state.potential.copy(), "gate": self._state.gate.copy()}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._state.potential[...] = state["potential"]
-        self._state.gate[...] = state["gate"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Self
 
@@ -11,12 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import config as settings
-from annelid.control.muscles import muscles_a_segment
-from annelid.control.stretch_sensor import StretchSensor
-from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, neuron_names, peristalsis_network
-from annelid.protocols import Array, Recordable, Sensation, Signal, State
-
-_CONTRACTION, _EXPANSION, _NEURONS_A_SEGMENT = 0, 1, 4
+from annelid.control.neural import PeristalsisController, design_of
+from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, peristalsis_network
+from annelid.protocols import Array, Recordable, Sensation, State, Values
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +43,15 @@ class CopySettings:
         )
 
 
-class SnsController:
+class SnsController(PeristalsisController):
     """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023.
 
     One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
     during the whole step; the activation is read from the potentials at t + dt and drives the body from t on.
     This is the order of the authors' loop. The kick acts during the first step only.
 
-    A segment's activation is a function of its contraction minus its expansion neuron, U1 - U2:
-    ``"sigmoid"``: ``1 / (1 + exp(-slope (U1 - U2)))`` (Riddle et al. 2023, Eq. 2, whose printed exponent has
-    the other sign); ``"linear"``: ``0.5 + clip(U1 - U2, -R, R) / (2 R)`` (Riddle et al. 2022).
+    A segment's activation is that of `annelid.control.neural.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023,
+    ``"linear"`` as in Riddle et al. 2022.
 
     Raises:
         ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, or network
@@ -79,31 +75,15 @@ class SnsController:
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
             control_timestep_s: Step of the network, s.
         """
-        self._config = config
-        self._parameters = PeristalsisParameters(
-            **{field.name: getattr(config, field.name) for field in fields(PeristalsisParameters)}
-        )
-        self._n_segments = n_segments
-        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
-        self._stepper = peristalsis_network(n_segments, self._parameters).compile(
-            timestep_ms=1e3 * control_timestep_s, scheme=config.scheme
-        )
-        self._timestep_s = control_timestep_s
-        self._sensor = StretchSensor(sensor, n_segments)
+        self._parameters = design_of(PeristalsisParameters, config)
+        network = peristalsis_network(n_segments, self._parameters)
+        super().__init__(network, config, sensor, n_segments, n_muscles, control_timestep_s)
         self._own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, config.sensor_current_nA, config.kick_nA)
         drive = (config.sensor_current_nA + config.kick_nA) / config.leak_conductance_uS
         reversals = config.excitatory_reversal_mV, config.sodium_reversal_mV
         self._explicable_mV = config.inhibitory_reversal_mV - drive, max(reversals) + drive
-        self._no_gates = np.full(len(self._stepper.arrays.neurons), np.nan)
         self._batches: dict[int, tuple[Stepper, NetworkState]] = {}
         self._inputs_nA = np.zeros(n_segments + 1)
-        self.reset(0)
-
-    def reset(self, seed: int) -> None:
-        """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
-        self._state = self._stepper.initial_state(self._config.gate_start)
-        self._sensor.reset()
-        self._n_steps = 0
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step.
@@ -129,8 +109,8 @@ class SnsController:
         """
         for n, time_s in self._pieces(self._n_steps, sensation.time_s, n_steps):
             on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, time_s)
-            np.multiply(on, self._config.sensor_current_nA, out=self._inputs_nA[:-1])
-            self._inputs_nA[-1] = self._config.kick_nA if self._n_steps == 0 else 0.0
+            np.multiply(on, self._sns.sensor_current_nA, out=self._inputs_nA[:-1])
+            self._inputs_nA[-1] = self._sns.kick_nA if self._n_steps == 0 else 0.0
             self._stepper.advance(self._state, self._inputs_nA, n)
             self._n_steps += n
         return self._activation(self._state.potential[0])
@@ -196,61 +176,23 @@ class SnsController:
 
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""
-        names = neuron_names(self._n_segments)
-        n_neurons = len(names)
-        return Recordable(
-            signals=(
-                Signal("potential", ("neuron",), (n_neurons,), "mV", "membrane potential relative to rest"),
-                Signal(
-                    "sodium_gate",
-                    ("neuron",),
-                    (n_neurons,),
-                    "1",
-                    "inactivation gate h of the persistent sodium channel; NaN for neurons without one",
-                ),
-                Signal(
-                    "sensor_on",
-                    ("segment",),
-                    (self._n_segments,),
-                    "1",
-                    "stretch sensor during the last control step: 1 while the segment is at rest length",
-                ),
-            ),
-            coords={"neuron": names, "segment": list(range(1, self._n_segments + 1))},
-            attrs={
-                "controller": "synthetic nervous system",
-                **{f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()},
-            },
+        return self._named(
+            self._potential_signal(),
+            self._sodium_gate_signal(),
+            self._sensor_signal(),
+            controller="synthetic nervous system",
+            **{f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()},
         )
 
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+    def read(self, frame: bool) -> Values:
         """Reads the signals that `recordable` names; there are none at frame rate."""
         if frame:
             return {}
-        potential = self._state.potential[0]
-        gate = self._no_gates.copy()
-        gate[self._stepper.arrays.channel_neuron] = self._state.gate[0, 0]
         return {
-            "potential": potential.copy(),
-            "sodium_gate": gate,
-            "sensor_on": self._sensor.on.astype(np.float64),
+            "potential": self._potential(),
+            "sodium_gate": self._sodium_gate(),
+            "sensor_on": self._sensor_on(),
         }
-
-    def get_state(self) -> State:
-        """Returns copies of potentials (mV), gates, sensors and the number of steps taken."""
-        return {
-            "potential": self._state.potential.copy(),
-            "gate": self._state.gate.copy(),
-            "sensor_on": self._sensor.on.copy(),
-            "n_steps": np.array(self._n_steps),
-        }
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._state.potential[...] = state["potential"]
-        self._state.gate[...] = state["gate"]
-        self._sensor.on[...] = state["sensor_on"]
-        self._n_steps = int(state["n_steps"])
 
     def alarm(self) -> str | None:
         """Returns a sentence if a potential has left the range that currents and reversals can explain."""
@@ -281,7 +223,7 @@ class SnsController:
         arrays = self._stepper.arrays
         opening = (potential[:, arrays.terminal_neuron] - arrays.terminal_threshold_mV) * arrays.terminal_slope_per_mV
         pieces = [opening > 0.0, opening > 1.0]
-        if self._config.activation == "linear":
+        if self._sns.activation == "linear":
             activation = self._activation(potential)
             pieces += [activation > 0.0, activation < 1.0]
         return np.concatenate(pieces, axis=1)
@@ -293,16 +235,5 @@ class SnsController:
         if width not in self._batches:
             own = self._stepper
             stepper = Stepper(own.arrays, own.timestep_ms, own.scheme, width)
-            self._batches[width] = stepper, stepper.initial_state(self._config.gate_start)
+            self._batches[width] = stepper, stepper.initial_state(self._sns.gate_start)
         return self._batches[width]
-
-    def _activation(self, potential: Array) -> Array:
-        """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""
-        by_segment = potential.reshape(*potential.shape[:-1], -1, _NEURONS_A_SEGMENT)
-        difference = by_segment[..., _CONTRACTION] - by_segment[..., _EXPANSION]
-        if self._config.activation == "linear":
-            reach = self._parameters.range_mV
-            activation = 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
-        else:
-            activation = 1.0 / (1.0 + np.exp(-self._config.activation_slope_per_mV * difference))
-        return activation if self._muscles_a_segment == 1 else activation.repeat(self._muscles_a_segment, axis=-1)

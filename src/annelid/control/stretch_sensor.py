@@ -6,8 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import config
-from annelid.errors import ConfigError
+from annelid.clock import SLACK_S
+from annelid.errors import require_at_least
 from annelid.protocols import Array
+
+
+def lengthening_m(stretch_m: Array, rest_stretch_m: Array) -> Array:
+    """Returns by how much each segment's mean length exceeds that at rest.
+
+    Args:
+        stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.
+        rest_stretch_m: Their lengths at rest, m, same shape.
+
+    Returns:
+        Lengthening, m, shape ``(.., n_segments)``; the same bits for one worm and for many.
+    """
+    # In one memory layout, whatever that of the lengths: the order of a sum depends on it.
+    return np.subtract(stretch_m, rest_stretch_m, order="C").sum(axis=-1) / stretch_m.shape[-1]
 
 
 class StretchSensor:
@@ -25,12 +40,10 @@ class StretchSensor:
 
     def __init__(self, settings: config.StretchSensor, n_segments: int) -> None:
         """Makes a sensor for ``n_segments`` segments from its section of the configuration."""
-        if n_segments < 1:
-            raise ConfigError(f"n_segments must be at least 1, not {n_segments}")
+        require_at_least(1, n_segments=n_segments)
         self._tolerance_m = settings.tolerance_m
         self._hysteresis_m = settings.hysteresis_m
-        # Half a microsecond of slack: sums of time steps miss the end of the hold by rounding.
-        self._hold_until_s = settings.startup_hold_s - 5e-7
+        self._hold_until_s = settings.startup_hold_s - SLACK_S
         self.on: NDArray[np.bool_] = np.zeros(n_segments, dtype=bool)
 
     def reset(self) -> None:
@@ -75,12 +88,9 @@ class StretchSensor:
         Returns:
             Shape ``(.., n_segments)``.
         """
-        n_sensors = stretch_m.shape[-1]
         tolerance = self._tolerance_m if tolerance_m is None else tolerance_m
         hysteresis = self._hysteresis_m if hysteresis_m is None else hysteresis_m
-        # In one memory layout, whatever that of the lengths: the order of a sum depends on it.
-        excess = np.subtract(stretch_m, rest_stretch_m, order="C").sum(axis=-1) / n_sensors
-        on = excess <= tolerance + hysteresis * before
+        on = lengthening_m(stretch_m, rest_stretch_m) <= tolerance + hysteresis * before
         if self.held_at(time_s):
             on[..., 0] = False
         return on

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from annelid.clock import SLACK_S
 from annelid.config import SineWave, TimedWave
-from annelid.control.muscles import muscles_a_segment
+from annelid.control.open_loop import OpenLoopController
 from annelid.errors import ConfigError
-from annelid.protocols import Array, Recordable, Sensation, State
-
-# Half a microsecond, half the shortest time step: sums of time steps miss the moments of a pattern by rounding.
-_SLACK_S = 5e-7
+from annelid.protocols import Array
 
 
 def sine_activation(wave: SineWave, n_segments: int, time_s: ArrayLike) -> Array:
@@ -54,55 +50,16 @@ def timed_activation(wave: TimedWave, n_segments: int, time_s: ArrayLike) -> Arr
     """
     cycle = timed_cycle_s(wave, n_segments)
     start = np.array([segment * wave.interval_s % cycle for segment in range(n_segments)])
-    start[cycle - start < _SLACK_S] = 0.0
-    since_first = np.asarray(time_s, dtype=float)[..., np.newaxis] - start + _SLACK_S
-    since = np.where(since_first >= 0, since_first % cycle, np.inf) - _SLACK_S
+    start[cycle - start < SLACK_S] = 0.0
+    since_first = np.asarray(time_s, dtype=float)[..., np.newaxis] - start + SLACK_S
+    since = np.where(since_first >= 0, since_first % cycle, np.inf) - SLACK_S
     release = wave.rise_s + wave.hold_s
-    up = since / wave.rise_s if wave.rise_s else (since >= -_SLACK_S).astype(float)
-    down = 1.0 - (since - release) / wave.fall_s if wave.fall_s else (since < release - _SLACK_S).astype(float)
+    up = since / wave.rise_s if wave.rise_s else (since >= -SLACK_S).astype(float)
+    down = 1.0 - (since - release) / wave.fall_s if wave.fall_s else (since < release - SLACK_S).astype(float)
     return wave.level * np.clip(np.minimum(up, down), 0.0, 1.0)
 
 
-class _Wave:
-    """What open-loop waves share: no state, nothing to record, nothing random."""
-
-    name: str
-
-    def __init__(self, activation: Callable[[float], Array], n_segments: int, n_muscles: int) -> None:
-        self._activation = activation
-        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
-
-    def reset(self, seed: int) -> None:
-        """Does nothing: there is no state, and nothing is random."""
-
-    def step(self, sensation: Sensation) -> Array:
-        """Returns the activation of the step that begins now.
-
-        Args:
-            sensation: Its time is used, and nothing else.
-
-        Returns:
-            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
-        """
-        return self._activation(sensation.time_s).repeat(self._muscles_a_segment)
-
-    def recordable(self) -> Recordable:
-        """Names the controller; it has no signals, as its activation is recorded anyway."""
-        return Recordable(attrs={"controller": self.name})
-
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
-        """Reads nothing, as `recordable` names nothing."""
-        return {}
-
-    def get_state(self) -> State:
-        """Returns nothing: the next step depends on time alone."""
-        return {}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned: nothing."""
-
-
-class SineController(_Wave):
+class SineController(OpenLoopController[SineWave]):
     """A sinusoidal wave, open loop: the classical controller that oscillators with feedback are compared with.
 
     Raises:
@@ -111,18 +68,12 @@ class SineController(_Wave):
 
     name = "sine wave"
 
-    def __init__(self, wave: SineWave, n_segments: int, n_muscles: int) -> None:
-        """Builds the controller.
-
-        Args:
-            wave: Its section of the configuration.
-            n_segments: Segments of the worm.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-        """
-        super().__init__(lambda time_s: sine_activation(wave, n_segments, time_s), n_segments, n_muscles)
+    def activation(self, time_s: float) -> Array:
+        """Returns `sine_activation` at a time."""
+        return sine_activation(self._pattern, self._n_segments, time_s)
 
 
-class TimedController(_Wave):
+class TimedController(OpenLoopController[TimedWave]):
     """Segments that take turns by the clock, open loop.
 
     Raises:
@@ -132,18 +83,16 @@ class TimedController(_Wave):
 
     name = "timed wave"
 
-    def __init__(self, wave: TimedWave, n_segments: int, n_muscles: int) -> None:
-        """Builds the controller.
-
-        Args:
-            wave: Its section of the configuration.
-            n_segments: Segments of the worm.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-        """
-        super().__init__(lambda time_s: timed_activation(wave, n_segments, time_s), n_segments, n_muscles)
-        turn, cycle = wave.rise_s + wave.hold_s + wave.fall_s, timed_cycle_s(wave, n_segments)
-        if turn > cycle + _SLACK_S:
+    def __init__(self, pattern: TimedWave, n_segments: int, n_muscles: int) -> None:
+        """Builds the controller from the same as `OpenLoopController`."""
+        super().__init__(pattern, n_segments, n_muscles)
+        turn, cycle = pattern.rise_s + pattern.hold_s + pattern.fall_s, timed_cycle_s(pattern, n_segments)
+        if turn > cycle + SLACK_S:
             raise ConfigError(
                 f"controller.rise_s + hold_s + fall_s = {turn:g}: must be at most {cycle:g} s, the cycle of "
-                f"{n_segments} segments with interval_s = {wave.interval_s:g} and waves = {wave.waves}"
+                f"{n_segments} segments with interval_s = {pattern.interval_s:g} and waves = {pattern.waves}"
             )
+
+    def activation(self, time_s: float) -> Array:
+        """Returns `timed_activation` at a time."""
+        return timed_activation(self._pattern, self._n_segments, time_s)

@@ -53,10 +53,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.errors import ConfigError
+from annelid.nervous.half_centre import add_half_centre
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
 from annelid.nervous.peristalsis import PeristalsisParameters, peristalsis_network
-from annelid.nervous.synapses import Synapse
 
 Array = NDArray[np.float64]
 
@@ -211,12 +211,7 @@ def adaptive_half_centre(parameters: PeristalsisParameters | None = None) -> Net
     """
     p = PeristalsisParameters() if parameters is None else parameters
     network = Network("half-centre under a drive")
-    neuron = Neuron(p.capacitance_nF, p.leak_conductance_uS, channels=(p.sodium_channel,))
-    network.add_neuron("contraction", neuron, p.range_mV)
-    network.add_neuron("expansion", neuron, 0.0)
-    mutual = Synapse(p.conductances.half_centre, p.inhibitory_reversal_mV, 0.0, p.range_mV)
-    network.add_synapse("contraction", "expansion", mutual)
-    network.add_synapse("expansion", "contraction", mutual)
+    add_half_centre(network, "contraction", "expansion", p)
     _add_drive(network, p, ["contraction", "expansion"], p.capacitance_nF / p.leak_conductance_uS)
     network.add_output("contraction", "contraction")
     network.add_output("expansion", "expansion")
@@ -249,7 +244,7 @@ def adaptive_peristalsis_network(
 
 def _add_drive(network: Network, p: PeristalsisParameters, targets: list[str], time_constant_ms: float) -> None:
     network.add_neuron(DRIVE_NEURON, Neuron(time_constant_ms * p.leak_conductance_uS, p.leak_conductance_uS))
-    drive = Synapse(drive_conductance_uS(p), p.excitatory_reversal_mV, 0.0, p.range_mV)
+    drive = p.excitatory(drive_conductance_uS(p))
     for target in targets:
         network.add_synapse(DRIVE_NEURON, target, drive)
     network.add_input("drive", DRIVE_NEURON)

@@ -18,10 +18,10 @@ are named as the neurons that they belong to.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_negative, require_positive
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
 from annelid.nervous.synapses import Synapse
@@ -49,13 +49,12 @@ class Signals:
     inhibitory_mV: float = -40.0
 
     def __post_init__(self) -> None:
-        for name in ("range_mV", "leak_conductance_uS", "capacitance_nF"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, not {getattr(self, name)}")
+        require_positive(
+            range_mV=self.range_mV, leak_conductance_uS=self.leak_conductance_uS, capacitance_nF=self.capacitance_nF
+        )
         if not self.excitatory_mV > self.range_mV:
             raise ConfigError(f"excitatory_mV must be above range_mV = {self.range_mV}, not {self.excitatory_mV}")
-        if not self.inhibitory_mV < 0:
-            raise ConfigError(f"inhibitory_mV must be negative, not {self.inhibitory_mV}")
+        require_negative(inhibitory_mV=self.inhibitory_mV)
 
     @property
     def neuron(self) -> Neuron:
@@ -120,12 +119,8 @@ def addition(
     s = Signals() if signals is None else signals
     if not gains:
         raise ConfigError("gains must have one entry for each term, and there is none")
-    terms = [f"term_{number}" for number in range(1, len(gains) + 1)]
-    synapses = [transmission(gain, s) for gain in gains]
-    target = _signal_neurons("addition", s, terms, "sum", network, prefix)
-    for term, synapse in zip(terms, synapses, strict=True):
-        target.add_synapse(prefix + term, f"{prefix}sum", synapse)
-    return target
+    terms = {f"term_{number}": transmission(gain, s) for number, gain in enumerate(gains, start=1)}
+    return _converging("addition", s, terms, "sum", network, prefix)
 
 
 def subtraction(
@@ -154,10 +149,7 @@ def subtraction(
     """
     s = Signals() if signals is None else signals
     plus, minus = subtraction_synapses(gain, s)
-    target = _signal_neurons("subtraction", s, ("plus", "minus"), "difference", network, prefix)
-    target.add_synapse(f"{prefix}plus", f"{prefix}difference", plus)
-    target.add_synapse(f"{prefix}minus", f"{prefix}difference", minus)
-    return target
+    return _converging("subtraction", s, {"plus": plus, "minus": minus}, "difference", network, prefix)
 
 
 def subtraction_synapses(gain: float = 1.0, signals: Signals | None = None) -> tuple[Synapse, Synapse]:
@@ -196,10 +188,7 @@ def division(
         raise ConfigError(f"ratio must be above 0 and below 1, not {ratio}")
     through = transmission(1.0, s)
     shunt = s.synapse((1.0 / ratio - 1.0) * (s.leak_conductance_uS + through.conductance_uS), 0.0)
-    target = _signal_neurons("division", s, ("dividend", "divisor"), "quotient", network, prefix)
-    target.add_synapse(f"{prefix}dividend", f"{prefix}quotient", through)
-    target.add_synapse(f"{prefix}divisor", f"{prefix}quotient", shunt)
-    return target
+    return _converging("division", s, {"dividend": through, "divisor": shunt}, "quotient", network, prefix)
 
 
 def multiplication(
@@ -234,9 +223,9 @@ def multiplication(
     leak, reach = s.leak_conductance_uS, s.range_mV
     gamma = reach / residue_mV - 1.0
     through = transmission(1.0, s)
-    target = _signal_neurons("multiplication", s, ("factor_1", "factor_2"), "product", network, prefix)
+    factors = {"factor_1": through, "factor_2": None}
+    target = _converging("multiplication", s, factors, "product", network, prefix)
     target.add_neuron(f"{prefix}interneuron", Neuron(s.capacitance_nF, leak, bias_nA=leak * reach), reach)
-    target.add_synapse(f"{prefix}factor_1", f"{prefix}product", through)
     target.add_synapse(f"{prefix}factor_2", f"{prefix}interneuron", s.synapse(gamma * leak, -reach / gamma))
     shunt = s.synapse(gamma * (leak + through.conductance_uS), 0.0)
     target.add_synapse(f"{prefix}interneuron", f"{prefix}product", shunt)
@@ -276,9 +265,7 @@ def differentiation(
         ConfigError: A time that is not positive, a gain that `transmission` refuses, or a name that is taken.
     """
     s = Signals() if signals is None else signals
-    for name, value in (("gain_ms", gain_ms), ("fast_ms", fast_ms)):
-        if not value > 0:
-            raise ConfigError(f"{name} must be positive, not {value}")
+    require_positive(gain_ms=gain_ms, fast_ms=fast_ms)
     plus, minus = subtraction_synapses(amplification, s)
     leak = s.leak_conductance_uS
     target = Network("differentiation") if network is None else network
@@ -323,8 +310,7 @@ def integration(
         ConfigError: A rate that is not positive, or a name that is taken.
     """
     s = Signals() if signals is None else signals
-    if not rate_mV_per_nA_ms > 0:
-        raise ConfigError(f"rate_mV_per_nA_ms must be positive, not {rate_mV_per_nA_ms}")
+    require_positive(rate_mV_per_nA_ms=rate_mV_per_nA_ms)
     leak, reach = s.leak_conductance_uS, s.range_mV
     neuron = Neuron(0.5 / rate_mV_per_nA_ms, leak, bias_nA=leak * reach)
     mutual = s.synapse(-leak * reach / s.inhibitory_mV, s.inhibitory_mV)
@@ -338,14 +324,21 @@ def integration(
     return target
 
 
-def _signal_neurons(
-    title: str, signals: Signals, inputs: Sequence[str], output: str, network: Network | None, prefix: str
+def _converging(
+    title: str,
+    signals: Signals,
+    inputs: Mapping[str, Synapse | None],
+    output: str,
+    network: Network | None,
+    prefix: str,
 ) -> Network:
-    """Adds the neurons that take part in a subnetwork, with an input into each first one and an output of the last."""
+    """Adds neurons with an input each, an output neuron, and the synapses that lead from those to this one."""
     target = Network(title) if network is None else network
     for name in (*inputs, output):
         target.add_neuron(prefix + name, signals.neuron)
-    for name in inputs:
+    for name, synapse in inputs.items():
         target.add_input(prefix + name, prefix + name)
+        if synapse is not None:
+            target.add_synapse(prefix + name, prefix + output, synapse)
     target.add_output(prefix + output, prefix + output)
     return target

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError, require_negative, require_positive, suggest
 from annelid.nervous import design
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Array, Channel, Neuron, persistent_sodium
@@ -60,10 +60,10 @@ class HalfCentre:
     gate_time_constant_ms: float = 300.0
 
     def __post_init__(self) -> None:
-        for field in fields(HalfCentre):
-            value, negative = getattr(self, field.name), field.name == "inhibitory_reversal_mV"
-            if field.name != "bifurcation_mV" and not (value < 0 if negative else value > 0):
-                raise ConfigError(f"{field.name} must be {'negative' if negative else 'positive'}, not {value}")
+        signed = ("bifurcation_mV", "inhibitory_reversal_mV")
+        names = [field.name for field in fields(HalfCentre) if field.name not in signed]
+        require_positive(**{name: getattr(self, name) for name in names})
+        require_negative(inhibitory_reversal_mV=self.inhibitory_reversal_mV)
         held = self.range_mV + self.offset_mV
         for name in ("excitatory_reversal_mV", "sodium_reversal_mV"):
             if not getattr(self, name) > held:

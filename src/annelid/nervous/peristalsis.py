@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from functools import cached_property
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_at_least, require_positive
 from annelid.nervous import design
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
@@ -67,8 +67,7 @@ class PeristalsisParameters(HalfCentre):
     """
 
     def __post_init__(self) -> None:
-        if not self.bifurcation_mV > 0:
-            raise ConfigError(f"bifurcation_mV must be positive, not {self.bifurcation_mV}")
+        require_positive(bifurcation_mV=self.bifurcation_mV)
         super().__post_init__()
 
     @cached_property
@@ -114,8 +113,7 @@ def peristalsis_network(n_segments: int, parameters: PeristalsisParameters | Non
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
     """
-    if n_segments < 3:
-        raise ConfigError(f"n_segments must be at least 3, not {n_segments}")
+    require_at_least(3, n_segments=n_segments)
     p = PeristalsisParameters() if parameters is None else parameters
     g = p.conductances
     leaky = Neuron(p.capacitance_nF, p.leak_conductance_uS)

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_at_least
 
 Array = NDArray[np.float64]
 
@@ -137,8 +137,7 @@ def phase_chain(
     Raises:
         ConfigError: Fewer than 2 body oscillators.
     """
-    if n_body < 2:
-        raise ConfigError(f"n_body must be at least 2, not {n_body}")
+    require_at_least(2, n_body=n_body)
     n = n_body + 2 * limbs
     weight, bias = np.zeros((n, n)), np.zeros((n, n))
     front = np.arange(n_body - 1)

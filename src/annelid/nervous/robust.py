@@ -31,7 +31,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import log, sqrt
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_at_least, require_negative, require_positive
 from annelid.nervous import design
 from annelid.nervous.functional_subnetworks import Signals, transmission
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
@@ -75,11 +75,8 @@ class RobustParameters(HalfCentre):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.bifurcation_mV < 0:
-            raise ConfigError(f"bifurcation_mV must be negative, not {self.bifurcation_mV}")
-        for name in ("turn_ms", "push_nA", "habit_ms"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name} must be positive, not {getattr(self, name)}")
+        require_negative(bifurcation_mV=self.bifurcation_mV)
+        require_positive(turn_ms=self.turn_ms, push_nA=self.push_nA, habit_ms=self.habit_ms)
         if not self.entrainment >= 0:
             raise ConfigError(f"entrainment must not be negative, not {self.entrainment}")
         if not 0.0 < yielding_hold(self, self.push_nA) < 1.0:
@@ -187,8 +184,7 @@ def robust_network(n_segments: int, parameters: RobustParameters | None = None) 
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
     """
-    if n_segments < 3:
-        raise ConfigError(f"n_segments must be at least 3, not {n_segments}")
+    require_at_least(3, n_segments=n_segments)
     p = RobustParameters() if parameters is None else parameters
     network = Network(f"robust peristalsis of {n_segments} segments")
     for segment in range(1, n_segments + 1):

@@ -38,7 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_at_least, require_positive
 
 Array = NDArray[np.float64]
 
@@ -61,10 +61,8 @@ class HeteroclinicRing:
     saddle_value: float = 2.0
 
     def __post_init__(self) -> None:
-        if self.n_nodes < 3:
-            raise ConfigError(f"n_nodes must be at least 3, not {self.n_nodes}")
-        if not self.growth_rate_per_s > 0:
-            raise ConfigError(f"growth_rate_per_s must be positive, not {self.growth_rate_per_s}")
+        require_at_least(3, n_nodes=self.n_nodes)
+        require_positive(growth_rate_per_s=self.growth_rate_per_s)
         if not self.saddle_value > 1:
             raise ConfigError(f"saddle_value must be greater than 1, not {self.saddle_value}: else the ring repels")
 

@@ -11,7 +11,7 @@ from typing import Literal, Self, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 from annelid.nervous.arrays import NetworkArrays
 from annelid.nervous.neurons import Array
 from annelid.nervous.synapses import Modulated
@@ -99,10 +99,8 @@ class Stepper:
     def __init__(self, arrays: NetworkArrays, timestep_ms: float, scheme: Scheme = "euler", n_worms: int = 1) -> None:
         if scheme not in get_args(Scheme):
             raise ConfigError(f"unknown scheme {scheme!r}: {suggest(scheme, get_args(Scheme))}")
-        if not timestep_ms > 0:
-            raise ConfigError(f"timestep_ms must be positive, not {timestep_ms}")
-        if n_worms < 1:
-            raise ConfigError(f"n_worms must be at least 1, not {n_worms}")
+        require_positive(timestep_ms=timestep_ms)
+        require_at_least(1, n_worms=n_worms)
         self.arrays = arrays
         self.timestep_ms = float(timestep_ms)
         self.scheme: Scheme = scheme

@@ -70,13 +70,13 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
         from annelid.control.waves import SineController, TimedController
 
         return SineController(section, *size) if isinstance(section, SineWave) else TimedController(section, *size)
-    from annelid.control import oscillators
+    from annelid.control import AdaptiveController, oscillators
 
     if isinstance(section, HeteroclinicChannel):
         return oscillators.HeteroclinicController(section, *size, timestep_s)
     if isinstance(section, PhaseChain):
         return oscillators.PhaseChainController(section, *size, timestep_s)
-    return oscillators.AdaptiveController(section, config.sensor, *size, timestep_s)
+    return AdaptiveController(section, config.sensor, *size, timestep_s)
 
 
 def as_controller(

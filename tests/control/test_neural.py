@@ -1,0 +1,74 @@
+"""What controllers of a network share: the design of its section, and activation from the right neurons."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from annelid import config as settings
+from annelid.control import AdaptiveController, SnsController
+from annelid.control.neural import design_of
+from annelid.control.robust import RobustController
+from annelid.nervous import PeristalsisParameters
+from annelid.nervous.robust import RobustParameters
+
+Neural = SnsController | AdaptiveController | RobustController
+
+N = 4
+SLOPE_PER_MV, RANGE_MV = 0.1, 15.0
+
+
+def built(kind: str, n_muscles: int = N, **changes: Any) -> Neural:
+    size, sensor = (N, n_muscles, 0.001), settings.StretchSensor()
+    changes |= {"activation_slope_per_mV": SLOPE_PER_MV, "range_mV": RANGE_MV}
+    match kind:
+        case "sns":
+            return SnsController(settings.SnsController(**changes), sensor, *size)
+        case "adaptive":
+            section = settings.AdaptiveSns(network=settings.SnsController(**changes))
+            return AdaptiveController(section, sensor, *size)
+        case _:
+            return RobustController(settings.RobustSns(**changes), *size)
+
+
+def gives(controller: Neural, **potential_mV: list[float]) -> np.ndarray:
+    """Activation at potentials of the named roles; every other neuron is at 7 mV."""
+    names = list(controller.recordable().coords["neuron"])
+    potential = np.full(len(names), 7.0)
+    for role, values in potential_mV.items():
+        for segment, value in enumerate(values, start=1):
+            potential[names.index(f"{role}_{segment}")] = value
+    return controller._activation(potential)
+
+
+@pytest.mark.parametrize("n_muscles", [N, 2 * N])
+@pytest.mark.parametrize("kind", ["sns", "adaptive", "sns-robust"])
+def test_activation_is_the_sigmoid_of_each_segments_half_centre(kind: str, n_muscles: int) -> None:
+    contraction, expansion = [20.0, -3.0, 0.5, 11.0], [1.0, 18.0, 0.5, -40.0]
+    found = gives(built(kind, n_muscles), contraction=contraction, expansion=expansion)
+    expected = 1.0 / (1.0 + np.exp(-SLOPE_PER_MV * (np.array(contraction) - expansion)))
+    assert found == pytest.approx(expected.repeat(n_muscles // N), rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["sns", "adaptive"])
+def test_linear_activation_is_clipped_at_the_range(kind: str) -> None:
+    controller = built(kind, activation="linear")
+    found = gives(controller, contraction=[15.0, 7.5, 0.0, -40.0], expansion=[0.0, 0.0, 7.5, 20.0])
+    assert found == pytest.approx([1.0, 0.75, 0.25, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "section"),
+    [
+        (PeristalsisParameters, settings.SnsController(range_mV=17.0, gate_time_constant_ms=120.0)),
+        (RobustParameters, settings.RobustSns(range_mV=17.0, turn_ms=500.0, bifurcation_mV=-2.0)),
+    ],
+)
+def test_a_design_has_every_parameter_of_its_section(kind: Any, section: Any) -> None:
+    design = design_of(kind, section)
+    default = kind()
+    changed = {name for name in vars(default) if getattr(design, name) != getattr(default, name)}
+    assert changed == set(section.model_fields_set)
+    assert all(getattr(design, name) == getattr(section, name) for name in changed)

@@ -61,7 +61,8 @@ class Lines:
         left, now = self._left(stage, share), self._clock()
         if now - self._last >= LINE_EVERY_S:
             self._last = now
-            self._stream.write(f"{stage}: {_text(done, total, left)}\n")
+            text = _text(done, total, left)
+            self._stream.write(f"{stage}: {text}\n" if text else f"{stage}\n")
             self._stream.flush()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections import defaultdict
 from dataclasses import replace
 from math import isnan, nan
 from pathlib import Path
@@ -162,7 +163,7 @@ def test_a_worm_lighter_than_its_strands_is_refused() -> None:
 
 def test_the_sweeps_meet_at_the_base_worm() -> None:
     """All sweeps share the base worm's runs, and at its value a quantity's fields are the preset's own."""
-    settings = dict.fromkeys((0.5, 2.0), SETTING)
+    settings = defaultdict(lambda: SETTING)
     base = [
         [point for point in sweep_points(quantity, "quick", settings) if point.value == sweeps.BASE[quantity.name]]
         for quantity in QUANTITIES
@@ -254,7 +255,7 @@ def test_the_deficits_to_compare_with() -> None:
 @pytest.fixture
 def readings() -> list[Reading]:
     """Made-up readings of the quick sweeps, with two checks and one problem."""
-    settings = dict.fromkeys((0.5, 2.0), SETTING)
+    settings = defaultdict(lambda: SETTING)
     points = [point for quantity in QUANTITIES for point in sweep_points(quantity, "quick", settings)]
     points += check_points(settings)[:2]
     made = [Reading(point, tuple(read(i, 0.06 / i) for i in point.segments)) for point in points]
@@ -299,7 +300,7 @@ def test_the_tables_say_what_was_found(readings: list[Reading], capsys: pytest.C
     found = Asymmetry((answer, replace(answer, weak=nan)), (13.0, 12.0, 15.0, 13.0), confirmed, (confirmed,))
     console = Console(width=180)
     tables = [sweep_table(readings, QUANTITIES[0]), checks_table(readings), asymmetry_table(found)]
-    for table in [settings_table({2.0: SETTING}), *tables]:
+    for table in [settings_table({sweeps.BASE_KEY: SETTING}), *tables]:
         console.print(table)
     shown = capsys.readouterr().out
     for words in (

@@ -128,7 +128,7 @@ def weak_middle_command(
         sweep_table,
         write_readings,
     )
-    from annelid.studies.weak_middle.sweeps import BASE, QUANTITIES, weak_middle
+    from annelid.studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
     from annelid.view.figures.weak_middle import weak_middle_figure
 
     if output.exists() and not output.is_dir():
@@ -138,7 +138,7 @@ def weak_middle_command(
         with study_progress(quiet=quiet) as progress:
             set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
             if not quick:
-                found = asymmetry(store, set_to[BASE["stiffness"]].force_N, jobs=jobs, progress=progress)
+                found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)
     except KeyboardInterrupt:
         words = ["annelid", "experiment", "weak-middle", "-o", str(output), *(["--quick"] if quick else [])]
         again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
@@ -151,7 +151,6 @@ def weak_middle_command(
             Console().print(table)
     path = output / "weak_middle.csv"
     write_readings([*readings, *(found.readings if found else ())], path)
-    compared = {"robot": robot_deficit(), "the paper's model": papers_deficit()}
-    marks = {f"{name}, {100 * value:.0f} %": value for name, value in compared.items()}
+    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
     for written in (path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))):
         typer.echo(written)

@@ -15,8 +15,8 @@ from annelid.config import load_config
 from annelid.studies.case import CHAIN
 from annelid.studies.weak_middle.asymmetry import Asymmetry
 from annelid.studies.weak_middle.pulls import ACTUATORS
-from annelid.studies.weak_middle.settings import Setting
-from annelid.studies.weak_middle.sweeps import BASE, QUANTITIES, STIFFNESS, Quantity, Reading, deficits
+from annelid.studies.weak_middle.settings import Key, Setting
+from annelid.studies.weak_middle.sweeps import BASE, QUANTITIES, Quantity, Reading, deficits
 from annelid.view.figures.weak_middle import Panel
 from annelid.view.output import whole_file
 
@@ -87,30 +87,28 @@ def panels(readings: Sequence[Reading]) -> list[Panel]:
     """Gathers the sweeps for the figure."""
     return [
         Panel(
+            quantity.title,
             quantity.label,
             BASE[quantity.name],
             {kind: deficits(readings, quantity, kind) for kind in ACTUATORS},
             logarithmic=quantity.name in ("stiffness", "friction"),
+            names={0.0: "weightless"} if quantity.name == "weight" else {},
         )
         for quantity in QUANTITIES
     ]
 
 
-def settings_table(set_to: Mapping[float, Setting]) -> Table:
+def settings_table(set_to: Mapping[Key, Setting]) -> Table:
     """Tabulates how strongly the actuators pull."""
     from rich.table import Table
 
-    table = Table(STIFFNESS.label, title="an end pulled to the robot's elongation")
+    table = Table("worm", "", title="an end pulled to the robot's elongation")
     for heading in ("force limit (N)", "cable wound to (m)", "ring (m)", "muscle's activation"):
         table.add_column(heading, justify="right")
-    for value, one in set_to.items():
-        table.add_row(
-            f"{value:g}",
-            f"{one.force_N:.2f}",
-            f"{one.length_m:.4f}",
-            f"{one.ring_length_m:.4f}",
-            f"{one.activation:.3f}",
-        )
+    labels = {quantity.name: quantity.label for quantity in QUANTITIES}
+    for (name, value), one in set_to.items():
+        numbers = (f"{one.force_N:.2f}", f"{one.length_m:.4f}", f"{one.ring_length_m:.4f}", f"{one.activation:.4f}")
+        table.add_row(labels.get(name, name), f"{value:g}" if name in labels else "", *numbers)
     return table
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
+from typing import Any
 
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.errors import ConfigError
@@ -23,14 +24,17 @@ from annelid.studies.weak_middle.pulls import (
     read_pull,
     servo,
 )
-from annelid.studies.weak_middle.worms import stiffness_changes
 
 END_M = (ROBOT_ELONGATION_M[0] + ROBOT_ELONGATION_M[-1]) / 2
 """An end of the base worm elongates as the robot's two ends do on average, m."""
 GUESSES_M = (0.70, 0.67)
-"""Cable lengths that the search begins with."""
+"""Cable lengths that a search begins with where nothing is known, m."""
 LARGEST_ERROR_M = 0.0003
 ROUNDS = 5
+STAGE = "setting the actuators"
+
+Key = tuple[str, float]
+"""Names a worm: the quantity in which it differs from the base worm, and its value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,43 +60,54 @@ class Setting:
 
 
 def settings(
-    store: Store, stiffnesses_GPa: Sequence[float], jobs: int | None, progress: StudyProgress | None
-) -> dict[float, Setting]:
-    """Sets the actuators for worms of several stiffnesses.
+    store: Store,
+    worms: Mapping[Key, Mapping[str, Any]],
+    guesses_m: Mapping[Key, Sequence[float]],
+    jobs: int | None,
+    progress: StudyProgress | None,
+) -> dict[Key, Setting]:
+    """Sets the actuators for several worms.
 
     A wound length is found at which an end elongates by `END_M`, by secants, which cannot collapse a ring; the tension
     of that cable is the force of the others.
 
+    Args:
+        store: Where runs are kept.
+        worms: Fields in which each worm differs from the base worm, by any key.
+        guesses_m: Cable lengths that the search for each worm begins with, m.
+        jobs: Processes; None for one a core.
+        progress: Called as runs finish.
+
     Returns:
-        A setting for every stiffness, GPa.
+        A setting for every worm.
 
     Raises:
         ConfigError: An end does not come near `END_M`.
         AnnelidError: A run cannot be built or written.
+        KeyboardInterrupt: Finished runs are kept.
     """
-    tried: dict[float, dict[float, Pulled]] = {value: {} for value in stiffnesses_GPa}
-    wanted = {value: list(GUESSES_M) for value in stiffnesses_GPa}
+    tried: dict[Key, dict[float, Pulled]] = {key: {} for key in worms}
+    wanted = {key: list(guesses_m[key]) for key in worms}
+    report = None if progress is None else partial(progress, STAGE)
     for _ in range(ROUNDS):
         cases = {
-            (value, length): pull(1, length_limited(length), stiffness_changes(value))
-            for value, lengths in wanted.items()
+            (key, length): pull(1, length_limited(length), worms[key])
+            for key, lengths in wanted.items()
             for length in lengths
         }
-        report = None if progress is None else partial(progress, "setting the actuators")
         found = store.compute(cases.values(), jobs=jobs, progress=report)
-        for (value, length), case in cases.items():
-            tried[value][length] = read_pull(1, found[case_key(case)])
+        for (key, length), case in cases.items():
+            tried[key][length] = read_pull(1, found[case_key(case)])
         wanted = {
-            value: [next_length(readings)]
-            for value, readings in tried.items()
+            key: [next_length(readings)] if len(readings) > 1 else list(GUESSES_M)
+            for key, readings in tried.items()
             if _error(*nearest(readings)) > LARGEST_ERROR_M
         }
         if not wanted:
-            return {value: _setting(*nearest(readings)) for value, readings in tried.items()}
-    value = next(iter(wanted))
+            return {key: _setting(*nearest(readings)) for key, readings in tried.items()}
+    changes = ", ".join(f"{field} = {value:g}" for field, value in worms[next(iter(wanted))].items())
     raise ConfigError(
-        f"body.strands.young_modulus_Pa = {value * 1e9:g}: no cable length was found at which an end elongates by "
-        f"{100 * END_M:.2f} cm"
+        f"with {changes or 'the preset'} no cable length was found at which an end elongates by {100 * END_M:.2f} cm"
     )
 
 

@@ -17,7 +17,7 @@ from annelid.studies.examination import Effort
 from annelid.studies.progress import StudyProgress
 from annelid.studies.store import Store, case_key
 from annelid.studies.weak_middle.pulls import Actuator, Pulled, preset_body, pull, read_pull
-from annelid.studies.weak_middle.settings import Setting, settings
+from annelid.studies.weak_middle.settings import GUESSES_M, Key, Setting, settings
 from annelid.studies.weak_middle.worms import friction_changes, segment_changes, stiffness_changes, weight_changes
 
 
@@ -26,26 +26,43 @@ class Quantity(NamedTuple):
 
     Attributes:
         name: In one word, for the CSV.
+        title: In a few words, for a panel.
         label: For the axis of a panel and the head of a table, with its unit.
         values: Values of the full study and of the quick one, in that unit.
         changes: Fields of the preset for a value.
     """
 
     name: str
+    title: str
     label: str
     values: Mapping[Effort, tuple[float, ...]]
     changes: Callable[[float], dict[str, Any]]
 
 
-SEGMENTS = Quantity("segments", "number of segments", {"full": (3, 4, 5, 6, 7, 8), "quick": (3, 4)}, segment_changes)
+SEGMENTS = Quantity(
+    "segments",
+    "Length of the worm",
+    "number of segments",
+    {"full": (3, 4, 5, 6, 7, 8), "quick": (3, 4)},
+    segment_changes,
+)
 STIFFNESS = Quantity(
-    "stiffness", "Young's modulus (GPa)", {"full": (0.3, 0.5, 0.8, 1.2, 2.0), "quick": (0.5, 2.0)}, stiffness_changes
+    "stiffness",
+    "Stiffness of the rods",
+    "Young's modulus (GPa)",
+    {"full": (0.3, 0.5, 0.8, 1.2, 2.0), "quick": (0.5, 2.0)},
+    stiffness_changes,
 )
 WEIGHT = Quantity(
-    "weight", "mass of the worm (kg)", {"full": (0.0, 0.77, 1.3, 1.87, 2.4, 3.0), "quick": (0.0, 1.87)}, weight_changes
+    "weight",
+    "Weight",
+    "mass of the worm (kg)",
+    {"full": (0.0, 0.77, 1.3, 1.87, 2.4, 3.0), "quick": (0.0, 1.87)},
+    weight_changes,
 )
 FRICTION = Quantity(
     "friction",
+    "Friction",
     "friction of the ground",
     {"full": (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5), "quick": (0.1, 0.7)},
     friction_changes,
@@ -54,6 +71,7 @@ QUANTITIES = (SEGMENTS, STIFFNESS, WEIGHT, FRICTION)
 """The sweeps. Every one passes through the base worm."""
 BASE = {"segments": 4.0, "stiffness": 2.0, "weight": 1.87, "friction": 0.7}
 """The base worm's values, to the digits in which the sweeps state theirs."""
+BASE_KEY: Key = ("base", 0.0)
 
 CHECKS: Mapping[str, dict[str, Any]] = {
     "half the step": {"clock.control_timestep_s": 0.01, "clock.physics_timestep_s": 0.01},
@@ -152,40 +170,59 @@ def compute(
     ]
 
 
-def sweep_points(quantity: Quantity, effort: Effort, set_to: Mapping[float, Setting]) -> list[Point]:
+def worm_key(quantity: Quantity, value: float) -> Key:
+    """Names the worm that the actuators of a point are set for; longer worms have those of the base worm."""
+    return BASE_KEY if quantity is SEGMENTS or value == BASE[quantity.name] else (quantity.name, value)
+
+
+def sweep_points(quantity: Quantity, effort: Effort, set_to: Mapping[Key, Setting]) -> list[Point]:
     """Returns the points of a sweep.
 
-    Force, cable length and activation are those of the base worm, but in the sweep of stiffness, in which they are
-    set anew for every value.
+    Force, cable length and activation are set anew for every worm, so that an end always elongates alike, but for other
+    numbers of segments, which have those of the base worm. The servo is the preset's everywhere.
 
     Args:
         quantity: What is varied.
         effort: Quick or full.
-        set_to: Settings by stiffness, GPa.
+        set_to: Settings by `worm_key`.
     """
     points = []
     for value in quantity.values[effort]:
-        setting = set_to[value if quantity is STIFFNESS else BASE["stiffness"]]
+        actuators = set_to[worm_key(quantity, value)].actuators().values()
         n_segments = int(value) if quantity is SEGMENTS else preset_body().n_segments
         changes = {} if value == BASE[quantity.name] else quantity.changes(value)
-        points += [Point(quantity.name, value, n_segments, one, changes) for one in setting.actuators().values()]
+        points += [Point(quantity.name, value, n_segments, one, changes) for one in actuators]
     return points
 
 
-def check_points(set_to: Mapping[float, Setting]) -> list[Point]:
+def all_settings(store: Store, effort: Effort, jobs: int | None, progress: StudyProgress | None) -> dict[Key, Setting]:
+    """Sets the actuators for the worms of all sweeps, by `worm_key`; the base worm comes first."""
+    found = settings(store, {BASE_KEY: {}}, {BASE_KEY: GUESSES_M}, jobs, progress)
+    # Under another weight or friction the base worm's length is nearly right; softer rods sag.
+    near = (found[BASE_KEY].length_m,)
+    worms, guesses = {}, {}
+    for quantity in (STIFFNESS, WEIGHT, FRICTION):
+        for value in quantity.values[effort]:
+            key = worm_key(quantity, value)
+            if key != BASE_KEY:
+                worms[key], guesses[key] = quantity.changes(value), GUESSES_M if quantity is STIFFNESS else near
+    return found | settings(store, worms, guesses, jobs, progress)
+
+
+def check_points(set_to: Mapping[Key, Setting]) -> list[Point]:
     """Returns the points at which the resolution is varied: force-limited, at the base and at the greatest weight."""
-    actuator = set_to[BASE["stiffness"]].actuators()["force-limited"]
     heaviest = max(WEIGHT.values["full"])
     return [
         Point(WEIGHT.name, mass, preset_body().n_segments, actuator, {**worm, **resolution}, words)
         for mass, worm in ((BASE["weight"], {}), (heaviest, weight_changes(heaviest)))
+        for actuator in (set_to[worm_key(WEIGHT, mass)].actuators()["force-limited"],)
         for words, resolution in CHECKS.items()
     ]
 
 
 def weak_middle(
     store: Store, effort: Effort, *, jobs: int | None = None, progress: StudyProgress | None = None
-) -> tuple[dict[float, Setting], list[Reading]]:
+) -> tuple[dict[Key, Setting], list[Reading]]:
     """Runs the study.
 
     Args:
@@ -195,13 +232,13 @@ def weak_middle(
         progress: Called as runs finish.
 
     Returns:
-        The settings by stiffness, GPa, and the readings of all sweeps, then of the checks.
+        The settings by `worm_key`, and the readings of all sweeps, then of the checks.
 
     Raises:
         AnnelidError: A run cannot be built or written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    set_to = settings(store, STIFFNESS.values[effort], jobs, progress)
+    set_to = all_settings(store, effort, jobs, progress)
     points = [point for quantity in QUANTITIES for point in sweep_points(quantity, effort, set_to)]
     if effort == "full":
         points += check_points(set_to)

@@ -15,11 +15,17 @@ def segment_changes(n_segments: float) -> dict[str, Any]:
 
 
 def stiffness_changes(young_GPa: float) -> dict[str, Any]:
-    """Fields for a Young's modulus, GPa; the shear modulus keeps its ratio to it."""
+    """Fields for a Young's modulus, GPa.
+
+    Shear modulus and damping keep their ratios to it, so that soft rods come to rest as soon as stiff ones.
+    """
     strands = preset_body().strands
-    ratio = strands.shear_modulus_Pa / strands.young_modulus_Pa
-    young_Pa = young_GPa * 1e9
-    return {"body.strands.young_modulus_Pa": young_Pa, "body.strands.shear_modulus_Pa": round(ratio * young_Pa)}
+    share = young_GPa * 1e9 / strands.young_modulus_Pa
+    return {
+        "body.strands.young_modulus_Pa": young_GPa * 1e9,
+        "body.strands.shear_modulus_Pa": round(share * strands.shear_modulus_Pa),
+        "body.strands.joint_damping_Nms_per_rad": round(share * strands.joint_damping_Nms_per_rad, 6),
+    }
 
 
 def weight_changes(mass_kg: float) -> dict[str, Any]:

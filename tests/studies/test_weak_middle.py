@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections import defaultdict
 from dataclasses import replace
 from math import isnan, nan
@@ -49,7 +50,7 @@ from annelid.studies.weak_middle.results import (
     sweep_table,
     write_readings,
 )
-from annelid.studies.weak_middle.settings import END_M, Setting, next_length
+from annelid.studies.weak_middle.settings import END_M, Setting, next_force, next_length
 from annelid.studies.weak_middle.sweeps import QUANTITIES, Point, Reading, check_points, sweep_points
 from annelid.studies.weak_middle.worms import stiffness_changes, weight_changes
 from annelid.view.figures.muscle_surface import engine_flv, scaled_length
@@ -228,6 +229,19 @@ def test_what_is_read_of_a_pull() -> None:
 def test_the_search_for_a_length_is_exact_for_a_straight_line(slope: float, root: float) -> None:
     readings = {length: read(1, END_M + slope * (length - root)) for length in (root + 0.013, root - 0.021)}
     assert next_length(readings) == pytest.approx(root, abs=0.6e-4)
+
+
+@given(st.floats(0.002, 0.02), st.floats(8.0, 14.0))
+def test_the_search_for_a_force_ends_on_a_straight_line(slope: float, wanted: float) -> None:
+    """Elongation rises by ``slope`` a newton and is right at ``wanted``; a ring collapses three percent above."""
+    readings: dict[float, Pulled] = {}
+    force = round(1.05 * wanted, 2)
+    for _ in range(8):
+        problem = "collapsed" if force > 1.03 * wanted else ""
+        readings[force] = read(1, END_M + slope * (force - wanted), problem)
+        force = next_force(readings)
+        assert force < min((one for one, reading in readings.items() if reading.problem), default=math.inf)
+    assert force == pytest.approx(wanted, abs=0.011)
 
 
 @given(st.lists(st.floats(0.01, 1.0), min_size=2, max_size=6), st.booleans(), st.floats(0, 1))

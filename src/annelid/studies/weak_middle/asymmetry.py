@@ -51,9 +51,9 @@ def spring_changes(stiffness_N_per_m: float) -> dict[str, Any]:
 
 FORCE = Cause("force", "force limit of its servo (N)", (12.0, 12.6, 13.2, 13.8, 14.4, 15.0), lambda _: {})
 CAUSES = (
-    Cause("springs", "rate of the springs (N/m)", (17.0, 20.0, 24.5, 29.0), spring_changes),
-    Cause(WEIGHT.name, "mass of the worm (kg)", WEIGHT.values["full"][1:], weight_changes),
-    Cause(FRICTION.name, FRICTION.label, FRICTION.values["full"], friction_changes),
+    Cause("springs", "rate of the springs (N/m)", (14.0, 17.0, 20.0, 24.5, 29.0, 32.0), spring_changes),
+    Cause(WEIGHT.name, "mass of the worm (kg)", (0.6, *WEIGHT.values["full"][1:]), weight_changes),
+    Cause(FRICTION.name, FRICTION.label, (*FRICTION.values["full"], 2.0), friction_changes),
 )
 """Quantities of the whole worm: what they do is a bound to what the same difference in one segment could do."""
 END_FORCES_N = (12.8, 13.1, 13.4)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
 from typing import Any
@@ -30,7 +30,12 @@ END_M = (ROBOT_ELONGATION_M[0] + ROBOT_ELONGATION_M[-1]) / 2
 GUESSES_M = (0.70, 0.67)
 """Cable lengths that a search begins with where nothing is known, m."""
 LARGEST_ERROR_M = 0.0003
+FORCE_ERROR_M = 0.0015
+"""Largest distance of an end from `END_M` with which a search for a length and for a force is done, m."""
 ROUNDS = 5
+STEP_BACK = 0.015
+SLOPE_M = 0.2
+"""A force is raised by its share of this that the end is to elongate further, before there are two readings, m."""
 STAGE = "setting the actuators"
 
 Key = tuple[str, float]
@@ -44,8 +49,8 @@ class Setting:
     Attributes:
         length_m: Cable of the length-limited actuator, m.
         ring_length_m: Length of the ring that this gives, m.
-        force_N: Tension that it takes: the limit of the force-limited actuator, N.
-        activation: Activation of the muscle that has the same force at the same length.
+        force_N: Limit of the force-limited actuator, N.
+        activation: Activation of the muscle that has the tension of the wound cable at the same length.
     """
 
     length_m: float
@@ -68,8 +73,8 @@ def settings(
 ) -> dict[Key, Setting]:
     """Sets the actuators for several worms.
 
-    A wound length is found at which an end elongates by `END_M`, by secants, which cannot collapse a ring; the tension
-    of that cable is the force of the others.
+    A wound length is found at which an end elongates by `END_M`, by secants, which cannot collapse a ring. The tension
+    of that cable sets the muscle, and the force limit is sought from there.
 
     Args:
         store: Where runs are kept.
@@ -104,11 +109,59 @@ def settings(
             if _error(*nearest(readings)) > LARGEST_ERROR_M
         }
         if not wanted:
-            return {key: _setting(*nearest(readings)) for key, readings in tried.items()}
+            found_settings = {key: _setting(*nearest(readings)) for key, readings in tried.items()}
+            return _with_forces(store, worms, found_settings, jobs, report)
     changes = ", ".join(f"{field} = {value:g}" for field, value in worms[next(iter(wanted))].items())
     raise ConfigError(
         f"with {changes or 'the preset'} no cable length was found at which an end elongates by {100 * END_M:.2f} cm"
     )
+
+
+def _with_forces(
+    store: Store,
+    worms: Mapping[Key, Mapping[str, Any]],
+    found: Mapping[Key, Setting],
+    jobs: int | None,
+    report: Callable[[int, int, float], object] | None,
+) -> dict[Key, Setting]:
+    """Corrects force limits, from the tension of the wound cable on, until an end elongates alike under them.
+
+    An end near `END_M` is close to where a constant force collapses it, and friction holds it differently on the two
+    ways there, so that the tension alone may be a percent too high. Where the search does not end, the force counts
+    that comes nearest.
+    """
+    tried: dict[Key, dict[float, Pulled]] = {key: {} for key in found}
+    wanted = {key: one.force_N for key, one in found.items()}
+    for _ in range(ROUNDS):
+        cases = {key: pull(1, force_limited(force), worms[key]) for key, force in wanted.items()}
+        outcomes = store.compute(cases.values(), jobs=jobs, progress=report)
+        for key, case in cases.items():
+            tried[key][wanted[key]] = read_pull(1, outcomes[case_key(case)])
+        wanted = {
+            key: next_force(readings)
+            for key, readings in tried.items()
+            if _error(*nearest(readings)) > FORCE_ERROR_M and next_force(readings) not in readings
+        }
+        if not wanted:
+            break
+    return {key: replace(one, force_N=nearest(tried[key])[0]) for key, one in found.items()}
+
+
+def next_force(readings: Mapping[float, Pulled]) -> float:
+    """Returns the force, N, to try after these readings: on the secant, or below the least one without a reading."""
+    good = {force: one for force, one in readings.items() if not one.problem}
+    too_high = min((force for force, one in readings.items() if one.problem), default=float("inf"))
+    if not good:
+        return round((1.0 - STEP_BACK) * too_high, 2)
+    force, reading = nearest(good)
+    others = sorted((one for one in good if one != force), key=lambda one: _error(one, good[one]))
+    slope = force / SLOPE_M
+    if others and good[others[0]].elongation_m != reading.elongation_m:
+        slope = (others[0] - force) / (good[others[0]].elongation_m - reading.elongation_m)
+    step = (END_M - reading.elongation_m) * (slope if slope > 0 else force / SLOPE_M)
+    if force + step >= too_high:
+        return round((force + too_high) / 2.0, 2)
+    return round(force + step, 2)
 
 
 def nearest(readings: Mapping[float, Pulled]) -> tuple[float, Pulled]:

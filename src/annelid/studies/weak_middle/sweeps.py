@@ -81,7 +81,9 @@ CHECKS: Mapping[str, dict[str, Any]] = {
         "clock.physics_timestep_s": 0.01,
     },
 }
-"""How the readings change with the resolution, at the base worm and at its greatest weight."""
+"""Resolutions at which some readings are taken again."""
+CHECKED_KG = (0.77, 1.87, 3.0)
+"""Masses of the worms whose readings they are, force-limited."""
 
 
 @dataclass(frozen=True)
@@ -172,14 +174,15 @@ def compute(
 
 def worm_key(quantity: Quantity, value: float) -> Key:
     """Names the worm that the actuators of a point are set for; longer worms have those of the base worm."""
-    return BASE_KEY if quantity is SEGMENTS or value == BASE[quantity.name] else (quantity.name, value)
+    longer = quantity is SEGMENTS and value > BASE[SEGMENTS.name]
+    return BASE_KEY if longer or value == BASE[quantity.name] else (quantity.name, value)
 
 
 def sweep_points(quantity: Quantity, effort: Effort, set_to: Mapping[Key, Setting]) -> list[Point]:
     """Returns the points of a sweep.
 
-    Force, cable length and activation are set anew for every worm, so that an end always elongates alike, but for other
-    numbers of segments, which have those of the base worm. The servo is the preset's everywhere.
+    Force, cable length and activation are set anew for every worm, so that an end always elongates alike, but for
+    longer worms, which have those of the base worm. The servo is the preset's everywhere.
 
     Args:
         quantity: What is varied.
@@ -198,10 +201,10 @@ def sweep_points(quantity: Quantity, effort: Effort, set_to: Mapping[Key, Settin
 def all_settings(store: Store, effort: Effort, jobs: int | None, progress: StudyProgress | None) -> dict[Key, Setting]:
     """Sets the actuators for the worms of all sweeps, by `worm_key`; the base worm comes first."""
     found = settings(store, {BASE_KEY: {}}, {BASE_KEY: GUESSES_M}, jobs, progress)
-    # Under another weight or friction the base worm's length is nearly right; softer rods sag.
+    # Softer rods sag; elsewhere the base worm's length is nearly right.
     near = (found[BASE_KEY].length_m,)
     worms, guesses = {}, {}
-    for quantity in (STIFFNESS, WEIGHT, FRICTION):
+    for quantity in QUANTITIES:
         for value in quantity.values[effort]:
             key = worm_key(quantity, value)
             if key != BASE_KEY:
@@ -210,11 +213,11 @@ def all_settings(store: Store, effort: Effort, jobs: int | None, progress: Study
 
 
 def check_points(set_to: Mapping[Key, Setting]) -> list[Point]:
-    """Returns the points at which the resolution is varied: force-limited, at the base and at the greatest weight."""
-    heaviest = max(WEIGHT.values["full"])
+    """Returns the points at which the resolution is varied: force-limited, at several weights."""
     return [
         Point(WEIGHT.name, mass, preset_body().n_segments, actuator, {**worm, **resolution}, words)
-        for mass, worm in ((BASE["weight"], {}), (heaviest, weight_changes(heaviest)))
+        for mass in CHECKED_KG
+        for worm in ({} if mass == BASE[WEIGHT.name] else weight_changes(mass),)
         for actuator in (set_to[worm_key(WEIGHT, mass)].actuators()["force-limited"],)
         for words, resolution in CHECKS.items()
     ]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.analysis.elongation import elongation, end_difference, middle_deficit
+from annelid.analysis.elongation import elongation, end_difference, interior_deficit, middle_deficit
 from annelid.analysis.forces import contraction_forces
 from annelid.analysis.travel import net_travel, path_travel
 
@@ -57,3 +57,16 @@ def test_net_travel_and_the_way_forth_and_back() -> None:
     assert net_travel(position) == pytest.approx(-0.1)
     assert path_travel(position) == pytest.approx(0.5)
     assert math.isnan(net_travel([]))
+
+
+@given(st.lists(st.floats(0.001, 0.1), min_size=3, max_size=8), st.floats(0.1, 10.0))
+def test_interior_deficit_knows_neither_unit_nor_direction(lengths: list[float], scale: float) -> None:
+    deficit = interior_deficit(lengths)
+    assert interior_deficit([scale * length for length in lengths]) == pytest.approx(deficit, abs=1e-9)
+    assert interior_deficit(lengths[::-1]) == pytest.approx(deficit, abs=1e-9)
+
+
+def test_interior_deficit_is_that_of_the_means() -> None:
+    assert interior_deficit([0.05, 0.03, 0.04, 0.06]) == pytest.approx(1 - 3.5 / 5.5)
+    assert interior_deficit([0.05, 0.02, 0.05]) == pytest.approx(middle_deficit([0.05, 0.02, 0.05]))
+    assert math.isnan(interior_deficit([0.0, 0.01, 0.0]))

@@ -47,3 +47,25 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         Path(folder, file).write_text("mine")
         assert "exists" in annelid(*command, "-o", folder, "--quiet").sentence()
         assert Path(folder, file).read_text() == "mine"
+
+
+def test_the_weak_middle_needs_a_folder(annelid: Command) -> None:
+    Path("taken").write_text("mine")
+    done = annelid("experiment", "weak-middle", "-o", "taken")
+    assert done.exit_code == 2
+    assert "taken is a file" in done.sentence()
+    assert Path("taken").read_text() == "mine"
+
+
+@pytest.mark.slow
+def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
+    first = annelid("experiment", "weak-middle", "--quick", "-o", "weak", "--quiet")
+    assert first.exit_code == 0, first.err
+    assert first.out.splitlines() == [str(Path("weak/weak_middle.csv")), str(Path("weak/weak_middle.png"))]
+    table = Path("weak/weak_middle.csv").read_bytes()
+    runs = {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")}
+    again = annelid("experiment", "weak-middle", "--quick", "-o", "weak")
+    assert again.exit_code == 0, again.err
+    assert "force-limited" in again.out
+    assert Path("weak/weak_middle.csv").read_bytes() == table
+    assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs

@@ -58,6 +58,20 @@ def middle_deficit(elongation_m: ArrayLike) -> float:
     return float(1.0 - values[1:-1].mean() / values[0]) if values[0] > 0 else float("nan")
 
 
+def interior_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below both ends: ``1 - mean(interior) / mean(ends)``.
+
+    Args:
+        elongation_m: Elongation of each segment, m, shape ``(n_segments,)``, at least three.
+
+    Returns:
+        A fraction; NaN where the ends do not elongate.
+    """
+    values = np.asarray(elongation_m, dtype=float)
+    ends = (values[0] + values[-1]) / 2.0
+    return float(1.0 - values[1:-1].mean() / ends) if ends > 0 else float("nan")
+
+
 def end_difference(elongation_m: ArrayLike) -> float:
     """How far the last segment stays below the first: ``1 - last / first``, a fraction (NaN if unmoved)."""
     values = np.asarray(elongation_m, dtype=float)

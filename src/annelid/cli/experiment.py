@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,8 @@ from annelid.cli.common import (
     overrides_of,
     refuse_existing,
 )
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.errors import RunFileError
 
 experiment = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm's body.")
 
@@ -81,3 +84,73 @@ def load_frame_command(
     loops = {config.name: (loop.displacement_m, loop.force_N), "measured": (measured.displacement_m, measured.force_N)}
     for path in (table, load_frame_figure(loops, table.with_suffix(""))):
         typer.echo(path)
+
+
+@experiment.command("weak-middle")
+def weak_middle_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path(
+        "weak-middle"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")] = False,
+) -> None:
+    """Find out why the middle of the worm elongates less than its ends.
+
+    Every segment of a resting worm (preset wang) is pulled alone, wound in and held until it stands still; the deficit
+    is how far the interior segments stay below the two ends, on average. Swept one at a time: number of segments,
+    Young's modulus, weight, friction; each with four kinds of actuators. Force-limited: a servo that stalls at
+    a tension. Servo: the preset's, with its shortest cable. Muscle: the paper's, whose force falls with its length.
+    Length-limited: wound to a length, whatever that takes. Then: which differences between two interior segments would
+    make them elongate as the robot's, 3.82 and 4.78 cm.
+
+    Writes weak_middle.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one
+    goes on. About 250 runs of some seconds each; docs/weak_middle.md explains the results.
+
+    \b
+    annelid experiment weak-middle --quick
+    annelid experiment weak-middle -o weak-middle
+    """
+    from rich.console import Console
+
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+    from annelid.studies.weak_middle.asymmetry import asymmetry
+    from annelid.studies.weak_middle.results import (
+        asymmetry_table,
+        checks_table,
+        panels,
+        papers_deficit,
+        robot_deficit,
+        settings_table,
+        sweep_table,
+        write_readings,
+    )
+    from annelid.studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
+    from annelid.view.figures.weak_middle import weak_middle_figure
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store, found = Store(output / "runs"), None
+    try:
+        with study_progress(quiet=quiet) as progress:
+            set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
+            if not quick:
+                found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "experiment", "weak-middle", "-o", str(output), *(["--quick"] if quick else [])]
+        again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
+        tables += [checks_table(readings), asymmetry_table(found)] if found else []
+        for table in tables:
+            Console().print(table)
+    path = output / "weak_middle.csv"
+    write_readings([*readings, *(found.readings if found else ())], path)
+    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
+    for written in (path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))):
+        typer.echo(written)

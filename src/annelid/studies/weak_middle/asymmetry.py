@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.studies.progress import StudyProgress
 from annelid.studies.store import Store
-from annelid.studies.weak_middle.pulls import force_limited, base_body
+from annelid.studies.weak_middle.pulls import base_body, force_limited
 from annelid.studies.weak_middle.sweeps import (
     FRICTION,
     WEIGHT,

@@ -23,7 +23,7 @@ AUTHORS_MESH: dict[str, Any] = {
     "body.rings.force_limit_N": 13.2,
     "body.rings.speed_limit_m_per_s": 0.2,
 }
-"""The preset with these is the base worm, which all others differ from in one quantity: rods and springs of the authors'
+"""The preset with these is the base worm, which all others change in one quantity: rods and springs of the authors'
 models, none of them tuned to the robot's elongations, and servos of which a single one moves an end as the robot's."""
 RESOLUTION: dict[str, Any] = {
     "clock.control_timestep_s": 0.02,

@@ -34,7 +34,7 @@ def robustness_command(
     """Compare how often controllers walk over a designed sample of worms.
 
     The sample varies sensor noise, friction, physics step, number of segments and stiffness. Every point is walked
-    by the paper's controller and by sns-robust. Writes robustness.json and robustness.md after every few points, and
+    by the paper's controller and by sns-robust. Writes robustness.json and robustness.md after every run, and
     keeps runs, so that a second call goes on where the first was stopped. All 300 points take about 20 hours of one
     core for each controller.
 

@@ -27,7 +27,7 @@ from annelid.analysis.score import DESIGN_INTERVAL_S
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.studies.case import RODS, Case
 from annelid.studies.markdown import table
-from annelid.studies.store import Store, case_key, physics_fingerprint
+from annelid.studies.store import Store, physics_fingerprint
 from annelid.view.output import whole_file
 
 CONTROLLERS = ("sns", "sns-robust")
@@ -219,8 +219,8 @@ def robustness(
     """Walks the first points of the sample under each controller, as far as the folder does not tell how that goes.
 
     Args:
-        folder: Folder of the results; runs go to ``runs`` within it. Written after every few points, so that a stopped
-            study shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
+        folder: Folder of the results; runs go to ``runs`` within it. Written after every run, so that a stopped study
+            shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
         n_points: How many points, in the order drawn.
         controllers: Kinds of controllers, of `CONTROLLERS`.
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
@@ -251,37 +251,34 @@ def robustness(
     }
     missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
     cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
-    total_s = sum(case.cost_s for case in cases.values())
-    store, before_s = Store(folder / "runs"), 0.0
-    lot = TOGETHER * (jobs or os.cpu_count() or 1)
-    for first in range(0, len(missing), lot):
-        keys = missing[first : first + lot]
-        lot_s = sum(cases[key].cost_s for key in keys)
+    store, total_s, before_s = Store(folder / "runs"), sum(case.cost_s for case in cases.values()), 0.0
 
-        share_of = partial(_report, progress, first, len(missing), before_s / total_s, lot_s / total_s)
-        found = store.compute([cases[key] for key in keys], jobs=jobs, progress=share_of)
-        before_s += lot_s
-        for kind, i in keys:
-            run = store.run(cases[kind, i])
-            scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
-            judged[kind, i] = judge(i, chosen[i], kind, *scores, found[case_key(cases[kind, i])].message)
+    def judge_what_is_there() -> None:
+        for (kind, i), case in cases.items():
+            if (kind, i) not in judged and case in store:
+                judged[kind, i] = _judged_run(store, case, i, chosen[i], kind)
         _write(_sorted(judged), folder)
+
+    def tell(lot_s: float, _: int, __: int, share: float) -> None:
+        judge_what_is_there()
+        if progress is not None:
+            done = sum(key in judged for key in cases)
+            progress("robustness", done, len(cases), (before_s + share * lot_s) / total_s)
+
+    in_order = list(cases.values())
+    size = TOGETHER * (jobs or os.cpu_count() or 1)
+    for lot in (in_order[first : first + size] for first in range(0, len(in_order), size)):
+        lot_s = sum(case.cost_s for case in lot)
+        store.compute(lot, jobs=jobs, progress=partial(tell, lot_s))
+        before_s += lot_s
     return _sorted(judged)
 
 
-def _report(
-    progress: Progress | None,
-    before: int,
-    total: int,
-    share_before: float,
-    share_of_lot: float,
-    done: int,
-    _: int,
-    share: float,
-) -> None:
-    """Tells how far the study has come, from how far a lot of its runs has."""
-    if progress is not None:
-        progress("robustness", before + done, total, share_before + share * share_of_lot)
+def _judged_run(store: Store, case: Case, number: int, point: Point, controller: str) -> Judged:
+    """Judges a point whose run the store has."""
+    run = store.run(case)
+    scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+    return judge(number, point, controller, *scores, store[case].message)
 
 
 def read_judged(folder: Path) -> list[Judged]:

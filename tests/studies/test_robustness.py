@@ -12,7 +12,7 @@ import pytest
 from annelid.analysis.score import RhythmScore
 from annelid.errors import ConfigError, RunFileError
 from annelid.studies import robustness as study
-from annelid.studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, wilson
+from annelid.studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, shares_table, wilson
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
 
@@ -154,3 +154,15 @@ def test_damaged_results_are_refused(tmp_path: Path) -> None:
 def test_an_unknown_controller_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="unknown controller 'shc'"):
         study.robustness(tmp_path, 1, controllers=["shc"])
+
+
+@pytest.mark.parametrize("folder", ["drawn", "three_segments"])
+def test_the_committed_results_are_of_the_sample_and_can_be_gone_on_from(folder: str) -> None:
+    place = Path(__file__).parents[2] / "docs" / "robustness" / folder
+    judged, sample = study.read_judged(place), points()
+    assert judged
+    assert len({(one.controller, one.point) for one in judged}) == len(judged)
+    for one in judged:
+        assert one.n_segments == (sample[one.point].n_segments if folder == "drawn" else 3)
+        assert one.walked or not one.in_time
+    assert (place / "robustness.md").read_text() == shares_table(shares(judged)) + "\n"

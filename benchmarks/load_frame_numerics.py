@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import load_config
-from annelid.studies.calibration.fit import SHEAR_PER_YOUNG, places
+from annelid.studies.calibration.fit import places
 from annelid.studies.calibration.frame import load_frame
 from annelid.studies.calibration.loop import cable_force, read_loop
 from annelid.studies.calibration.report import EQUAL_STIFFNESS
+from annelid.studies.case import SHEAR_OVER_YOUNG
 
 YOUNG_MODULUS_PA, DRY_FRICTION_NM, CABLE_FRICTION = 0.437e9, 0.0083, 2.15
 """About those of the default fit."""
 WORM = EQUAL_STIFFNESS | {
     "body.strands.young_modulus_Pa": YOUNG_MODULUS_PA,
-    "body.strands.shear_modulus_Pa": SHEAR_PER_YOUNG * YOUNG_MODULUS_PA,
+    "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG * YOUNG_MODULUS_PA,
     "body.joints.dry_friction_Nm": DRY_FRICTION_NM,
 }
 CASES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {

@@ -78,11 +78,6 @@ def scores(
     return [score(time_s, trace[:, copy]) for copy in range(n_copies)]
 
 
-def is_wave(found: RhythmScore) -> bool:
-    """Whether the rhythm is one wave from front to rear."""
-    return found.verdict == "ordered" and found.direction == 1 and found.wave_fronts == 1
-
-
 def relative_period(found: RhythmScore, n_segments: int) -> float:
     """Period over the design's, nan without one."""
     return np.nan if found.period_s is None else found.period_s / (n_segments * DESIGN_INTERVAL_S)
@@ -95,7 +90,7 @@ def show(title: str, network_of: Callable[[int], Network], sizes: tuple[int, ...
         for n in sizes:
             signal = signals(n_copies, n, np.random.default_rng(n))[name]
             found = scores(network_of(n), n, signal, n_copies, seed=n + 1)
-            periods = np.array([relative_period(one, n) for one in found if is_wave(one)])
+            periods = np.array([relative_period(one, n) for one in found if one.is_one_wave])
             in_time = int((np.abs(periods - 1.0) <= IN_TIME).sum())
             silent = sum(one.verdict == "silent" for one in found)
             reach = f"{periods.min():.3f} .. {periods.max():.3f}" if len(periods) else ""

@@ -22,7 +22,6 @@ from annelid.studies.examinations.ranges import EQUAL, RANGES, compiled_ranges
 from annelid.studies.examinations.side_by_side import (
     held_elongation,
     in_unit,
-    is_the_papers_wave,
     listed,
     rhythm_words,
     span,
@@ -179,9 +178,9 @@ def test_rhythms_in_words():
     assert rhythm_words(WAVE) == "1-2-3, 2.63 s"
     assert rhythm_words(backwards) == "3-2-1, 2 fronts, 2.63 s"
     assert rhythm_words(replace(WAVE, verdict=None)) == "too short to tell"
-    assert is_the_papers_wave(WAVE)
-    assert not is_the_papers_wave(backwards)
-    assert not is_the_papers_wave(SILENT)
+    assert WAVE.is_one_wave
+    assert not backwards.is_one_wave
+    assert not SILENT.is_one_wave
 
 
 def test_numbers_in_words():

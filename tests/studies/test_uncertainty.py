@@ -267,7 +267,7 @@ errors = st.one_of(st.none(), st.floats(0.0, 1e6))
 def quantity(
     value: float | None, parameters: float | None, time_step: float | None, elements: float | None
 ) -> Quantity:
-    return Quantity("q", "q", "m", value, parameters, time_step, elements, None, 8, "cm", 100.0, 2)
+    return Quantity("q", "q", "m", value, "cm", 100.0, 2, parameters, time_step, elements, None, 8)
 
 
 @given(errors, errors, errors)

@@ -74,6 +74,11 @@ class RhythmScore:
     mean_contracted: float
     last_onset_s: float | None
 
+    @property
+    def is_one_wave(self) -> bool:
+        """Whether segments contract in order, in one wave from front to rear."""
+        return self.verdict == "ordered" and self.direction == 1 and self.wave_fronts == 1
+
 
 def rhythm_score(run: Run, after_s: float = 0.0) -> RhythmScore:
     """Scores the rhythm of a run as `score` does.

@@ -17,6 +17,9 @@ PLANAR = "riddle2022-planar"
 PAPERS_MESH = {"body.mesh.elements_per_side": 3, "body.formulation.solver_tolerance": 1e-6}
 """How the rods are compared with the chain; their preset has a coarser mesh and solves less sharply."""
 
+SHEAR_OVER_YOUNG = 1.0 / 1.5
+"""G/E of the paper's strands (0.2 and 0.3 GPa) and of the authors' later model's (1.33 and 2 GPa)."""
+
 HOLD_S, REST_S = 0.8, 0.4
 """In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
 

@@ -25,7 +25,7 @@ import numpy as np
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.studies.case import RODS, Case
+from annelid.studies.case import RODS, SHEAR_OVER_YOUNG, Case
 from annelid.studies.markdown import table
 from annelid.studies.store import Store, physics_fingerprint
 from annelid.view.output import whole_file
@@ -43,8 +43,6 @@ STARTS = ("design", "silent", "random")
 TOGETHER = 8
 """Points computed as one lot for each process, so that no process waits long for the lot's last run."""
 PERIOD_TOLERANCE = 0.1
-SHEAR_OVER_YOUNG = 2.0 / 3.0
-"""The paper's ratio of the strands' shear and Young's moduli."""
 
 Progress = Callable[[str, int, int, float], object]
 """Called with the stage, the number of points done, their total, and the share of the work that is done."""
@@ -191,7 +189,7 @@ def judge(
         lengthening: The score of its segments' lengthening.
         message: Why the run ended before its time; empty if it did not.
     """
-    walked = not message and _is_one_wave(rhythm)
+    walked = not message and rhythm.is_one_wave
     period = rhythm.period_s
     return Judged(
         point=number,
@@ -201,7 +199,7 @@ def judge(
         period_s=period,
         walked=walked,
         in_time=walked and period is not None and abs(period / point.design_period_s - 1.0) <= PERIOD_TOLERANCE,
-        lengthened=not message and _is_one_wave(lengthening),
+        lengthened=not message and lengthening.is_one_wave,
         code=physics_fingerprint(),
     )
 
@@ -343,10 +341,6 @@ def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
     ]
     head = ["controller", "points", "walked 1-2-..-N", "in time: within 10 % of the period", "and so lengthened"]
     return table([*head, "share in time (%)"], rows)
-
-
-def _is_one_wave(found: RhythmScore) -> bool:
-    return found.verdict == "ordered" and found.direction == 1 and found.wave_fronts == 1
 
 
 def _sorted(judged: Mapping[tuple[str, int], Judged]) -> list[Judged]:

@@ -22,9 +22,8 @@ from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.morphology import Array
 from annelid.studies.calibration.frame import load_frame
 from annelid.studies.calibration.loop import Loop, cable_force
+from annelid.studies.case import SHEAR_OVER_YOUNG
 
-SHEAR_PER_YOUNG = 1.0 / 1.5
-"""G/E of the paper (0.2 and 0.3 GPa) and of the authors' later model (1.33 and 2 GPa)."""
 SPACINGS, N_FORCES = 22, 20
 """The measured way is divided evenly; forces are compared at so many of the divisions, on each way."""
 STEP = 0.04
@@ -65,7 +64,7 @@ PARAMETERS = {
             5e9,
             lambda value: {
                 "body.strands.young_modulus_Pa": value,
-                "body.strands.shear_modulus_Pa": value * SHEAR_PER_YOUNG,
+                "body.strands.shear_modulus_Pa": value * SHEAR_OVER_YOUNG,
             },
         ),
         Parameter("dry_friction", "N m", 0.01, 1e-4, 0.2, lambda value: {"body.joints.dry_friction_Nm": value}),

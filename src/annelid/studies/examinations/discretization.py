@@ -22,7 +22,6 @@ from annelid.studies.examinations.side_by_side import (
     held_elongation,
     in_percent,
     in_unit,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -195,7 +194,7 @@ def _convergence_in_words(found: Convergence) -> str:
 
 
 def _walks_in_words(walks: Sequence[tuple[int, Outcome]]) -> str:
-    good = [(n, outcome) for n, outcome in walks if is_the_papers_wave(outcome.rhythm)]
+    good = [(n, outcome) for n, outcome in walks if outcome.rhythm.is_one_wave]
     bad = [f"{n} ({outcome.rhythm.verdict or 'too short to tell'})" for n, outcome in walks if (n, outcome) not in good]
     if not good:
         return f"In closed loop none of {listed([str(n) for n, _ in walks])} elements walks 1-2-3."
@@ -303,7 +302,7 @@ def _draw(held_runs: Sequence[Convergence], walks: Sequence[tuple[int, Outcome]]
         counts = [n for n, _ in walks]
         draw_segments(right, counts, CM * elongations, marker=TIGHT.marker, linestyle=TIGHT.line)
         for (n, outcome), values in zip(walks, elongations, strict=True):
-            if not is_the_papers_wave(outcome.rhythm):
+            if not outcome.rhythm.is_one_wave:
                 right.plot([n] * len(values), CM * values, linestyle="none", marker="x", color="black", markersize=8.0)
         right.set(xscale="log", xlabel="elements per rhombus side", ylabel="largest elongation (cm)")
         _ticks(right, counts)

@@ -25,7 +25,6 @@ from annelid.studies.examinations.side_by_side import (
     held_elongation,
     in_cm,
     in_percent,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -128,9 +127,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             numbers[f"travel_friction_{friction:g}_{name}_m"] = kept(series.travel_m[i])
             numbers[f"deficit_closed_mean_friction_{friction:g}_{name}"] = kept(series.deficit[i])
             numbers[f"verdict_friction_{friction:g}_{name}"] = rhythm_words(series.outcomes[i].rhythm)
-        walk = [
-            f"{f:g}" for f, o in zip(series.frictions, series.outcomes, strict=True) if is_the_papers_wave(o.rhythm)
-        ]
+        walk = [f"{f:g}" for f, o in zip(series.frictions, series.outcomes, strict=True) if o.rhythm.is_one_wave]
         numbers[f"frictions_that_walk_{name}"] = listed(walk)
     for name, (slippery, rough) in held.items():
         numbers[f"deficit_open_mean_friction_{SLIPPERY:g}_{name}"] = kept(slippery)
@@ -179,8 +176,8 @@ def _remarks(every: Sequence[_Series], solved: Sequence[tuple[float, float, floa
     remarks = []
     for series in every:
         pairs = list(zip(series.frictions, series.outcomes, strict=True))
-        walk = [f"{f:g}" for f, o in pairs if is_the_papers_wave(o.rhythm)]
-        fail = [f"{f:g} ({rhythm_words(o.rhythm)})" for f, o in pairs if not is_the_papers_wave(o.rhythm)]
+        walk = [f"{f:g}" for f, o in pairs if o.rhythm.is_one_wave]
+        fail = [f"{f:g} ({rhythm_words(o.rhythm)})" for f, o in pairs if not o.rhythm.is_one_wave]
         sentence = f"{capitalised(series.worm.label)}: order 1-2-3 at friction {listed(walk)}"
         remarks.append(
             sentence + (f"; not at {listed(fail)}." if fail else "; no other was tried." if len(pairs) == 1 else ".")

@@ -22,7 +22,6 @@ from annelid.studies.examinations.side_by_side import (
     TIGHT,
     capitalised,
     in_unit,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -133,7 +132,7 @@ def _of_start(beats: Mapping[tuple[str, str], Beat], start: str) -> list[Beat]:
 
 
 def _walks(beat: Beat) -> bool:
-    return is_the_papers_wave(beat.outcome.rhythm)
+    return beat.outcome.rhythm.is_one_wave
 
 
 def _starts_in_words(beats: Beats) -> str:

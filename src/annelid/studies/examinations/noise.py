@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,6 @@ from annelid.studies.examinations.side_by_side import (
     Worm,
     capitalised,
     in_percent,
-    is_the_papers_wave,
     listed,
     rhythm_kind,
     rhythm_words,
@@ -40,6 +40,7 @@ EVEN = 0.9
 
 Cells = Mapping[tuple[float, float], Sequence[RhythmScore]]
 """The runs of each (tolerance, noise), both in m."""
+ONE_WAVE: Callable[[RhythmScore], bool] = attrgetter("is_one_wave")
 
 
 @dataclass(frozen=True)
@@ -103,24 +104,22 @@ def read_cells(chart: NoiseMap, results: Results) -> Cells:
 
 def is_even(score: RhythmScore) -> bool:
     """Tells whether a rhythm is the paper's wave and does not limp."""
-    return is_the_papers_wave(score) and score.regularity is not None and score.regularity >= EVEN
+    return score.is_one_wave and score.regularity is not None and score.regularity >= EVEN
 
 
-def steady_tolerances(
-    cells: Cells, noise_m: float, wanted: Callable[[RhythmScore], bool] = is_the_papers_wave
-) -> list[float]:
+def steady_tolerances(cells: Cells, noise_m: float, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> list[float]:
     """Returns the tolerances at which every run with this noise has the wanted rhythm, m, rising."""
     return sorted(
         tolerance for (tolerance, noise), scores in cells.items() if noise == noise_m and all(map(wanted, scores))
     )
 
 
-def handled_noise(cells: Cells, wanted: Callable[[RhythmScore], bool] = is_the_papers_wave) -> float | None:
+def handled_noise(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> float | None:
     """Returns the largest noise at which some tolerance has the wanted rhythm in every run, m; None if none has."""
     return max((noise for _, noise in cells if steady_tolerances(cells, noise, wanted)), default=None)
 
 
-def share(cells: Cells, wanted: Callable[[RhythmScore], bool] = is_the_papers_wave) -> float:
+def share(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> float:
     """Returns the share of runs with the wanted rhythm, averaged over the cells."""
     return float(np.mean([np.mean([wanted(score) for score in scores]) for scores in cells.values()]))
 
@@ -181,7 +180,7 @@ def examine(results: Results, effort: Effort, stem: Path) -> Findings:
         numbers[f"even_share_{name}"] = share(compared[name], is_even)
         numbers[f"runs_{name}"] = float(sum(map(len, cells.values())))
     if effort == "full":
-        walking = [is_the_papers_wave(results[case].rhythm) for case in NOISY_AT_THE_PAPERS_STEP]
+        walking = [results[case].rhythm.is_one_wave for case in NOISY_AT_THE_PAPERS_STEP]
         numbers["walking_share_noisy_papers_step"] = sum(walking) / len(walking)
     return Findings(
         answer=" ".join(
@@ -325,7 +324,7 @@ def _step_in_words(results: Results) -> str:
         for tolerance, case in AT_THE_PAPERS_STEP.items()
     ]
     noisy = [results[case].rhythm for case in NOISY_AT_THE_PAPERS_STEP]
-    walking = sum(map(is_the_papers_wave, noisy))
+    walking = sum(map(ONE_WAVE, noisy))
     noise_m = NOISY_AT_THE_PAPERS_STEP[0].config.sensor.noise_m
     return (
         "The chain's map is of steps of 2 ms. At the paper's step of 1 ms and without noise its rhythm is "
@@ -354,7 +353,7 @@ def _table(read: Sequence[tuple[NoiseMap, Cells]]) -> Table:
             if not scores:
                 continue
             kinds = Counter(map(rhythm_kind, scores))
-            walks = [score for score in scores if is_the_papers_wave(score)]
+            walks = [score for score in scores if score.is_one_wave]
             regularities = [score.regularity for score in walks if score.regularity is not None]
             periods = [score.period_s for score in walks if score.period_s is not None]
             rows.append(
@@ -432,7 +431,7 @@ def _draw_map(axes: Axes, cells: Cells, tolerances: Sequence[float], noises: Seq
 
 
 def _cell_text(scores: Sequence[RhythmScore]) -> str:
-    walks = [score for score in scores if is_the_papers_wave(score)]
+    walks = [score for score in scores if score.is_one_wave]
     text = f"{len(walks)}/{len(scores)}"
     regularities = [score.regularity for score in walks if score.regularity is not None]
     return f"{text}\n{np.mean(regularities):.2f}".replace("\n0.", "\n.") if regularities else text

@@ -28,7 +28,6 @@ from annelid.studies.examinations.side_by_side import (
     in_cm,
     in_percent,
     in_unit,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -186,8 +185,8 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     paper_m, tight_m = chains.elongation_m[0, 0], tight.elongation_m[0, 0]
     last = sprung.elongation_m[-1, 0]
     undamped_m = float(held_elongation(results[_UNDAMPED_TIGHT])[0])
-    ordered = [f"{k:g}" for k, outcome in walking if is_the_papers_wave(outcome.rhythm)]
-    others = [f"{k:g} ({rhythm_kind(o.rhythm)})" for k, o in walking if not is_the_papers_wave(o.rhythm)]
+    ordered = [f"{k:g}" for k, outcome in walking if outcome.rhythm.is_one_wave]
+    others = [f"{k:g} ({rhythm_kind(o.rhythm)})" for k, o in walking if not o.rhythm.is_one_wave]
     at_paper = _at(chains.stiffness[0], sprung)
     answer = (
         f"The paper's pins give like springs of {chains.stiffness[0]:.0f} N/m: with segment 1 held contracted, strands "

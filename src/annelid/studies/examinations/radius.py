@@ -26,7 +26,6 @@ from annelid.studies.examinations.side_by_side import (
     in_cm,
     in_percent,
     in_unit,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -110,7 +109,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         for series in varied
     ]
     fates = [f"{series.worm.label}: {rhythm_words(series.outcomes[-1].rhythm)}" for series in varied]
-    walks = [series for series in varied if is_the_papers_wave(series.outcomes[-1].rhythm)]
+    walks = [series for series in varied if series.outcomes[-1].rhythm.is_one_wave]
     verdict = (
         "all keep the order 1-2-3"
         if len(walks) == len(varied)

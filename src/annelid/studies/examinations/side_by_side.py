@@ -150,11 +150,6 @@ def span(values: Sequence[float], scale: float = 1.0, digits: int = 0) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def is_the_papers_wave(score: RhythmScore) -> bool:
-    """Tells whether a rhythm is the paper's: one wave from front to rear."""
-    return score.verdict == "ordered" and score.direction == 1 and score.wave_fronts == 1
-
-
 def rhythm_words(score: RhythmScore) -> str:
     """Says what a rhythm is, for a table: ``1-2-3, 2.63 s``, ``disordered``, ``silent after 0.74 s``."""
     if score.verdict == "ordered":
@@ -183,7 +178,7 @@ _RHYTHMS: dict[str, dict[str, Any]] = {
 def rhythm_kind(score: RhythmScore) -> str:
     """Names the kind of a rhythm, as the legend of `draw_rhythms` does."""
     if score.verdict == "ordered":
-        return "1-2-3" if is_the_papers_wave(score) else "other order"
+        return "1-2-3" if score.is_one_wave else "other order"
     return score.verdict or "too short"
 
 

@@ -21,7 +21,6 @@ from annelid.studies.examinations.side_by_side import (
     in_cm,
     in_percent,
     in_unit,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -79,8 +78,8 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         numbers[f"verdict_{kind}"] = rhythm_words(walk.outcome.rhythm)
         numbers[f"elongation_first_{kind}_m"] = kept(walked_elongation(walk.outcome, first_helix=True)[0])
         numbers[f"undershoot_{kind}_m"] = kept(-walk.shortest_m.min())
-    kept_order = [only for _, only in pairs if is_the_papers_wave(only.outcome.rhythm)]
-    lost_order = [only for _, only in pairs if not is_the_papers_wave(only.outcome.rhythm)]
+    kept_order = [only for _, only in pairs if only.outcome.rhythm.is_one_wave]
+    lost_order = [only for _, only in pairs if not only.outcome.rhythm.is_one_wave]
     sentences = []
     if kept_order:
         sentences.append(

@@ -26,7 +26,6 @@ from annelid.studies.examinations.side_by_side import (
     in_cm,
     in_percent,
     in_unit,
-    is_the_papers_wave,
     kept,
     legend_below,
     listed,
@@ -193,8 +192,8 @@ def _ms(step_s: float) -> str:
 
 
 def _walks_in_words(stepping: Stepping, row: Sequence[tuple[float, Outcome]]) -> str:
-    good = [(step, outcome) for step, outcome in row if is_the_papers_wave(outcome.rhythm)]
-    bad = [f"{_fate(outcome)} at {_ms(step)} ms" for step, outcome in row if not is_the_papers_wave(outcome.rhythm)]
+    good = [(step, outcome) for step, outcome in row if outcome.rhythm.is_one_wave]
+    bad = [f"{_fate(outcome)} at {_ms(step)} ms" for step, outcome in row if not outcome.rhythm.is_one_wave]
     label = capitalised(stepping.label)
     if not good:
         return f"{label}: no walk ({listed(bad)})."
@@ -268,7 +267,7 @@ def _settling_in_words(starts: Starts) -> str:
 def _speed_in_words(walks: Walks) -> str:
     best = []
     for stepping, row in walks:
-        good = [pair for pair in row if is_the_papers_wave(pair[1].rhythm)]
+        good = [pair for pair in row if pair[1].rhythm.is_one_wave]
         if good:
             step, outcome = max(good, key=lambda pair: pair[0])
             factor = in_unit(outcome.summary.real_time_factor, digits=2)
@@ -284,7 +283,7 @@ def _numbers(walks: Walks, starts: Starts) -> dict[str, float | str | None]:
     names = {id(RK4): "chain_rk4", id(EULER): "chain_euler", id(SOFT): "fast", id(HARD): "rods"}
     for stepping, row in walks:
         name = names[id(stepping)]
-        good = [step for step, outcome in row if is_the_papers_wave(outcome.rhythm)]
+        good = [step for step, outcome in row if outcome.rhythm.is_one_wave]
         numbers[f"largest_walking_step_{name}_s"] = max(good, default=None)
         for step, outcome in row:
             tag = f"{name}_{_ms(step)}ms"
@@ -373,7 +372,7 @@ def _draw_walks(axes: Axes, stepping: Stepping, row: Sequence[tuple[float, Outco
     values = [CM * float(walked_elongation(outcome)[0]) for _, outcome in row]
     axes.plot(steps, values, **_look(stepping))
     for x, y, (_, outcome) in zip(steps, values, row, strict=True):
-        if not is_the_papers_wave(outcome.rhythm):
+        if not outcome.rhythm.is_one_wave:
             axes.plot([x], [y], linestyle="none", marker="x", color="black", markersize=9.0)
 
 

@@ -7,42 +7,30 @@ from dataclasses import dataclass
 from math import log2, sqrt
 from statistics import stdev
 
+from annelid.studies.uncertainty.readings import Reading
+
 NOT_CONVERGED = 0.5
 """Numerical error, of the value, above which a quantity does not count as converged."""
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
-    """One number of a run with its error bars, all in ``unit``; None for what cannot be told.
+class Quantity(Reading):
+    """A number of the run itself with its error bars, all in ``unit``; None for what cannot be told.
 
     Attributes:
-        name: Field of the summary, with the segment behind a point where it has one a segment.
-        label: What it is called.
-        unit: Unit of value and errors.
-        value: Of the run itself.
         parameters: Sample standard deviation over the drawn worms.
         time_step: Largest difference between the run and one of finer steps.
         discretization: Largest difference between the run and one of more elements.
         order: Order in which the value converges with the step, from two halvings; None unless both change it the
             same way.
         n_drawn: Number of drawn worms that it was read in.
-        shown_unit: Unit in which it is shown.
-        factor: What the value is multiplied by for that.
-        digits: Digits behind the point where there is no error to tell them from.
     """
 
-    name: str
-    label: str
-    unit: str
-    value: float | None
     parameters: float | None
     time_step: float | None
     discretization: float | None
     order: float | None
     n_drawn: int
-    shown_unit: str
-    factor: float
-    digits: int
 
     @property
     def errors(self) -> dict[str, float | None]:

@@ -20,22 +20,19 @@ import numpy as np
 from annelid.config import RunConfig, WormBody
 from annelid.errors import ConfigError, suggest
 from annelid.morphology import Array
+from annelid.studies.calibration.fit import PARAMETERS
 from annelid.studies.calibration.loop import wrap_factors
 
 CABLE = "cable_friction"
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    "young_modulus": ("body.strands.young_modulus_Pa", "body.strands.shear_modulus_Pa"),
-    "dry_friction": ("body.joints.dry_friction_Nm",),
+    **{name: tuple(parameter.changes(parameter.start)) for name, parameter in PARAMETERS.items()},
     CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N"),
-    "spring_rate": ("body.springs.stiffness_N_per_m",),
-    "spring_rest_length": ("body.springs.rest_length_m",),
-    "viscous_friction": ("body.joints.viscous_friction_Nms_per_rad",),
     "floor_friction": ("arena.friction",),
 }
-"""What can be varied, and the fields that it scales. The shear modulus keeps its ratio to Young's. The cable's friction
-is no field of a body: it scales the rings' force by the mean tension of a cable, ``(1 - exp(-m)) / m`` of that at its
-pulled end. By default what the load frame tells apart is varied: the first three. The others have no error that anyone
-has measured."""
+"""What can be varied, and the fields that it scales: what a fit may change, and the floor. The shear modulus keeps its
+ratio to Young's. The cable's friction is no field of a body: it scales the rings' force by the mean tension of a cable,
+``(1 - exp(-m)) / m`` of that at its pulled end. By default what the load frame tells apart is varied: the first three.
+The others have no error that anyone has measured."""
 CALIBRATION = "calibration.json"
 DEFAULT_SOURCE = "annelid calibrate"
 LEAST_EIGENVALUE = -1e-6

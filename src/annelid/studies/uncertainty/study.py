@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -223,18 +223,12 @@ def combine(nominal: Sequence[Reading], runs: Sequence[VariantRun]) -> tuple[Qua
         drawn, steps = values("drawn", reading.name), values("time step", reading.name)
         quantities.append(
             Quantity(
-                name=reading.name,
-                label=reading.label,
-                unit=reading.unit,
-                value=reading.value,
+                **asdict(reading),
                 parameters=scatter(drawn),
                 time_step=largest_difference(reading.value, steps),
                 discretization=largest_difference(reading.value, values("elements", reading.name)),
                 order=order_of_convergence(reading.value, *steps) if len(steps) > 1 else None,
                 n_drawn=sum(value is not None for value in drawn),
-                shown_unit=reading.shown_unit,
-                factor=reading.factor,
-                digits=reading.digits,
             )
         )
     return tuple(quantities)

@@ -20,6 +20,8 @@ State = dict[str, NDArray[np.generic]]
 """Named arrays whose shapes and dtypes never change during a run."""
 Values = Mapping[str, NDArray[np.generic] | float]
 """Present values of signals, by name."""
+SIDES = ("belly", "left", "back", "right")
+"""Sides of a segment, quarters of its skin; as the worm leads towards -x on its belly, its left is -y."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,11 @@ class Sensation:
         muscle_force_N: Contractile force of every ring muscle, N, positive when it pulls, ``(n_muscles,)``.
         contact_force_N: Force of the ground on each segment, N, ``(n_segments, 3)``; zeros without ground.
         center_of_mass_m: Centre of mass, m, shape ``(3,)``; planar worms use the first component.
+        touch_N: Normal force of the ground on each side of every segment, N, ``(n_segments, 4)`` in the order of
+            `SIDES`; ``(0, 4)`` for a body that has no skin.
+        front_m: Centre of the foremost ring, m, ``(3,)``; NaN for a body that cannot tell.
+        heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``; NaN for a body that
+            cannot tell.
     """
 
     time_s: float
@@ -43,6 +50,9 @@ class Sensation:
     muscle_force_N: Array
     contact_force_N: Array
     center_of_mass_m: Array
+    touch_N: Array = field(default_factory=lambda: np.zeros((0, len(SIDES))))
+    front_m: Array = field(default_factory=lambda: np.full(3, np.nan))
+    heading: Array = field(default_factory=lambda: np.full(3, np.nan))
 
 
 class Plant(Protocol):

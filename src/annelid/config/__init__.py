@@ -6,6 +6,7 @@ A configuration is a tree of sections (`run`, `worm`, `planar`, `controllers`). 
 sets how finely a 3D worm is resolved.
 """
 
+from annelid.config.arena import Arena
 from annelid.config.checking import check_config, field_paths, fields_of
 from annelid.config.controllers import (
     AdaptiveSns,
@@ -22,7 +23,7 @@ from annelid.config.controllers import (
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
 from annelid.config.loading import load_config, parse_assignments, preset_names, preset_text, toml_value
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
-from annelid.config.run import Arena, Clock, Guard, Record, RunConfig
+from annelid.config.run import Clock, Guard, Record, RunConfig
 from annelid.config.sections import Section
 from annelid.config.worm import Chain, Joints, Mesh, Pins, Rings, Rods, ServoRings, Springs, Strands, WormBody
 

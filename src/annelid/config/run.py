@@ -7,9 +7,10 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, Tag, model_validator
 
+from annelid.config.arena import Arena
 from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
-from annelid.config.sections import Impedance, NonNegative, Positive, Section, kind_or
+from annelid.config.sections import Positive, Section, kind_or
 from annelid.config.worm import WormBody
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
@@ -27,20 +28,6 @@ Body = Annotated[
 def _is_multiple(large: float, small: float) -> bool:
     ratio = large / small
     return round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-6 * ratio
-
-
-class Arena(Section):
-    """Where the worm crawls: flat ground under gravity."""
-
-    friction: Annotated[float, Field(ge=0.01, le=100)] = Field(
-        default=1.0, description="coefficient of sliding friction"
-    )
-    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
-    gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
-    contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")
-    contact_impedance: Impedance = Field(
-        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
-    )
 
 
 class Clock(Section):

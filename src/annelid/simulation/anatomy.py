@@ -67,6 +67,8 @@ class Posture(_Rows):
         spring_length: Shape ``(n_springs,)``.
         stretch: Lengths of the springs that serve as sensors, ``(n_segments, n_sensors)``.
         ring_length: Shape ``(n_muscles,)``.
+        front: Centre of the foremost ring, ``(3,)``.
+        heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``.
     """
 
     crossing: Array
@@ -74,6 +76,8 @@ class Posture(_Rows):
     spring_length: Array
     stretch: Array
     ring_length: Array
+    front: Array
+    heading: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +179,9 @@ class Anatomy:
         spring = _norm(ends[..., 1, :] - ends[..., 0, :])
         corners = crossing.take(self._ring_path, axis=-2)
         ring = _norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
-        return Posture(crossing, center_of_mass, spring, spring.take(self._sensors, axis=-1), ring)
+        front, rear = (crossing.take(self.geometry.rings[end], axis=-2).mean(axis=-2) for end in (0, -1))
+        heading = (front - rear) / _norm(front - rear)[..., np.newaxis]
+        return Posture(crossing, center_of_mass, spring, spring.take(self._sensors, axis=-1), ring, front, heading)
 
     def control(self, activation: Array, state: Array, ring_length_m: Array, time_s: float) -> Array:
         """Tells what the engine's actuators get under an activation, ``(n_muscles,)``: the same, or for servos a speed.

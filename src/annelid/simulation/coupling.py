@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -109,15 +110,8 @@ class Coupling:
         true = self.sensation
         if not self._noise_m:
             return true
-        return Sensation(
-            time_s=true.time_s,
-            stretch_m=true.stretch_m + self.noise.normal(0.0, self._noise_m, true.stretch_m.shape),
-            rest_stretch_m=true.rest_stretch_m,
-            ring_length_m=true.ring_length_m,
-            muscle_force_N=true.muscle_force_N,
-            contact_force_N=true.contact_force_N,
-            center_of_mass_m=true.center_of_mass_m,
-        )
+        noise = self.noise.normal(0.0, self._noise_m, true.stretch_m.shape)
+        return replace(true, stretch_m=true.stretch_m + noise)
 
     def check_activation(self, activation: Array) -> None:
         """Stops a controller that breaks its promise before its numbers reach the engine."""

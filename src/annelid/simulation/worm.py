@@ -224,6 +224,8 @@ class Worm(ABC):
             muscle_force_N=forces.muscle,
             contact_force_N=forces.contact,
             center_of_mass_m=posture.center_of_mass,
+            front_m=posture.front,
+            heading=posture.heading,
         )
 
     def alarm(self) -> str | None:

@@ -14,7 +14,7 @@ from annelid import config
 from annelid.config import TimedWave, check_config, load_config
 from annelid.config.turning import TurningSection
 from annelid.control import SnsController, TimedController
-from annelid.control.steering import heading_angle, side_scales, wrapped
+from annelid.control.steering import half_scales, heading_angle, wrapped
 from annelid.control.turning import TurningController, build_steering
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched
@@ -139,7 +139,7 @@ class TestEveryKind:
         for signal in named.signals:
             assert np.shape(values[signal.name]) == signal.shape
         assert named.attrs["turning"] == section.kind
-        assert named.coords["side"] == ["left", "right"]
+        assert named.coords["half"] == ["left", "right"]
 
 
 def mirror_of(section: TurningSection) -> TurningSection:
@@ -160,7 +160,7 @@ def mirrored_feeling(here: Sensation) -> Sensation:
 
 @given(st.floats(-1.0, 1.0))
 def test_a_modulation_takes_from_one_side_only(modulation: float) -> None:
-    left, right = side_scales(modulation)
+    left, right = half_scales(modulation)
     assert right - left == pytest.approx(modulation)
     assert max(left, right) == 1.0
 
@@ -181,13 +181,22 @@ def test_the_pattern_keeps_its_rhythm_and_one_side_its_size(modulation: float) -
     for k in range(600):
         whole, scaled = plain.step(felt(k * STEP_S)).reshape(-1, 2), turning.step(felt(k * STEP_S)).reshape(-1, 2)
         if k >= settled:
-            assert np.allclose(scaled, whole * side_scales(modulation), rtol=1e-12, atol=1e-12)
+            assert np.allclose(scaled, whole * half_scales(modulation), rtol=1e-12, atol=1e-12)
+
+
+def test_every_segment_takes_its_share_and_a_negative_one_bends_the_other_way() -> None:
+    shares = (1.0, 0.0, -0.5)
+    section = config.ConstantTurning(modulation=0.8, shares=shares, descending_time_constant_s=1e-3)
+    scales = build_steering(section, N, STEP_S).advance(felt(), 100)
+    assert scales.tolist() == [pytest.approx([0.2, 1.0]), [1.0, 1.0], pytest.approx([1.0, 0.6])]
+    with pytest.raises(ConfigError, match=r"turning.shares has 3 entries: must have 6, one a segment"):
+        load_config("riddle2025", {"turning.shares": list(shares)})
 
 
 def test_descending_neurons_follow_with_their_time_constant() -> None:
-    steering = build_steering(config.ConstantTurning(modulation=1.0, descending_time_constant_s=0.05), STEP_S)
+    steering = build_steering(config.ConstantTurning(modulation=1.0, descending_time_constant_s=0.05), 1, STEP_S)
     for k in range(1, 200):
-        left, right = steering.advance(felt(), 1)
+        left, right = steering.advance(felt(), 1)[0]
         assert left == pytest.approx(np.exp(-k * STEP_S / 0.05), rel=1e-9)
         assert right == 1.0
 
@@ -195,36 +204,36 @@ def test_descending_neurons_follow_with_their_time_constant() -> None:
 class TestSteering:
     @pytest.mark.parametrize("error_deg", [-40.0, -10.0, 10.0, 40.0])
     def test_it_turns_towards_the_wanted_heading(self, error_deg: float) -> None:
-        steering = build_steering(config.HeadingTurning(heading_deg=error_deg, gain_per_rad=1.0), STEP_S)
-        left, right = steering.advance(felt(heading_deg=25.0), 20_000)
+        steering = build_steering(config.HeadingTurning(heading_deg=error_deg, gain_per_rad=1.0), 1, STEP_S)
+        left, right = steering.advance(felt(heading_deg=25.0), 20_000)[0]
         assert right - left == pytest.approx(np.radians(error_deg), rel=1e-6)
 
     def test_it_takes_the_shorter_way_round(self) -> None:
-        steering = build_steering(config.HeadingTurning(heading_deg=170.0, gain_per_rad=0.3), STEP_S)
+        steering = build_steering(config.HeadingTurning(heading_deg=170.0, gain_per_rad=0.3), 1, STEP_S)
         steering.advance(felt(heading_deg=0.0), 1)
-        left, right = steering.advance(felt(heading_deg=-170.0), 50_000)
+        left, right = steering.advance(felt(heading_deg=-170.0), 50_000)[0]
         assert right - left == pytest.approx(-0.3 * np.radians(20.0), rel=1e-6)
 
     def test_a_steady_rate_of_turning_is_taken_off(self) -> None:
         rate_deg_per_s, slow = 5.0, 2.0
         section = config.HeadingTurning(gain_per_rad=0.0, rate_gain_s=2.0, rate_time_constant_s=slow)
-        steering = build_steering(section, STEP_S)
+        steering = build_steering(section, 1, STEP_S)
         scales = np.ones(2)
         for k in range(12_000):
-            scales = steering.advance(felt(heading_deg=wrapped_deg(rate_deg_per_s * k * STEP_S + 150.0)), 1)
+            scales = steering.advance(felt(heading_deg=wrapped_deg(rate_deg_per_s * k * STEP_S + 150.0)), 1)[0]
         assert scales[1] - scales[0] == pytest.approx(-2.0 * np.radians(rate_deg_per_s), rel=0.01)
 
     def test_the_largest_modulation_is_never_exceeded(self) -> None:
         section = config.HeadingTurning(heading_deg=90.0, gain_per_rad=50.0, largest_modulation=0.4)
-        left, right = build_steering(section, STEP_S).advance(felt(), 20_000)
+        left, right = build_steering(section, 1, STEP_S).advance(felt(), 20_000)[0]
         assert (left, right) == (pytest.approx(0.6), 1.0)
 
     def test_waypoints_are_taken_in_order_and_left_behind(self) -> None:
         section = config.CourseTurning(waypoints=((-1.0, -1.0), (-3.0, 1.0)), reach_m=0.2, gain_per_rad=0.5)
-        steering = build_steering(section, STEP_S)
+        steering = build_steering(section, 1, STEP_S)
         towards = []
         for front in ((0.0, 0.0), (-0.95, -0.95), (-2.95, 1.05)):
-            left, right = steering.advance(felt(front_m=front), 50_000)
+            left, right = steering.advance(felt(front_m=front), 50_000)[0]
             towards.append(right - left)
         first, second = np.radians(45.0), heading_angle(np.array([-2.05, 1.95, 0.0]))
         assert towards == pytest.approx([0.5 * first, 0.5 * second, 0.0], abs=1e-6)
@@ -248,13 +257,13 @@ def wrapped_deg(angle_deg: float) -> float:
 
 def drive(section: TurningSection, duration_s: float) -> np.ndarray:
     """Positions (m) and heading (deg) of a point that crawls at 0.1 m/s and turns with a radius of 1.5 m at least."""
-    steering, dt = build_steering(section, STEP_S), 0.01
+    steering, dt = build_steering(section, 1, STEP_S), 0.01
     x, y, heading = 0.0, 0.0, 0.0
     way = []
     for k in range(round(duration_s / dt)):
         swing = np.radians(3.0) * np.sin(2.0 * np.pi * k * dt / 2.0)
         here = felt(k * dt, front_m=(x, y), heading_deg=wrapped_deg(np.degrees(heading + swing)))
-        left, right = steering.advance(here, round(dt / STEP_S))
+        left, right = steering.advance(here, round(dt / STEP_S))[0]
         heading += dt * 0.1 / 1.5 * (right - left)
         x, y = x - dt * 0.1 * np.cos(heading), y - dt * 0.1 * np.sin(heading)
         way.append((x, y, np.degrees(heading)))
@@ -265,8 +274,10 @@ class TestTouch:
     """The published rule, worked out by hand at steps of 10 ms: rate 0.1 a step."""
 
     def scales(self, *forces_N: float, section: config.TouchTurning | None = None) -> list[list[float]]:
-        steering = build_steering(section or config.TouchTurning(), 0.01)
-        return [steering.advance(felt(left_N=max(-f, 0.0), right_N=max(f, 0.0)), 1).round(9).tolist() for f in forces_N]
+        steering = build_steering(section or config.TouchTurning(), 1, 0.01)
+        return [
+            steering.advance(felt(left_N=max(-f, 0.0), right_N=max(f, 0.0)), 1)[0].round(9).tolist() for f in forces_N
+        ]
 
     def test_two_newtons_do_not_start_it(self) -> None:
         assert self.scales(2.0, -2.0, 1.5) == [[1.0, 1.0]] * 3
@@ -299,8 +310,8 @@ class TestTouch:
         assert left[6:] == [0.4] * 1294
 
     def test_the_rate_does_not_depend_on_the_step(self) -> None:
-        steering = build_steering(config.TouchTurning(), STEP_S)
-        assert steering.advance(felt(right_N=15.0), 50)[0] == pytest.approx(0.5)
+        steering = build_steering(config.TouchTurning(), 1, STEP_S)
+        assert steering.advance(felt(right_N=15.0), 50)[0, 0] == pytest.approx(0.5)
 
 
 class TestRefusals:

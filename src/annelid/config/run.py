@@ -11,7 +11,7 @@ from annelid.config.arena import Arena
 from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
 from annelid.config.sections import Positive, Section, kind_or
-from annelid.config.turning import TurningSection
+from annelid.config.turning import Descending, TurningSection
 from annelid.config.worm import WormBody
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
@@ -115,6 +115,10 @@ class RunConfig(Section):
                 f"turning.kind = {self.turning.kind!r} needs a left and a right half of every ring: "
                 "body.kind = 'worm' with body.rings.layout = 'halves'"
             )
+        if isinstance(self.turning, Descending) and self.turning.shares is not None:
+            n = len(self.turning.shares)
+            if n != self.body.n_segments:
+                raise ValueError(f"turning.shares has {n} entries: must have {self.body.n_segments}, one a segment")
         return self
 
     @model_validator(mode="after")

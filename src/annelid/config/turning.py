@@ -15,10 +15,15 @@ Waypoint = tuple[Annotated[float, Field(ge=-1e4, le=1e4)], Annotated[float, Fiel
 class Descending(Section):
     """What turning by descending neurons has in common: a modulation that they follow.
 
-    A modulation m in [-1, 1] turns to the left if positive: left activation is scaled by ``1 - max(m, 0)``, right
-    activation by ``1 - max(-m, 0)``.
+    A modulation m in [-1, 1] scales a segment's left activation by ``1 - max(m, 0)`` and its right one by
+    ``1 - max(-m, 0)``, so that it bends to the left where m is positive.
     """
 
+    shares: tuple[Modulation, ...] | None = Field(
+        default=None,
+        description="share of the modulation that each segment takes, front to rear; negative ones bend it the other "
+        "way; default 1 each",
+    )
     descending_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
         default=0.2, description="time constant with which the descending neurons follow the wanted modulation"
     )

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from annelid.clock import SLACK_S
 from annelid.config import ConstantTurning, CourseTurning, HeadingTurning, Steered, TouchTurning
@@ -35,38 +36,44 @@ def wrapped(angle_rad: float) -> float:
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def side_scales(modulation: float) -> Array:
-    """Returns what a modulation in [-1, 1] leaves of the left and the right activation, ``(2,)``.
+def half_scales(modulation: ArrayLike) -> Array:
+    """Returns what modulations m in [-1, 1] leave of the left and the right activation.
 
-    It turns to the left if positive: ``1 - max(m, 0)`` and ``1 - max(-m, 0)``.
+    Args:
+        modulation: Any shape; positive ones bend a segment to the left.
+
+    Returns:
+        ``1 - max(m, 0)`` and ``1 - max(-m, 0)``, shape ``(.., 2)``.
     """
-    return np.array([1.0 - max(modulation, 0.0), 1.0 - max(-modulation, 0.0)])
+    m = np.asarray(modulation, dtype=float)
+    return np.stack([1.0 - np.maximum(m, 0.0), 1.0 - np.maximum(-m, 0.0)], axis=-1)
 
 
 class Steering(ABC, Generic[Settings]):
-    """Tells at every control step what is left of the activation of either side."""
+    """Tells at every control step what is left of the activation of the two halves of every ring."""
 
-    def __init__(self, settings: Settings, control_timestep_s: float) -> None:
+    def __init__(self, settings: Settings, n_segments: int, control_timestep_s: float) -> None:
         """Makes it from its section of the configuration, in its initial state."""
         self._settings = settings
+        self._n_segments = n_segments
         self._timestep_s = control_timestep_s
         self.reset()
 
     @abstractmethod
     def reset(self) -> None:
-        """Returns to the initial state: both sides whole."""
+        """Returns to the initial state: all halves whole."""
 
     @abstractmethod
     def advance(self, sensation: Sensation, n_steps: int) -> Array:
         """Takes control steps that feel the same but for their times.
 
         Returns:
-            Scales of the left and the right activation after the last of them, each in [0, 1], ``(2,)``.
+            Scales after the last of them, each in [0, 1], ``(n_segments, 2)``: left and right half of every ring.
         """
 
     @abstractmethod
     def scales(self) -> Array:
-        """Returns the scales after the latest step, ``(2,)``."""
+        """Returns the scales after the latest step, ``(n_segments, 2)``."""
 
     @abstractmethod
     def get_state(self) -> State:
@@ -84,10 +91,12 @@ class DescendingSteering(Steering[Commanded]):
     during it.
     """
 
-    def __init__(self, settings: Commanded, control_timestep_s: float) -> None:
+    def __init__(self, settings: Commanded, n_segments: int, control_timestep_s: float) -> None:
         """Makes it from its section of the configuration, silent."""
         self._keeps = math.exp(-control_timestep_s / settings.descending_time_constant_s)
-        super().__init__(settings, control_timestep_s)
+        shares = settings.shares
+        self._shares = np.ones(n_segments) if shares is None else np.array(shares, dtype=float)
+        super().__init__(settings, n_segments, control_timestep_s)
 
     @abstractmethod
     def wanted(self, sensation: Sensation) -> float:
@@ -105,8 +114,8 @@ class DescendingSteering(Steering[Commanded]):
         return self.scales()
 
     def scales(self) -> Array:
-        """Returns what the present activity leaves of either side."""
-        return side_scales(self._modulation)
+        """Returns what the present activity leaves of every half: of its own side's in proportion to its share."""
+        return half_scales(self._modulation * self._shares)
 
     def get_state(self) -> State:
         """Returns the activity of the descending neurons."""
@@ -132,10 +141,10 @@ class AimedSteering(DescendingSteering[Aimed]):
     order lags behind it, over the filter's time constant: it averages over the swings of a cycle.
     """
 
-    def __init__(self, settings: Aimed, control_timestep_s: float) -> None:
+    def __init__(self, settings: Aimed, n_segments: int, control_timestep_s: float) -> None:
         """Makes it from its section of the configuration, silent."""
         self._follows = -math.expm1(-control_timestep_s / settings.rate_time_constant_s)
-        super().__init__(settings, control_timestep_s)
+        super().__init__(settings, n_segments, control_timestep_s)
 
     @abstractmethod
     def target(self, sensation: Sensation) -> float | None:
@@ -254,8 +263,8 @@ class TouchSteering(Steering[TouchTurning]):
         ]
 
     def scales(self) -> Array:
-        """Returns the scales after the latest step."""
-        return np.array(self._scales)
+        """Returns the scales after the latest step, those of a side alike."""
+        return np.tile(self._scales, (self._n_segments, 1))
 
     def get_state(self) -> State:
         """Returns what is left of the timer, s, and the latched and the present scales."""

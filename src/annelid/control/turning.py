@@ -26,15 +26,15 @@ HALVES = ("left", "right")
 _PATTERN, _STEERING = "pattern_", "turning_"
 
 
-def build_steering(section: TurningSection, control_timestep_s: float) -> Steering:
+def build_steering(section: TurningSection, n_segments: int, control_timestep_s: float) -> Steering:
     """Builds what a section of the configuration describes."""
     if isinstance(section, ConstantTurning):
-        return ConstantSteering(section, control_timestep_s)
+        return ConstantSteering(section, n_segments, control_timestep_s)
     if isinstance(section, HeadingTurning):
-        return HeadingSteering(section, control_timestep_s)
+        return HeadingSteering(section, n_segments, control_timestep_s)
     if isinstance(section, CourseTurning):
-        return CourseSteering(section, control_timestep_s)
-    return TouchSteering(section, control_timestep_s)
+        return CourseSteering(section, n_segments, control_timestep_s)
+    return TouchSteering(section, n_segments, control_timestep_s)
 
 
 class TurningController:
@@ -70,7 +70,7 @@ class TurningController:
         self._pattern = pattern
         self._stateful: Stateful = pattern
         self._kind = section.kind
-        self._steering = build_steering(section, control_timestep_s)
+        self._steering = build_steering(section, n_segments, control_timestep_s)
         self._timestep_s = control_timestep_s
 
     def reset(self, seed: int) -> None:
@@ -110,22 +110,25 @@ class TurningController:
 
     @staticmethod
     def _scaled(activation: Array, scales: Array) -> Array:
-        return (activation.reshape(-1, len(HALVES)) * scales).reshape(-1)
+        return (activation.reshape(scales.shape) * scales).reshape(-1)
 
     def recordable(self) -> Recordable:
         """Names the scales of the sides, and what the pattern names."""
         own = self._pattern.recordable() if isinstance(self._pattern, Records) else Recordable()
-        scale = Signal("side_scale", ("side",), (len(HALVES),), "1", "share of its activation that a side is left")
+        shape = self._steering.scales().shape
+        scale = Signal(
+            "half_scale", ("segment", "half"), shape, "1", "share of its activation that half a ring is left"
+        )
         return Recordable(
             signals=(*own.signals, scale),
-            coords={**own.coords, "side": list(HALVES)},
+            coords={**own.coords, "segment": list(range(1, shape[0] + 1)), "half": list(HALVES)},
             attrs={**own.attrs, "turning": self._kind},
         )
 
     def read(self, frame: bool) -> Values:
         """Reads the signals that `recordable` names."""
         own = self._pattern.read(frame) if isinstance(self._pattern, Records) else {}
-        return own if frame else {**own, "side_scale": self._steering.scales()}
+        return own if frame else {**own, "half_scale": self._steering.scales()}
 
     def get_state(self) -> State:
         """Returns the states of pattern and steering."""

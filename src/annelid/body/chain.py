@@ -14,7 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from annelid.arena.floor import contact_options
+from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA
 from annelid.config import Arena, Chain, Strands, WormBody

@@ -21,7 +21,7 @@ from math import pi
 import mujoco
 import numpy as np
 
-from annelid.arena.floor import contact_options
+from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.config import Arena, Rods, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry

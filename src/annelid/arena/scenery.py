@@ -7,6 +7,7 @@ from math import sqrt
 import mujoco
 
 from annelid.arena.contact import contact_options
+from annelid.arena.panels import add_panels
 from annelid.arena.shapes import Shape, shape_of
 from annelid.config import Arena, Floor, Pipe
 
@@ -24,7 +25,7 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     """Adds the arena to look at, below a sky and a light.
 
     Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
-    unbounded planes that can be touched; relief and pipes are shapes that nothing touches.
+    unbounded planes; relief and pipes are shapes to see, and hidden panels that can be touched.
 
     Args:
         spec: The worm's spec, its lowest line at z = 0.
@@ -55,6 +56,7 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     shape = shape_of(arena, length_m)
     if shape is not None:
         _add_shape(spec, shape, arena)
+        add_panels(spec, arena, length_m)
     if isinstance(arena, Pipe) or shape is None:
         _add_floor(spec, arena, length_m)
     add_rails(spec, arena)

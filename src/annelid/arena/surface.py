@@ -4,25 +4,32 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from annelid.arena.course import UP, Bore, Course, bore_of, course_of
 from annelid.arena.relief import RoughGround, StepProfile
 from annelid.config import Arena, Floor, Pipe, Rough, Steps
 from annelid.protocols import Array
 
-SETTLED_M = 1e-12
-"""A nearest point is found when its distance changes by no more, which three or four rounds near a surface reach."""
+SETTLED = 1e-10
+"""A nearest point is found when distance, m, and normal change by no more: after two to five rounds near a surface."""
 MOST_ROUNDS = 60
 
 
 class Surface(Protocol):
     """The boundary between free space and what a worm touches."""
 
-    def nearest(self, points_m: Array) -> tuple[Array, Array]:
-        """Returns signed distances and normals, as `distance_m` and `normal` do, for the price of one of them."""
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
+        """Returns signed distances and normals, as `distance_m` and `normal` do, for the price of one of them.
+
+        Args:
+            points_m: Points, m, ``(..., 3)``.
+            first_order: A distance d may be wrong by d^2 / 2 of the surface's curvature along the arena: for a strand's
+                radius 0.05 mm where a taper begins, and a few micrometres elsewhere.
+        """
         ...
 
     def distance_m(self, points_m: Array) -> Array:
@@ -52,7 +59,7 @@ class _Nearest(ABC):
     """A surface that finds distance and normal at once."""
 
     @abstractmethod
-    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Returns signed distances, m, ``(...)``, and unit normals, ``(..., 3)``."""
 
     def distance_m(self, points_m: Array) -> Array:
@@ -76,7 +83,7 @@ class Plane(_Nearest):
     facing: Array
     offset_m: float
 
-    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Returns heights above it, m, and its normal."""
         return points_m @ self.facing - self.offset_m, np.broadcast_to(self.facing, points_m.shape)
 
@@ -91,38 +98,53 @@ class Between(_Nearest):
 
     parts: tuple[Surface, ...]
 
-    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Returns distance and normal of the nearest part."""
-        distance, normal = (np.stack(both) for both in zip(*(p.nearest(points_m) for p in self.parts), strict=True))
+        found = [part.nearest(points_m, first_order=first_order) for part in self.parts]
+        distance, normal = (np.stack(both) for both in zip(*found, strict=True))
         which = distance.argmin(axis=0)[np.newaxis]
         return np.take_along_axis(distance, which, 0)[0], np.take_along_axis(normal, which[..., np.newaxis], 0)[0]
+
+
+class Level(NamedTuple):
+    """A function that is positive in free space and zero on a surface.
+
+    Attributes:
+        value: Shape ``(n,)``.
+        gradient: Shape ``(n, 3)``.
+        is_distance: Where it is the distance itself, ``(n,)``.
+    """
+
+    value: Array
+    gradient: Array
+    is_distance: NDArray[np.bool_]
 
 
 class _Implicit(_Nearest):
     """A surface known by a function that is positive in free space and zero on it."""
 
     @abstractmethod
-    def level(self, points_m: Array) -> tuple[Array, Array]:
-        """Returns the function, ``(...)``, and its gradient, ``(..., 3)``, at points, m, ``(..., 3)``."""
+    def level(self, points_m: Array) -> Level:
+        """Returns the function at points, m, ``(n, 3)``."""
 
-    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Follows the normal from the point to the surface and takes the normal found there, until both agree."""
         points = points_m.reshape(-1, 3)
-        value, gradient = self.level(points)
+        value, gradient, done = self.level(points)
         size = _lengths(gradient)
         distance, normal = value / size, gradient / size[:, np.newaxis]
-        open_ = np.arange(len(points))
+        open_ = np.flatnonzero(~done & (not first_order))
         for _ in range(MOST_ROUNDS):
+            if not len(open_):
+                break
             along = normal[open_]
-            value, gradient = self.level(points[open_] - distance[open_, np.newaxis] * along)
+            value, gradient, _ = self.level(points[open_] - distance[open_, np.newaxis] * along)
             change = value / (gradient * along).sum(axis=-1)
             turned = gradient / _lengths(gradient)[:, np.newaxis]
-            moved = (np.abs(change) > SETTLED_M) | (np.abs(turned - along).max(axis=-1) > SETTLED_M)
+            moved = (np.abs(change) > SETTLED) | (np.abs(turned - along).max(axis=-1) > SETTLED)
             distance[open_] += change
             normal[open_] = turned
             open_ = open_[moved]
-            if not len(open_):
-                break
         return distance.reshape(points_m.shape[:-1]), normal.reshape(points_m.shape)
 
 
@@ -138,7 +160,7 @@ class PipeWall(_Implicit):
     course: Course
     bore: Bore
 
-    def level(self, points_m: Array) -> tuple[Array, Array]:
+    def level(self, points_m: Array) -> Level:
         """Returns how far points lie within the bore's radius at the nearest point of the centre line, m."""
         foot = self.course.nearest(points_m)
         away = points_m - foot.point_m
@@ -148,7 +170,8 @@ class PipeWall(_Implicit):
         radius, slope = self.bore.at(foot.arc_m)
         # The centre line's arc length grows faster than the way on the inner side of a curve.
         stretch = np.maximum(1.0 - (away * foot.curvature_per_m).sum(axis=-1), 0.1)
-        return radius - radial, (slope / stretch)[:, np.newaxis] * foot.tangent - outwards
+        gradient = (slope / stretch)[:, np.newaxis] * foot.tangent - outwards
+        return Level(radius - radial, gradient, slope == 0.0)
 
 
 @dataclass(frozen=True)
@@ -163,11 +186,11 @@ class Hills(_Implicit):
     ground: RoughGround
     level_m: float
 
-    def level(self, points_m: Array) -> tuple[Array, Array]:
+    def level(self, points_m: Array) -> Level:
         """Returns heights above the ground straight below, m."""
         height, slope = self.ground.height(points_m[:, :2])
         gradient = np.concatenate([-slope, np.ones((len(slope), 1))], axis=-1)
-        return points_m[:, 2] - self.level_m - height, gradient
+        return Level(points_m[:, 2] - self.level_m - height, gradient, np.zeros(len(height), dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -182,7 +205,7 @@ class Stairs(_Nearest):
     profile: StepProfile
     level_m: float
 
-    def nearest(self, points_m: Array) -> tuple[Array, Array]:
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Returns distance and normal of the nearest tread, riser or rounding."""
         distance, ahead, up = self.profile.nearest(-points_m[..., 0], points_m[..., 2] - self.level_m)
         return distance, np.stack([-ahead, np.zeros(ahead.shape), up], axis=-1)

@@ -47,7 +47,8 @@ def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSp
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
         moving_planes: Where the engine has no one plane for the ground, add planes that are laid under the skin before
-            every step (`annelid.simulation.ground`), and nothing to see; else what is seen of the ground.
+            every step (`annelid.simulation.ground`), and nothing to see; else all that is seen, and panels that hold
+            the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.
@@ -58,6 +59,7 @@ def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSp
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
+    laid = moving_planes and has_moving_planes(arena)
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
@@ -67,14 +69,14 @@ def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSp
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
     if isinstance(body.formulation, Chain):
-        add_chains(spec, geometry, body, body.formulation, arena)
+        add_chains(spec, geometry, body, body.formulation, arena, vertices_touch=laid)
     else:
         add_rods(spec, geometry, body, body.formulation, arena)
     add_springs(spec, geometry, body.springs)
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:
         add_joint_friction(spec, geometry, body.joints)
-    if moving_planes and has_moving_planes(arena):
+    if laid:
         add_moving_planes(spec, arena)
         add_rails(spec, arena)
     else:

@@ -36,6 +36,7 @@ def build(
 
     \b
     annelid build riddle2023-rods -o worm.xml
+    annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
     from annelid.body import build_spec, compile_spec
@@ -43,6 +44,11 @@ def build(
 
     refuse_existing(output, force)
     config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity, arena)
+    if config.arena is not None and config.arena.has_setae:
+        raise ConfigError(
+            f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
+            "the same in both directions: leave it out or run the worm with annelid"
+        )
     spec = build_spec(config)
     try:
         compile_spec(spec)

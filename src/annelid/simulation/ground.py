@@ -40,7 +40,7 @@ class MovingGround:
         mujoco.mj_kinematics(self._model, data)
         places = data.geom_xpos[self._skin]
         with np.errstate(invalid="ignore", over="ignore"):
-            distance, normal = self._surface.nearest(places)
+            distance, normal = self._surface.nearest(places, first_order=True)
             data.mocap_pos[self._planes] = places - distance[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
             if self._setae is not None:

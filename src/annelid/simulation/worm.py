@@ -266,7 +266,8 @@ class Worm(ABC):
             energy = self.kinetic_energy_J()
         if due or isinstance(self._surface, Plane):
             with np.errstate(invalid="ignore", over="ignore"):
-                height = float(np.abs(self._surface.distance_m(self._posture.crossing)).max())
+                distance, _ = self._surface.nearest(self._posture.crossing, first_order=True)
+                height = float(np.abs(distance).max())
         if (
             height <= guard.height_m
             and strain <= guard.edge_strain

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
-from annelid.config import RunConfig
+from annelid.arena.surface import surface_of
+from annelid.config import RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Movement, Posture
@@ -52,6 +54,7 @@ class BodyBatch:
         self._time, self._ctrl, self._qpos, self._qvel = (bind(name) for name in ("time", "ctrl", "qpos", "qvel"))
         self._act: Array = bind("act") if models[0].na else np.empty((len(models), 0))
         self._mass_matrix = bind("M")
+        self._mocap = (bind("mocap_pos"), bind("mocap_quat")) if models[0].nmocap else None
         self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
         self._scratch = mujoco.MjData(models[0])
         self.worms = [
@@ -79,6 +82,17 @@ class BodyBatch:
         """
         for row, own in zip(rows, activation, strict=True):
             self._ctrl[row] = self.worms[row].control(own, n_steps)
+        if self._mocap is None:
+            return self._stepped(rows, n_steps)
+        reasons: dict[int, str] = {}
+        for _ in range(n_steps):
+            going = [row for row in rows if row not in reasons]
+            for row in going:
+                self._lay_ground(row)
+            reasons |= self._stepped(going, 1)
+        return reasons
+
+    def _stepped(self, rows: Sequence[int], n_steps: int) -> dict[int, str]:
         try:
             self._batch.step(rows, n_steps)
         except SimulationError as failure:
@@ -86,6 +100,16 @@ class BodyBatch:
                 int(row): engine_stopped(float(self._time[row]), self._batch.error(int(row))) for row in failure.ids
             }
         return {}
+
+    def _lay_ground(self, row: int) -> None:
+        """Lays the planes under one body's skin."""
+        ground, scratch = self.worms[row].ground, self._scratch
+        assert ground is not None
+        assert self._mocap is not None
+        scratch.qpos[:], scratch.qvel[:] = self._qpos[row], self._qvel[row]
+        ground.lay(scratch)
+        for bound, laid in zip(self._mocap, (scratch.mocap_pos, scratch.mocap_quat), strict=True):
+            bound[row] = laid
 
     def moved(self, rows: Sequence[int]) -> list[Movement]:
         """Reads what the last movement of some bodies has come to."""
@@ -194,6 +218,12 @@ def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
     for config in configs:
         physical = config.model_dump_json(include={"body", "arena", "clock"})
         if physical not in models:
-            models[physical] = compile_worm(config)
-        anatomies.append(models[physical])
+            anatomies.append(models.setdefault(physical, compile_worm(config)))
+            continue
+        known = models[physical]
+        # Friction by the direction of sliding is set in the model, which such worms cannot share.
+        assert isinstance(config.body, WormBody)
+        assert config.arena is not None
+        own = config.arena.has_setae
+        anatomies.append(Anatomy(copy(known.model), config.body, surface_of(config.arena)) if own else known)
     return anatomies

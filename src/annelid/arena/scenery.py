@@ -1,4 +1,4 @@
-"""What is seen of an arena: sky, light, floors, guard rails, the shapes of relief and pipes."""
+"""What is seen of an arena: sky, light, floors, guard rails and posts, the shapes of relief and pipes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from annelid.config import Arena, Floor, Pipe
 CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
 FLOOR_HALF_SIZE_M = 40.0
 RAIL_HALF_HEIGHT_M = 0.1
+POST_HALF_HEIGHT_M = 0.3
+"""Posts are about twice as high as the worm."""
+POST_RGBA = (0.75, 0.47, 0.30, 1.0)
 RAIL_RGBA = (0.55, 0.6, 0.66, 0.45)
 PIPE_ABOVE_FLOOR_M = 0.02
 """The floor below a pipe is there to be seen only."""
@@ -25,7 +28,7 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     """Adds the arena to look at, below a sky and a light.
 
     Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
-    unbounded planes; relief and pipes are shapes to see, and hidden panels that can be touched.
+    unbounded planes, posts cylinders; relief and pipes are shapes to see, and hidden panels that can be touched.
 
     Args:
         spec: The worm's spec, its lowest line at z = 0.
@@ -59,12 +62,23 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
         add_panels(spec, arena, length_m)
     if isinstance(arena, Pipe) or shape is None:
         _add_floor(spec, arena, length_m)
-    add_rails(spec, arena)
+    add_walls(spec, arena)
 
 
-def add_rails(spec: mujoco.MjSpec, arena: Arena) -> None:
-    """Adds the two guard rails, if there are any: upright planes, drawn 20 cm high."""
-    if not isinstance(arena, Floor) or arena.rail_gap_m is None:
+def add_walls(spec: mujoco.MjSpec, arena: Arena) -> None:
+    """Adds what stands upright, if anything: guard rails, which are planes drawn 20 cm high, and posts."""
+    if not isinstance(arena, Floor):
+        return
+    for number, (x, y, radius) in enumerate(arena.posts or ()):
+        spec.worldbody.add_geom(
+            name=f"post_{number}",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[x, y, POST_HALF_HEIGHT_M - arena.floor_gap_m],
+            size=[radius, POST_HALF_HEIGHT_M, 0.0],
+            rgba=POST_RGBA,
+            **contact_options(arena),
+        )
+    if arena.rail_gap_m is None:
         return
     for name, side, turn in (("rail_left", -1.0, -sqrt(0.5)), ("rail_right", 1.0, sqrt(0.5))):
         spec.worldbody.add_geom(

@@ -148,6 +148,18 @@ def test_the_four_segment_robot_s_modulus_lies_between_the_two_fits() -> None:
     assert shear == pytest.approx(young * 2.0 / 3.0)
 
 
+def test_the_robot_with_muscles_differs_in_its_rings_and_timing_only() -> None:
+    servos, muscles = (load_config(name).model_dump() for name in ("riddle2025", "riddle2025-muscles"))
+    for tree in (servos, muscles):
+        for own in ("name", "summary", "duration_s", "sensor"):
+            del tree[own]
+        del tree["body"]["rings"], tree["controller"]["gate_time_constant_ms"]
+    assert servos == muscles
+    own = {"length_range_m": (0.62, 1.1), "peak_force_N": (16.0, 31.0, 31.0, 31.0, 31.0, 16.0), "layout": "whole"}
+    assert {name: value_at("riddle2025-muscles", f"body.rings.{name}") for name in own} == own
+    assert value_at("riddle2025-muscles", "controller.gate_time_constant_ms") == 300.0
+
+
 @pytest.mark.parametrize("preset", ["wang", "riddle2025"])
 @pytest.mark.parametrize("path", ROBOTS)
 def test_the_robots_have_the_authors_mesh_and_servos(preset: str, path: str) -> None:

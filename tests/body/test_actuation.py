@@ -166,7 +166,7 @@ def test_a_worm_feels_the_springs_that_have_sensors() -> None:
     ("changes", "words"),
     [
         ({"body.rings.peak_force_N": 20.0}, "body.rings.peak_force_N"),
-        ({"body.rings.force_limit_N": [1.0, 2.0]}, "2 limits for 4 segments"),
+        ({"body.rings.force_limit_N": [1.0, 2.0]}, "2 values for 4 segments"),
         ({"body.rings.force_limit_N": []}, "one number for all servos"),
         ({"body.rings.speed_limit_m_per_s": 0.0}, "body.rings.speed_limit_m_per_s = 0"),
         ({"body.rings.length_range_m": [0.96, 0.62]}, "lower bound below its upper bound"),
@@ -177,6 +177,14 @@ def test_a_worm_feels_the_springs_that_have_sensors() -> None:
 def test_what_a_servo_cannot_be_is_refused_by_the_field_s_name(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         load_config("wang", changes)
+
+
+@pytest.mark.parametrize(
+    ("forces", "words"), [([31.0, 16.0], "2 values for 3 segments"), ([], "one number for all muscles")]
+)
+def test_muscles_have_one_peak_force_or_one_a_segment(forces: list[float], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        load_config("riddle2023-rods", {"body.rings.peak_force_N": forces})
 
 
 def test_muscles_refuse_the_fields_of_servos_and_may_become_servos() -> None:

@@ -64,6 +64,7 @@ BOTH: list[tuple[dict[str, Any], Read, Any]] = [
     ),
     ({"body.springs.rest_length_m": 0.065}, lambda m: set(m.tendon_lengthspring[springs(m)].ravel()), {0.065}),
     ({"body.rings.peak_force_N": 31.0}, lambda m: set(m.actuator_gainprm[:, 2]), {31.0}),
+    ({"body.rings.peak_force_N": [16.0, 31.0, 8.0]}, lambda m: m.actuator_gainprm[:, 2].tolist(), [16.0, 31.0, 8.0]),
     ({"body.rings.minimum_length": 0.61}, lambda m: set(m.actuator_gainprm[:, 4]), {0.61}),
     ({"body.rings.maximum_length": 1.7}, lambda m: set(m.actuator_gainprm[:, 5]), {1.7}),
     ({"body.rings.maximum_velocity": 2.5}, lambda m: set(m.actuator_gainprm[:, 6]), {2.5}),

@@ -61,7 +61,7 @@ def add_ring_actuators(spec: mujoco.MjSpec, geometry: MeshGeometry, rings: Rings
     """
     n = geometry.n_segments
     ranges = rings.length_ranges(n)
-    limits = rings.force_limits(n) if isinstance(rings, ServoRings) else [0.0] * n
+    forces = rings.force_limits(n) if isinstance(rings, ServoRings) else rings.peak_forces(n)
     names = iter(ring_names(n, rings))
     for segment in range(n):
         paths = ring_paths(geometry, segment, rings)
@@ -70,9 +70,9 @@ def add_ring_actuators(spec: mujoco.MjSpec, geometry: MeshGeometry, rings: Rings
             name = next(names)
             _add_ring_tendon(spec, name, path)
             if isinstance(rings, ServoRings):
-                _add_servo(spec, name, span, limits[segment], rings)
+                _add_servo(spec, name, span, forces[segment], rings)
             else:
-                _add_muscle(spec, name, span, rings)
+                _add_muscle(spec, name, span, forces[segment], rings)
             _add_length_sensor(spec, name)
             spec.add_sensor(
                 name=f"{name}_force",
@@ -104,7 +104,7 @@ def _add_ring_tendon(spec: mujoco.MjSpec, name: str, path: list[int]) -> None:
         tendon.wrap_site(crossing_site(crossing))
 
 
-def _add_muscle(spec: mujoco.MjSpec, name: str, span: list[float], rings: Rings) -> None:
+def _add_muscle(spec: mujoco.MjSpec, name: str, span: list[float], peak_force_N: float, rings: Rings) -> None:
     actuator = spec.add_actuator(
         name=name,
         target=name,
@@ -117,7 +117,7 @@ def _add_muscle(spec: mujoco.MjSpec, name: str, span: list[float], rings: Rings)
         timeconst=ACTIVATION_TIMES_S,
         tausmooth=0.0,
         range=[0.75, 1.05],
-        force=rings.peak_force_N,
+        force=peak_force_N,
         lmin=rings.minimum_length,
         lmax=rings.maximum_length,
         vmax=rings.maximum_velocity,

@@ -94,6 +94,16 @@ class Springs(Section):
         return "first helix" if self.sensors == "all" else "left side"
 
 
+def _not_empty(value: Any, actuators: str) -> Any:
+    if value == ():
+        raise ValueError(f"needs one number for all {actuators} or one a segment")
+    return value
+
+
+def _one_a_segment(value: float | tuple[float, ...], n_segments: int) -> list[float]:
+    return list(value) if isinstance(value, tuple) else [value] * n_segments
+
+
 class RingCables(Section):
     """What ring actuators of all kinds have in common: how they lie, and between which lengths they work."""
 
@@ -132,7 +142,9 @@ class Rings(RingCables):
     """
 
     kind: Literal["muscle"] = "muscle"
-    peak_force_N: Positive = Field(default=117.57, description="isometric force at the optimal length, F0")
+    peak_force_N: Positive | tuple[Positive, ...] = Field(
+        default=117.57, description="isometric force at the optimal length, F0, one number for all or one a segment"
+    )
     minimum_length: Positive = Field(default=0.58, description="lmin, relative to the optimal length")
     maximum_length: Positive = Field(default=1.6, description="lmax, relative to the optimal length")
     maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
@@ -141,6 +153,15 @@ class Rings(RingCables):
     activation_dynamics: bool = Field(
         default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
     )
+
+    @field_validator("peak_force_N")
+    @classmethod
+    def _given(cls, value: Any) -> Any:
+        return _not_empty(value, "muscles")
+
+    def peak_forces(self, n_segments: int) -> list[float]:
+        """Returns the peak force of every segment's muscles, N."""
+        return _one_a_segment(self.peak_force_N, n_segments)
 
 
 class ServoRings(RingCables):
@@ -168,14 +189,11 @@ class ServoRings(RingCables):
     @field_validator("force_limit_N")
     @classmethod
     def _given(cls, value: Any) -> Any:
-        if value == ():
-            raise ValueError("needs one number for all servos or one a segment")
-        return value
+        return _not_empty(value, "servos")
 
     def force_limits(self, n_segments: int) -> list[float]:
         """Returns the force limit of every segment's servos, N."""
-        limits = self.force_limit_N
-        return list(limits) if isinstance(limits, tuple) else [limits] * n_segments
+        return _one_a_segment(self.force_limit_N, n_segments)
 
 
 RingsSection = Annotated[Annotated[Rings, Tag("muscle")] | Annotated[ServoRings, Tag("servo")], kind_or("muscle")]
@@ -284,10 +302,12 @@ class WormBody(Section):
                 "give one pair for each, or one for all, for example body.rings.length_range_m=[0.566,1.067]"
             )
         if isinstance(self.rings, ServoRings):
-            n = len(self.rings.force_limits(self.mesh.n_segments))
-            if n != self.mesh.n_segments:
-                raise ValueError(
-                    f"body.rings.force_limit_N gives {n} limits for {self.mesh.n_segments} segments: "
-                    "give one for each, or one for all, for example body.rings.force_limit_N=13"
-                )
+            field, n = "force_limit_N", len(self.rings.force_limits(self.mesh.n_segments))
+        else:
+            field, n = "peak_force_N", len(self.rings.peak_forces(self.mesh.n_segments))
+        if n != self.mesh.n_segments:
+            raise ValueError(
+                f"body.rings.{field} gives {n} values for {self.mesh.n_segments} segments: "
+                f"give one for each, or one for all, for example body.rings.{field}=13"
+            )
         return self

@@ -149,7 +149,7 @@ def muscle_activation(force_N: float, ring_length_m: float) -> float:
     """Activation at which the paper's muscle, standing still, pulls with a force at a length of its ring."""
     rings = papers_muscle()
     length = scaled_length(ring_length_m, rings.length_ranges(1)[0])
-    return float(force_N / (rings.peak_force_N * closed_form_flv(length, 0.0, rings)))
+    return float(force_N / (rings.peak_forces(1)[0] * closed_form_flv(length, 0.0, rings)))
 
 
 def rest_ring_m() -> float:

@@ -128,8 +128,9 @@ def caption(rings: Rings, n_segments: int = 3) -> str:
     ranges = rings.length_ranges(n_segments)
     optimal = [(high - low) / (SCALED_RANGE[1] - SCALED_RANGE[0]) for low, high in ranges]
     low, high = _working_range(ranges)
+    peak_N = max(rings.peak_forces(n_segments))
     grid = np.linspace(rings.minimum_length, 1.0, 20_001)
-    settled = grid[np.searchsorted(engine_flv(grid, 0.0, rings), SETTLED_FORCE_N / rings.peak_force_N)]
+    settled = grid[np.searchsorted(engine_flv(grid, 0.0, rings), SETTLED_FORCE_N / peak_N)]
     settled_m = [high - (SCALED_RANGE[1] - settled) * unit for (_, high), unit in zip(ranges, optimal, strict=True)]
     return (
         "Force of MuJoCo's muscle as computed by the engine, relative to the peak force F0 and against length relative "
@@ -140,7 +141,7 @@ def caption(rings: Rings, n_segments: int = 3) -> str:
         f"{RING_LENGTHS_M[0]:.2f} and {RING_LENGTHS_M[1]:.2f} m on the ascending limb (shaded, L = {low:.2f} to "
         f"{high:.2f}), where the force falls to zero at {rings.minimum_length:g} L0. A full contraction against "
         f"{SETTLED_FORCE_N:g} N ends at {settled:.2f} L0, with rings {_span(settled_m, 2)} m long: its end is set by "
-        f"length rather than by the peak force of {rings.peak_force_N:.0f} N."
+        f"length rather than by the peak force of {peak_N:.0f} N."
     )
 
 

@@ -165,7 +165,7 @@ def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     assert np.array_equal(felt[0].center_of_mass_m, felt[2].center_of_mass_m)
 
 
-def stride(worm: BatchWorm, activation: Array, n_steps: int):  # noqa: ANN201
+def stride(worm: BatchWorm, activation: Array, n_steps: int):
     return worm.stride(activation, n_steps)
 
 

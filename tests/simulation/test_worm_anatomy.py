@@ -45,9 +45,12 @@ def test_many_worms_read_like_each_alone(body: str, n_worms: int, seed: int) -> 
     }
     engine = {name: random.normal(size=(n_worms, *shapes[name])) for name in part.outputs}
     crossing, center = random.normal(size=(n_worms, part.geometry.n_crossings, 3)), random.normal(size=(n_worms, 3))
-    postures, forces = part.posture(crossing, center).each(), part.forces(engine).each()
+    skin = random.normal(size=(n_worms, len(part.skin.segment), 3))
+    postures, forces = part.posture(crossing, center, skin).each(), part.forces(engine).each()
     for i in range(n_worms):
-        alone = part.posture(crossing[i], center[i]), part.forces({name: values[i] for name, values in engine.items()})
+        one = {name: values[i] for name, values in engine.items()}
+        alone = part.posture(crossing[i], center[i], skin[i]), part.forces(one)
+        assert np.array_equal(part.ground(engine)[i], part.ground(one))
         for of_many, of_one in zip((postures[i], forces[i]), alone, strict=True):
             for field in of_one.__slots__:
                 assert np.array_equal(getattr(of_many, field), getattr(of_one, field)), field
@@ -55,7 +58,7 @@ def test_many_worms_read_like_each_alone(body: str, n_worms: int, seed: int) -> 
 
 def test_lengths_are_the_distances_along_springs_and_rings() -> None:
     part, crossing = anatomy("rods"), np.random.default_rng(1).normal(size=(anatomy("rods").geometry.n_crossings, 3))
-    posture = part.posture(crossing, np.zeros(3))
+    posture = part.posture(crossing, np.zeros(3), np.zeros((0, 3)))
     first, second = crossing[part.geometry.springs].transpose(1, 0, 2)
     assert posture.spring_length == pytest.approx(np.linalg.norm(second - first, axis=1))
     assert posture.stretch == pytest.approx(posture.spring_length[part.geometry.sensor_springs])

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import NamedTuple, Self
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.surface import Surface
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors, winding_speed
 from annelid.body.rods import vertex_name
 from annelid.config import Chain, Rods, ServoRings, WormBody
 from annelid.morphology import Array, MeshGeometry
+from annelid.simulation.skin import Skin
 
 FLOOR = "floor"
 _NET_FORCE = 3
@@ -69,6 +71,8 @@ class Posture(_Rows):
         ring_length: Shape ``(n_muscles,)``.
         front: Centre of the foremost ring, ``(3,)``.
         heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``.
+        axis: Unit vectors along the body towards its front at every ring, ``(n_segments, 3)``.
+        skin: Centres of the geoms that can touch the ground, ``(n_geoms, 3)``.
     """
 
     crossing: Array
@@ -78,6 +82,8 @@ class Posture(_Rows):
     ring_length: Array
     front: Array
     heading: Array
+    axis: Array
+    skin: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +103,20 @@ class Forces(_Rows):
     pin_gap: Array
 
 
+class Movement(NamedTuple):
+    """What one movement of a body has come to.
+
+    Attributes:
+        posture: Where the body is at its end.
+        forces: What acted during its last physics step.
+        ground: Force of the ground on every geom of the skin during that step, N, ``(n_geoms, 3)``.
+    """
+
+    posture: Posture
+    forces: Forces
+    ground: Array
+
+
 class Anatomy:
     """The parts of one compiled worm, found once.
 
@@ -110,16 +130,19 @@ class Anatomy:
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
-        outputs: Names of the engine's arrays that `forces` needs.
+        outputs: Names of the engine's arrays that `forces` and `ground` need.
+        skin: The geoms that can touch the ground.
     """
 
-    def __init__(self, model: mujoco.MjModel, body: WormBody) -> None:
-        """Finds the parts of a body compiled with `add_contact_sensors`."""
+    def __init__(self, model: mujoco.MjModel, body: WormBody, surface: Surface) -> None:
+        """Finds the parts of a body compiled with `add_contact_sensors`, on a surface."""
         self.model = model
         self.geometry: MeshGeometry = mesh_of(body.mesh)
         self.muscle_names = ring_names(body.n_segments, body.rings)
         self.n_segments = self.geometry.n_segments
         self.n_muscles = len(self.muscle_names)
+        segments = np.arange(self.n_segments)
+        self._before, self._behind = np.maximum(segments - 1, 0), np.minimum(segments + 1, self.n_segments - 1)
         self._sensors = stretch_sensors(self.geometry, body.springs)
         self.rest_stretch_m = self.geometry.spring_length_m[self._sensors]
         self._servos = body.rings if isinstance(body.rings, ServoRings) else None
@@ -130,7 +153,7 @@ class Anatomy:
         self._ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
         self._mass_share = model.body_mass / model.body_mass.sum()
         self._edges_per_m = 1.0 / model.flexedge_length0
-        self._contact_slice, self._segment_rows = self._contacts_of_segments()
+        self._contact_slice, self._skin_geom, self._segment_rows, self.skin = self._contacts_of_segments(surface)
         self._pin_gap, pin_outputs = self._pin_reader(body)
         self.pins_can_part = self._pin_gap is not None
         edges = ("flexedge_length",) if self.has_edges else ()
@@ -143,17 +166,19 @@ class Anatomy:
         crossing = {int(site): index for index, site in enumerate(self._crossing_site)}
         return np.array([crossing[int(site)] for site in sites])
 
-    def _contacts_of_segments(self) -> tuple[slice, Array]:
-        """Where the contact sensors are, and which segment's ring is nearest to each sensor's geom at rest."""
+    def _contacts_of_segments(self, surface: Surface) -> tuple[slice, NDArray[np.int64], Array, Skin]:
+        """Where the contact sensors are, their geoms, and which segment's ring is nearest to each of these at rest."""
         model, geometry = self.model, self.geometry
         sensors = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_CONTACT))
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         ring_x = geometry.plane_x_m[geometry.ring_planes]
-        x = data.geom_xpos[model.sensor_refid[sensors], :1]
-        nearest = np.abs(x - ring_x[None]).argmin(axis=1)
+        geoms = model.sensor_refid[sensors].astype(np.int64)
+        rest = data.geom_xpos[geoms]
+        nearest = np.abs(rest[:, :1] - ring_x[None]).argmin(axis=1)
         first = int(model.sensor_adr[sensors[0]])
-        return slice(first, first + 3 * len(sensors)), np.eye(geometry.n_segments)[:, nearest]
+        skin = Skin(rest, nearest, geometry.n_segments, geometry.radius_m, surface)
+        return slice(first, first + 3 * len(sensors)), geoms, np.eye(geometry.n_segments)[:, nearest], skin
 
     def _pin_reader(self, body: WormBody) -> tuple[Callable[[Mapping[str, Array]], Array] | None, tuple[str, ...]]:
         """Returns what reads the largest gap at a pin, if pins can part, and the arrays that it needs."""
@@ -164,24 +189,32 @@ class Anatomy:
             return _gap_at_vertices(_pinned_bodies(self.model, self.geometry)), ("xpos",)
         return None, ()
 
-    def locate(self, data: mujoco.MjData) -> tuple[Array, Array]:
+    def locate(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
         """Brings the engine's positions up to its coordinates, which is not part of a step.
 
         Returns:
-            Positions of the crossings, ``(n_crossings, 3)``, and of the centre of mass, ``(3,)``, m.
+            Positions of the crossings, ``(n_crossings, 3)``, of the centre of mass, ``(3,)``, and of the geoms that can
+            touch, ``(n_geoms, 3)``, m.
         """
         mujoco.mj_kinematics(self.model, data)
-        return data.site_xpos.take(self._crossing_site, axis=0), self._mass_share @ data.xipos
+        return (
+            data.site_xpos.take(self._crossing_site, axis=0),
+            self._mass_share @ data.xipos,
+            data.geom_xpos.take(self._skin_geom, axis=0),
+        )
 
-    def posture(self, crossing: Array, center_of_mass: Array) -> Posture:
-        """Measures all lengths from the positions of the crossings and adds the centre of mass."""
+    def posture(self, crossing: Array, center_of_mass: Array, skin: Array) -> Posture:
+        """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
         ends = crossing.take(self.geometry.springs, axis=-2)
         spring = _norm(ends[..., 1, :] - ends[..., 0, :])
         corners = crossing.take(self._ring_path, axis=-2)
         ring = _norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
-        front, rear = (crossing.take(self.geometry.rings[end], axis=-2).mean(axis=-2) for end in (0, -1))
-        heading = (front - rear) / _norm(front - rear)[..., np.newaxis]
-        return Posture(crossing, center_of_mass, spring, spring.take(self._sensors, axis=-1), ring, front, heading)
+        center = crossing.take(self.geometry.rings, axis=-2).mean(axis=-2)
+        front = center[..., 0, :]
+        heading = _unit(front - center[..., -1, :])
+        axis = _unit(center.take(self._before, axis=-2) - center.take(self._behind, axis=-2))
+        stretch = spring.take(self._sensors, axis=-1)
+        return Posture(crossing, center_of_mass, spring, stretch, ring, front, heading, axis, skin)
 
     def control(self, activation: Array, state: Array, ring_length_m: Array, time_s: float) -> Array:
         """Tells what the engine's actuators get under an activation, ``(n_muscles,)``: the same, or for servos a speed.
@@ -198,6 +231,14 @@ class Anatomy:
         limits = -model.actuator_forcerange[:, 0]
         return winding_speed(activation, state, ring_length_m, model.actuator_actrange, limits, self._servos, time_s)
 
+    def ground(self, engine: Mapping[str, Array]) -> Array:
+        """Reads the force of the ground on every geom of the skin during the last physics step, N, ``(n_geoms, 3)``."""
+        return self._by_geom(engine).copy()
+
+    def _by_geom(self, engine: Mapping[str, Array]) -> Array:
+        by_geom = engine["sensordata"][..., self._contact_slice]
+        return by_geom.reshape(*by_geom.shape[:-1], -1, 3)
+
     def forces(self, engine: Mapping[str, Array]) -> Forces:
         """Reads what acted during the last physics step.
 
@@ -205,8 +246,7 @@ class Anatomy:
             engine: The engine's arrays named in `outputs`.
         """
         muscle = -engine["actuator_force"]
-        by_geom = engine["sensordata"][..., self._contact_slice]
-        contact = self._segment_rows @ by_geom.reshape(*by_geom.shape[:-1], -1, 3)
+        contact = self._segment_rows @ self._by_geom(engine)
         strain = gap = np.zeros(muscle.shape[:-1])
         if self.has_edges:
             strain = np.abs(engine["flexedge_length"] * self._edges_per_m - 1.0).max(axis=-1)
@@ -267,3 +307,8 @@ def _norm(vectors: Array) -> Array:
     squares = vectors * vectors
     # In this order the last bit is that of numpy's einsum and of a dot product.
     return np.sqrt((squares[..., 0] + squares[..., 2]) + squares[..., 1])
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors of the same directions and of length one."""
+    return vectors / _norm(vectors)[..., np.newaxis]

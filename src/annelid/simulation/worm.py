@@ -10,13 +10,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.clock import StepRatio
 from annelid.config import RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, MeshGeometry
-from annelid.protocols import Recordable, Sensation, Signal, State
-from annelid.simulation.anatomy import Anatomy, Forces, Posture, add_contact_sensors
+from annelid.protocols import SIDES, Recordable, Sensation, Signal, State
+from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
+from annelid.simulation.skin import Touch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on: positions, velocities, activations, warm start, and the rods' frames
@@ -51,13 +53,14 @@ def compile_worm(config: RunConfig) -> Anatomy:
     """
     spec = build_spec(config)
     assert isinstance(config.body, WormBody)
+    assert config.arena is not None
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     add_contact_sensors(spec)
     try:
         model = compile_spec(spec)
     except ValueError as error:
         raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
-    return Anatomy(model, config.body)
+    return Anatomy(model, config.body, surface_of(config.arena))
 
 
 class Worm(ABC):
@@ -80,6 +83,7 @@ class Worm(ABC):
         self._control_step = 0
         self._posture: Posture
         self._forces: Forces = anatomy.no_forces()
+        self._touch = Touch.none(anatomy.n_segments)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -111,7 +115,7 @@ class Worm(ABC):
         """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
 
     @abstractmethod
-    def move(self, activation: Array, n_steps: int) -> Forces:
+    def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps under an activation, ``(n_muscles,)``.
 
         Raises:
@@ -147,6 +151,7 @@ class Worm(ABC):
         self.reset_engine()
         self._control_step = 0
         self._forces = self.anatomy.no_forces()
+        self._touch = Touch.none(self.n_segments)
         self._posture = self.locate()
         return self.feel()
 
@@ -183,11 +188,7 @@ class Worm(ABC):
             SimulationStopped: The engine gave up on the step.
         """
         due = self.moves_due(n_steps)
-        self._control_step += n_steps
-        if due:
-            self._forces = self.move(activation, due)
-            self._posture = self.locate()
-        return self.feel()
+        return self.strode(n_steps, self.move(activation, due) if due else None)
 
     def moves_due(self, n_steps: int) -> int:
         """Number of physics steps at the end of the next ``n_steps`` control steps, at most `steps_to_move` of them."""
@@ -198,8 +199,8 @@ class Worm(ABC):
         time_s = n_steps * self._config.clock.physics_timestep_s
         return self.anatomy.control(activation, self.actuator_state(), self._posture.ring_length, time_s)
 
-    def strode(self, n_steps: int, moved: tuple[Posture, Forces] | None) -> Sensation:
-        """Takes note of control steps as `stride` does, where somebody else moves the body.
+    def strode(self, n_steps: int, moved: Movement | None) -> Sensation:
+        """Takes note of control steps, whoever has moved the body.
 
         Args:
             n_steps: How many.
@@ -208,9 +209,18 @@ class Worm(ABC):
         Returns:
             What the body feels at their end.
         """
+        due = self.moves_due(n_steps)
         self._control_step += n_steps
         if moved is not None:
-            self._posture, self._forces = moved
+            before, (self._posture, self._forces, ground) = self._posture, moved
+            self._touch = self.anatomy.skin.felt(
+                self._touch,
+                ground,
+                before.skin,
+                self._posture.skin,
+                self._posture.axis,
+                due * self._config.clock.physics_timestep_s,
+            )
         return self.feel()
 
     def feel(self) -> Sensation:
@@ -224,6 +234,7 @@ class Worm(ABC):
             muscle_force_N=forces.muscle,
             contact_force_N=forces.contact,
             center_of_mass_m=posture.center_of_mass,
+            touch_N=self._touch.normal,
             front_m=posture.front,
             heading=posture.heading,
         )
@@ -280,6 +291,11 @@ class Worm(ABC):
                 Signal("ring_length", ("muscle",), (m,), "m", "length of a ring muscle"),
                 Signal("muscle_force", ("muscle",), (m,), "N", "contractile force of a ring muscle"),
                 Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the floor on a segment"),
+                Signal("touch", ("segment", "side"), (n, len(SIDES)), "N", "normal force of the ground on a side"),
+                Signal("contact_count", ("segment",), (n,), "1", "number of vertices that touch the ground"),
+                Signal("slip_speed", ("segment",), (n,), "m/s", "forward speed along the ground of what touches it"),
+                Signal("slip_distance", ("segment",), (n,), "m", "way that what touches the ground has slid so far"),
+                Signal("slip_loss", ("segment",), (n,), "J", "work of a segment lost to friction so far"),
                 Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass"),
                 Signal("kinetic_energy", (), (), "J", "kinetic energy"),
                 *extremes,
@@ -293,7 +309,7 @@ class Worm(ABC):
                 ),
                 Signal("qpos", ("coordinate",), (self.model.nq,), "1", "generalised position", every_frame=True),
             ),
-            coords={"muscle": self.anatomy.muscle_names, "axis": AXES},
+            coords={"muscle": self.anatomy.muscle_names, "axis": AXES, "side": SIDES},
             attrs={
                 "total_mass_kg": self.total_mass_kg,
                 "body_length_m": geometry.length_m,
@@ -302,7 +318,7 @@ class Worm(ABC):
 
     def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
         """Reads the present values of the frame signals, or of all others."""
-        posture, forces = self._posture, self._forces
+        posture, forces, touch = self._posture, self._forces, self._touch
         if frame:
             return {"crossing_position": posture.crossing, "qpos": self.qpos()}
         values: dict[str, NDArray[np.generic] | float] = {
@@ -311,6 +327,11 @@ class Worm(ABC):
             "ring_length": posture.ring_length,
             "muscle_force": forces.muscle,
             "contact_force": forces.contact,
+            "touch": touch.normal,
+            "contact_count": touch.count,
+            "slip_speed": touch.slip_speed,
+            "slip_distance": touch.slip_distance,
+            "slip_loss": touch.slip_loss,
             "center_of_mass": posture.center_of_mass,
             "kinetic_energy": self.kinetic_energy_J(),
         }
@@ -329,6 +350,7 @@ class Worm(ABC):
             "muscle_force": forces.muscle.copy(),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
+            **self._touch.state(),
         }
 
     def set_state(self, state: State) -> None:
@@ -338,6 +360,7 @@ class Worm(ABC):
         strain, gap = np.asarray(state["extremes"], dtype=float)
         muscle, contact = (np.array(state[name], dtype=float) for name in ("muscle_force", "contact_force"))
         self._forces = Forces(muscle, contact, strain, gap)
+        self._touch = Touch.of_state(state)
         self._posture = self.locate()
 
 
@@ -365,7 +388,7 @@ class WormPlant(Worm):
         if state is not None:
             mujoco.mj_setState(self.model, self.data, state, STATE_PARTS)
 
-    def move(self, activation: Array, n_steps: int) -> Forces:
+    def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps under an activation, ``(n_muscles,)``.
 
         Raises:
@@ -376,7 +399,9 @@ class WormPlant(Worm):
             mujoco.mj_step(self.model, self.data, n_steps)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None
-        return self.anatomy.forces(self._outputs)
+        # Pin gaps are read before `locate` brings positions up to the end of the step.
+        forces, ground = self.anatomy.forces(self._outputs), self.anatomy.ground(self._outputs)
+        return Movement(self.locate(), forces, ground)
 
     def actuator_state(self) -> Array:
         """Returns the engine's actuator states, ``(n_states,)``."""

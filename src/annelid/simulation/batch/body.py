@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
-from annelid.simulation.anatomy import Anatomy, Forces, Posture
+from annelid.simulation.anatomy import Anatomy, Movement, Posture
 from annelid.simulation.worm import Worm, compile_worm, engine_stopped
 
 _NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
@@ -87,22 +87,25 @@ class BodyBatch:
             }
         return {}
 
-    def forces(self, rows: Sequence[int]) -> Forces:
-        """Reads what acted on some bodies during their last physics step, with an axis of them in front."""
-        if len(rows) == len(self.worms):
-            return self._anatomy.forces(self._outputs)
-        return self._anatomy.forces({name: values[rows] for name, values in self._outputs.items()})
+    def moved(self, rows: Sequence[int]) -> list[Movement]:
+        """Reads what the last movement of some bodies has come to."""
+        outputs = self._outputs
+        if len(rows) < len(self.worms):
+            outputs = {name: values[rows] for name, values in outputs.items()}
+        postures, forces = self._postures(rows).each(), self._anatomy.forces(outputs).each()
+        return [Movement(*one) for one in zip(postures, forces, self._anatomy.ground(outputs), strict=True)]
 
-    def postures(self, rows: Sequence[int]) -> Posture:
+    def _postures(self, rows: Sequence[int]) -> Posture:
         """Reads the postures of some bodies, with an axis of them in front."""
         crossing = np.empty((len(rows), self._anatomy.geometry.n_crossings, 3))
         center_of_mass = np.empty((len(rows), 3))
+        skin = np.empty((len(rows), len(self._anatomy.skin.segment), 3))
         for place, row in enumerate(rows):
-            crossing[place], center_of_mass[place] = self.located(row)
-        return self._anatomy.posture(crossing, center_of_mass)
+            crossing[place], center_of_mass[place], skin[place] = self.located(row)
+        return self._anatomy.posture(crossing, center_of_mass, skin)
 
-    def located(self, row: int) -> tuple[Array, Array]:
-        """Returns a body's crossings, ``(n_crossings, 3)``, and centre of mass, ``(3,)``, m."""
+    def located(self, row: int) -> tuple[Array, Array, Array]:
+        """Returns a body's crossings, centre of mass and skin as `Anatomy.locate` does."""
         self._scratch.qpos[:] = self._qpos[row]
         return self.worms[row].anatomy.locate(self._scratch)
 
@@ -144,7 +147,7 @@ class BatchWorm(Worm):
         """Resets its row, and gives it a state that `engine_state` returned if there is one."""
         self._bodies.reset(self._row, state)
 
-    def move(self, activation: Array, n_steps: int) -> Forces:
+    def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps with this worm alone.
 
         Raises:
@@ -153,7 +156,7 @@ class BatchWorm(Worm):
         reasons = self._bodies.move([self._row], activation[np.newaxis], n_steps)
         if reasons:
             raise SimulationStopped(reasons[self._row])
-        return self._bodies.forces([self._row]).each()[0]
+        return self._bodies.moved([self._row])[0]
 
     def actuator_state(self) -> Array:
         """Returns the engine's actuator states, ``(n_states,)``."""

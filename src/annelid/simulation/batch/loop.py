@@ -14,7 +14,7 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
-from annelid.simulation.anatomy import Anatomy, Forces, Posture
+from annelid.simulation.anatomy import Anatomy, Movement
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BodyBatch, compile_worms
 from annelid.simulation.batch.controllers import ControllerBatch
@@ -232,7 +232,7 @@ class _Team:
         if due:
             self._each(lambda member: member.record(wall_time_s))
 
-    def _move(self, n_steps: int, activation: Mapping[int, Array]) -> dict[int, tuple[Posture, Forces]]:
+    def _move(self, n_steps: int, activation: Mapping[int, Array]) -> dict[int, Movement]:
         """Moves the bodies if they are due to move; returns what each of those that could be moved has come to."""
         if not self._rows:
             return {}
@@ -242,8 +242,7 @@ class _Team:
         stacked = np.stack([activation[row] for row in self._rows])
         reasons = self._bodies.move(self._rows, stacked, due)
         self._drop({row: SimulationStopped(reason) for row, reason in reasons.items()})
-        moved = zip(self._bodies.postures(self._rows).each(), self._bodies.forces(self._rows).each(), strict=True)
-        return dict(zip(self._rows, moved, strict=True))
+        return dict(zip(self._rows, self._bodies.moved(self._rows), strict=True))
 
     def _write_what_is_due(self) -> None:
         """Hands samples to the files and writes checkpoints, each at its interval."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from annelid.config import RunConfig
 from annelid.errors import RunFileError, SimulationStopped
 from annelid.protocols import Array, Records
-from annelid.simulation.anatomy import Forces, Posture
+from annelid.simulation.anatomy import Movement
 from annelid.simulation.batch.body import BatchWorm
 from annelid.simulation.coupling import Coupling
 from annelid.simulation.loop import recorder_of
@@ -47,7 +47,7 @@ class Member:
         """Whether it has not ended yet."""
         return self.status == "running_or_killed"
 
-    def advance(self, n_steps: int, step: int, activation: Array, moved: tuple[Posture, Forces] | None) -> None:
+    def advance(self, n_steps: int, step: int, activation: Array, moved: Movement | None) -> None:
         """Takes note of control steps, and of what the body has come to if it moved at their end.
 
         Args:

@@ -20,7 +20,7 @@ class GaitNumbers:
         speed_m_per_s: Speed of the centre of mass, forwards, m/s.
         body_lengths_per_s: The same over the body's length at rest.
         cost_of_transport: Force times half the change of the rings' lengths over weight times way.
-        slip_ratio: Backward way of the rings over the forward way of the centre of mass; None where unrecorded.
+        slip_ratio: Way that segments slip on the ground, on average, over the way of the centre of mass.
     """
 
     cycles: int
@@ -53,5 +53,10 @@ def gait_numbers(run: Run) -> GaitNumbers | None:
         speed_m_per_s=speed,
         body_lengths_per_s=speed / float(data.attrs["body_length_m"]),
         cost_of_transport=work / (weight * abs(way)) if way else None,
-        slip_ratio=None,
+        slip_ratio=_slip(data, a, b) / abs(way) if way else None,
     )
+
+
+def _slip(data, a, b):
+    slip = data["slip_distance"].values
+    return float((slip[b] - slip[a]).mean())

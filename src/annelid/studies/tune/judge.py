@@ -98,6 +98,6 @@ def _problem(outcome: Outcome, gait: GaitNumbers | None) -> str:
         return f"out of order: {rhythm.reason}"
     if gait is None or gait.cycles < LEAST_CYCLES:
         return f"fewer than {LEAST_CYCLES} whole cycles"
-    if gait.speed_m_per_s <= 0.0:
+    if not gait.speed_m_per_s > 0.0:
         return "does not advance"
     return ""

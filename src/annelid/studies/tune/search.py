@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from annelid.errors import AnnelidError, ConfigError
+from annelid.errors import AnnelidError
 from annelid.studies.case import Case
 from annelid.studies.progress import StudyProgress
 from annelid.studies.store import Store
@@ -99,7 +99,7 @@ def search(
     """
     optimiser = optimiser_of(task.variables, len(task.objectives), task.own, task.seed)
     store.compute([task.start], jobs=jobs, progress=_report(progress, "untuned gait", 0, task.n_trials))
-    untuned = _judged(task.start, store, UNTUNED, {})
+    untuned = _trial(task.start, store, UNTUNED, {})
     yield [untuned]
     found = [untuned]
     while (done := len(found) - 1) < task.n_trials:
@@ -107,7 +107,7 @@ def search(
         cases = [task.start.but(of_trial) for of_trial in values]
         errors = _compute(store, cases, jobs, _report(progress, _best_words(task, found), done, task.n_trials))
         trials = [
-            _judged(case, store, done + i, of_trial, errors.get(i, ""))
+            _trial(case, store, done + i, of_trial, errors.get(i, ""))
             for i, (case, of_trial) in enumerate(zip(cases, values, strict=True))
         ]
         optimiser.tell([scores(trial, task.objectives) for trial in trials])
@@ -167,18 +167,21 @@ def _compute(store: Store, cases: Sequence[Case], jobs: int | None, progress: An
         for i, case in enumerate(cases):
             try:
                 store.compute([case], jobs=1)
-            except ConfigError as error:
+            except AnnelidError as error:
                 errors[i] = str(error)
         return errors
     return {}
 
 
-def _judged(case: Case, store: Store, number: int, values: Mapping[str, Any], error: str = "") -> Trial:
-    if error:
-        return Trial(number, values, case, Judged(None, f"cannot be built: {error}"), store.path(case))
+def judged_run(store: Store, case: Case) -> Judged:
+    """Judges a run that the store has."""
     outcome = store[case]
-    gait = None if outcome.message else gait_numbers(store.run(case))
-    return Trial(number, values, case, judge(outcome, gait), store.path(case))
+    return judge(outcome, None if outcome.message else gait_numbers(store.run(case)))
+
+
+def _trial(case: Case, store: Store, number: int, values: Mapping[str, Any], error: str = "") -> Trial:
+    judged = Judged(None, f"cannot be built: {error}") if error else judged_run(store, case)
+    return Trial(number, values, case, judged, store.path(case))
 
 
 def _best_words(task: Task, found: Sequence[Trial]) -> str:

@@ -35,7 +35,7 @@ CONFIG = load_config(PRESET)
 
 
 def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycles: int = 3) -> GaitNumbers:
-    return GaitNumbers(cycles, 2.0, speed, speed / 0.75, cost, slip)
+    return GaitNumbers(cycles, 2.0, speed, speed / 0.75, cost, 2.0 * speed, slip)
 
 
 def test_ranges_and_choices_are_read() -> None:

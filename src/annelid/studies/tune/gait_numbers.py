@@ -20,6 +20,7 @@ class GaitNumbers:
         speed_m_per_s: Speed of the centre of mass, forwards, m/s.
         body_lengths_per_s: The same over the body's length at rest.
         cost_of_transport: Force times half the change of the rings' lengths over weight times way.
+        stride_m: Way of a cycle, m.
         slip_ratio: Way that segments slip on the ground, on average, over the way of the centre of mass.
     """
 
@@ -28,6 +29,7 @@ class GaitNumbers:
     speed_m_per_s: float
     body_lengths_per_s: float
     cost_of_transport: float | None
+    stride_m: float
     slip_ratio: float | None
 
 
@@ -53,6 +55,7 @@ def gait_numbers(run: Run) -> GaitNumbers | None:
         speed_m_per_s=speed,
         body_lengths_per_s=speed / float(data.attrs["body_length_m"]),
         cost_of_transport=work / (weight * abs(way)) if way else None,
+        stride_m=speed * float(np.diff(onsets).mean()),
         slip_ratio=_slip(data, a, b) / abs(way) if way else None,
     )
 

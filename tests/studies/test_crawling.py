@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from annelid.analysis.gait import Gait
 from annelid.config import ServoRings, WormBody, load_config
 from annelid.errors import ConfigError
 from annelid.studies.case import Case
@@ -20,7 +21,6 @@ from annelid.studies.crawling import (
     write_figure,
     write_readings,
 )
-from annelid.studies.tune.gait_numbers import GaitNumbers
 from annelid.studies.tune.judge import Judged
 
 MUSCLES, SERVOS = "riddle2025-muscles", "riddle2025"
@@ -69,7 +69,7 @@ def readings() -> list[Reading]:
     found = []
     for point in points([MUSCLES, SERVOS], "quick"):
         walks = point.gait == MUSCLES or point.value != 3
-        gait = GaitNumbers(3, 2.0, 0.1 * point.value, 0.2 * point.value, 1.5, 0.2 * point.value, 0.3)
+        gait = Gait(cycles=3, speed_m_per_s=0.1 * point.value, cost_of_transport=1.5, slip_ratio=0.3)
         found.append(Reading(point, Judged(gait, "" if walks else "silent: stalled")))
     return found
 
@@ -100,7 +100,7 @@ def test_the_figure_and_the_tables_take_gaits_that_do_not_walk(tmp_path: Path) -
 
 def test_a_reading_s_number_is_its_gait_s() -> None:
     point = Point(MUSCLES, "friction", 0.7, Case(MUSCLES))
-    gait = GaitNumbers(3, 2.0, 0.1, 0.2, 1.5, 0.2, None)
+    gait = Gait(cycles=3, speed_m_per_s=0.1, cost_of_transport=1.5)
     assert Reading(point, Judged(gait, "")).number("cost_of_transport") == 1.5
     assert Reading(point, Judged(gait, "")).number("slip_ratio") is None
     assert Reading(point, Judged(gait, "does not advance")).number("cost_of_transport") is None

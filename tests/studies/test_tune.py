@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis import RhythmScore, Summary
+from annelid.analysis.gait import Gait
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.studies import store as store_module
@@ -22,7 +23,6 @@ from annelid.studies.case import Case, Work
 from annelid.studies.outcome import Outcome
 from annelid.studies.store import Store
 from annelid.studies.tune import search as module
-from annelid.studies.tune.gait_numbers import GaitNumbers
 from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
 from annelid.studies.tune.optimiser import CmaEs, Parzen, from_unit, generation_size, optimiser_of, to_unit
 from annelid.studies.tune.results import write_gait, write_results, write_trials
@@ -34,8 +34,15 @@ GATE, TOLERANCE = "controller.gate_time_constant_ms", "sensor.tolerance_m"
 CONFIG = load_config(PRESET)
 
 
-def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycles: int = 3) -> GaitNumbers:
-    return GaitNumbers(cycles, 2.0, speed, speed / 0.75, cost, 2.0 * speed, slip)
+def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycles: int = 3) -> Gait:
+    return Gait(
+        cycles=cycles,
+        period_s=2.0,
+        speed_m_per_s=speed,
+        speed_body_lengths_per_s=speed / 0.75,
+        cost_of_transport=cost,
+        slip_ratio=slip,
+    )
 
 
 def test_ranges_and_choices_are_read() -> None:
@@ -268,7 +275,7 @@ def an_outcome(**changes: Any) -> Outcome:
         (an_outcome(), a_gait(speed=float("nan")), "does not advance"),
     ],
 )
-def test_what_does_not_walk_is_told_why_and_penalised(outcome: Outcome, gait: GaitNumbers | None, words: str) -> None:
+def test_what_does_not_walk_is_told_why_and_penalised(outcome: Outcome, gait: Gait | None, words: str) -> None:
     judged = judge(outcome, gait)
     assert judged.problem == words
     for objective in OBJECTIVES.values():

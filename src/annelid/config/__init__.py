@@ -25,6 +25,14 @@ from annelid.config.loading import load_config, parse_assignments, preset_names,
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
 from annelid.config.run import Clock, Guard, Record, RunConfig
 from annelid.config.sections import Section
+from annelid.config.turning import (
+    ConstantTurning,
+    CourseTurning,
+    HeadingTurning,
+    Steered,
+    TouchTurning,
+    TurningSection,
+)
 from annelid.config.worm import Chain, Joints, Mesh, Pins, Rings, Rods, ServoRings, Springs, Strands, WormBody
 
 __all__ = [
@@ -34,11 +42,14 @@ __all__ = [
     "Boxerbaum2012Body",
     "Chain",
     "Clock",
+    "ConstantTurning",
     "Contraction",
+    "CourseTurning",
     "Daltorio2013Body",
     "DynamicPlanarWorm",
     "Fidelity",
     "Guard",
+    "HeadingTurning",
     "HeteroclinicChannel",
     "Joints",
     "Mesh",
@@ -57,9 +68,12 @@ __all__ = [
     "SineWave",
     "SnsController",
     "Springs",
+    "Steered",
     "Strands",
     "StretchSensor",
     "TimedWave",
+    "TouchTurning",
+    "TurningSection",
     "WormBody",
     "check_config",
     "field_paths",

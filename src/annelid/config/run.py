@@ -11,6 +11,7 @@ from annelid.config.arena import Arena
 from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
 from annelid.config.sections import Positive, Section, kind_or
+from annelid.config.turning import Descending, TurningSection
 from annelid.config.worm import WormBody
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
@@ -73,6 +74,9 @@ class RunConfig(Section):
     body: Body = WormBody()
     arena: Arena | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
     controller: ControllerSection = SnsController()
+    turning: TurningSection | None = Field(
+        default=None, description="what scales the two sides of a worm with half-rings"
+    )
     sensor: StretchSensor = StretchSensor()
     clock: Clock = Clock()
     record: Record = Record()
@@ -102,6 +106,19 @@ class RunConfig(Section):
                         f"controller.contractions.{i}.segment = {contraction.segment}: must be in "
                         f"1 .. {self.body.n_segments}, the segments of the body"
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _turning_needs_two_sides(self) -> Self:
+        if self.turning is not None and not (isinstance(self.body, WormBody) and self.body.rings.layout == "halves"):
+            raise ValueError(
+                f"turning.kind = {self.turning.kind!r} needs a left and a right half of every ring: "
+                "body.kind = 'worm' with body.rings.layout = 'halves'"
+            )
+        if isinstance(self.turning, Descending) and self.turning.shares is not None:
+            n = len(self.turning.shares)
+            if n != self.body.n_segments:
+                raise ValueError(f"turning.shares has {n} entries: must have {self.body.n_segments}, one a segment")
         return self
 
     @model_validator(mode="after")

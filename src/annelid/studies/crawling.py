@@ -32,7 +32,15 @@ VALUES: Mapping[Quantity, Mapping[Effort, tuple[float, ...]]] = {
     "segments": {"full": (3, 4, 5, 6, 7, 8, 10, 12), "quick": (3, 6)},
 }
 LABELS: Mapping[Quantity, str] = {"friction": "friction of the ground", "segments": "number of segments"}
-COLUMNS = ("speed_m_per_s", "body_lengths_per_s", "stride_m", "period_s", "cost_of_transport", "slip_ratio")
+COLUMNS = {
+    "speed_m_per_s": "speed (m/s)",
+    "speed_body_lengths_per_s": "body lengths/s",
+    "stride_m": "stride (m)",
+    "period_s": "period (s)",
+    "cost_of_transport": "cost of transport",
+    "slip_ratio": "slip ratio",
+}
+"""Numbers of a gait that are written, with their heads in a table."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +154,7 @@ def crawling_table(readings: Sequence[Reading], quantity: Quantity) -> Table:
     from rich.table import Table
 
     table = Table(title=f"Crawling, by {LABELS[quantity]}")
-    heads = ("speed (m/s)", "body lengths/s", "stride (m)", "period (s)", "cost of transport", "slip ratio", "problem")
-    for head in ("gait", LABELS[quantity], *heads):
+    for head in ("gait", LABELS[quantity], *COLUMNS.values(), "problem"):
         table.add_column(head, justify="left" if head in ("gait", "problem") else "right")
     for reading in readings:
         point = reading.point
@@ -177,7 +184,7 @@ def _line(readings: Sequence[Reading], gait: str, quantity: Quantity) -> Line:
     return Line(
         _name(gait),
         tuple(one.point.value for one in own),
-        column("body_lengths_per_s"),
+        column("speed_body_lengths_per_s"),
         column("cost_of_transport"),
         column("slip_ratio"),
     )

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isfinite
 
+from annelid.analysis.gait import Gait
 from annelid.errors import ConfigError, suggest
 from annelid.studies.outcome import Outcome
-from annelid.studies.tune.gait_numbers import GaitNumbers
 
 LEAST_CYCLES = 2
 
@@ -29,7 +29,7 @@ class Objective:
     label: str
     better: str
     penalty: float
-    read: Callable[[GaitNumbers], float | None]
+    read: Callable[[Gait], float | None]
 
     def is_better(self, one: float, other: float) -> bool:
         """Whether one value is better than another."""
@@ -56,7 +56,7 @@ class Judged:
         problem: Why it does not count as a gait; empty if it does.
     """
 
-    gait: GaitNumbers | None
+    gait: Gait | None
     problem: str
 
     def value(self, objective: Objective) -> float:
@@ -79,7 +79,7 @@ def objectives_of(names: list[str]) -> list[Objective]:
     return [OBJECTIVES[name] for name in names]
 
 
-def judge(outcome: Outcome, gait: GaitNumbers | None) -> Judged:
+def judge(outcome: Outcome, gait: Gait | None) -> Judged:
     """Judges a run: it must have ended whole, in order, over at least two cycles, and advance.
 
     In order are segments that contract 1-2-..-N again and again, or in a wave (of any number of fronts) that the score
@@ -88,7 +88,7 @@ def judge(outcome: Outcome, gait: GaitNumbers | None) -> Judged:
     return Judged(gait, _problem(outcome, gait))
 
 
-def _problem(outcome: Outcome, gait: GaitNumbers | None) -> str:
+def _problem(outcome: Outcome, gait: Gait | None) -> str:
     rhythm, summary = outcome.rhythm, outcome.summary
     if outcome.message:
         return f"stopped: {outcome.message}"
@@ -98,6 +98,6 @@ def _problem(outcome: Outcome, gait: GaitNumbers | None) -> str:
         return f"out of order: {rhythm.reason}"
     if gait is None or gait.cycles < LEAST_CYCLES:
         return f"fewer than {LEAST_CYCLES} whole cycles"
-    if not gait.speed_m_per_s > 0.0:
+    if gait.speed_m_per_s is None or not gait.speed_m_per_s > 0.0:
         return "does not advance"
     return ""

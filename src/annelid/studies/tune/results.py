@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 HISTORY, BEST, FRONT, FIGURE = "trials.csv", "best.toml", "front", "tuning"
 _ROWS = {
     "speed (m/s)": "speed_m_per_s",
-    "body lengths/s": "body_lengths_per_s",
+    "body lengths/s": "speed_body_lengths_per_s",
     "cost of transport": "cost_of_transport",
+    "the same, by cables": "cost_of_transport_cables",
     "slip ratio": "slip_ratio",
     "period (s)": "period_s",
     "cycles": "cycles",
@@ -115,8 +116,9 @@ def gait_lines(trial: Trial) -> list[tuple[str, str]]:
     if gait is None:
         return [("problem", trial.judged.problem)]
     found = [
-        ("speed", f"{gait.speed_m_per_s:.4f} m/s, {gait.body_lengths_per_s:.3f} body lengths/s"),
-        ("period", f"{gait.period_s:.3f} s over {gait.cycles} cycles"),
+        ("speed (m/s)", _short(gait.speed_m_per_s)),
+        ("speed (body lengths/s)", _short(gait.speed_body_lengths_per_s)),
+        ("period (s)", _short(gait.period_s)),
         ("cost of transport", _short(gait.cost_of_transport)),
         ("slip ratio", _short(gait.slip_ratio)),
     ]

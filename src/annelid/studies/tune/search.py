@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from annelid.analysis.gait import gait
 from annelid.errors import AnnelidError
 from annelid.studies.case import Case
 from annelid.studies.progress import StudyProgress
 from annelid.studies.store import Store
-from annelid.studies.tune.gait_numbers import gait_numbers
 from annelid.studies.tune.judge import Judged, Objective, judge
 from annelid.studies.tune.optimiser import optimiser_of
 from annelid.studies.tune.space import Variable, own_values
@@ -176,7 +176,7 @@ def _compute(store: Store, cases: Sequence[Case], jobs: int | None, progress: An
 def judged_run(store: Store, case: Case) -> Judged:
     """Judges a run that the store has."""
     outcome = store[case]
-    return judge(outcome, None if outcome.message else gait_numbers(store.run(case)))
+    return judge(outcome, None if outcome.message else gait(store.run(case)))
 
 
 def _trial(case: Case, store: Store, number: int, values: Mapping[str, Any], error: str = "") -> Trial:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -23,12 +24,13 @@ def show(
     annelid show runs/riddle2023-001
     annelid show runs/riddle2023-001 --json | jq .period_s
     """
-    from annelid.analysis import summary
+    from annelid.analysis import gait, summary
     from annelid.simulation.runfile import open_run
 
     opened = open_run(run)
     if as_json:
-        typer.echo(summary(opened).to_json())
+        numbers = summary(opened).to_dict() | {"gait": gait(opened).to_dict()}
+        typer.echo(json.dumps(numbers, indent=2, allow_nan=False))
         return
     print_table(opened)
     if opened.message:

@@ -79,6 +79,9 @@ class WormScene:
         if camera in FIXED:
             self._target[:] = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
         self._offsets = (points - self._target[:, None]).reshape(-1, 3)
+        if camera in FIXED:
+            far = fitting_distance(self._offsets, *self._angles, self._aspect) / self._model.stat.extent
+            self._model.vis.map.fogstart, self._model.vis.map.fogend = 2.0 * far, 6.0 * far
         self._canvas = Canvas(self._model, width, height, backend, fine=fine)
 
     def __enter__(self) -> Self:

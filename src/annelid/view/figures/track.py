@@ -23,7 +23,7 @@ N_OUTLINES = 6
 FIRST, LAST = "#9bb0c9", "#1b2a6b"
 FRONT = "#c2410c"
 WALL = "#bf784d"
-_EDGE_IN = 1.1
+_EDGE_IN = 1.3
 """Room that labels take beside the plot, inches."""
 
 
@@ -51,7 +51,7 @@ def track_figure(run: Run, path: str | Path) -> Path:
         draw_marks(axes, run.config)
         reached = f"{track.time_s[-1]:g} s"
         panel_title(axes, f"{run.config.name}: track of {reached}, seen from above")
-        axes.legend(loc="upper right", bbox_to_anchor=(1.0, -0.12), ncols=4, borderaxespad=0.0)
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
         return save(figure, path)
 
 

@@ -88,7 +88,8 @@ def test_opposite_modulations_turn_to_opposite_sides_by_about_as_much(tmp_path: 
 
 @pytest.mark.slow
 def test_the_nervous_system_steers_the_worm_to_a_heading(tmp_path: Path) -> None:
-    own = {"body.rings.layout": "halves", "duration_s": 20.0, "turning": {"kind": "heading", "heading_deg": 30.0}}
+    turning = {"kind": "heading", "heading_deg": 30.0, "shares": list(COUNTER)}
+    own = {"body.rings.layout": "halves", "sensor.tolerance_m": 0.008, "duration_s": 20.0, "turning": turning}
     run = simulate(load_config("riddle2025-muscles", own), tmp_path / "run", progress=False)
     assert summary(run).wave
     track = track_of(run)

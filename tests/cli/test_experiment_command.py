@@ -49,12 +49,19 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         assert Path(folder, file).read_text() == "mine"
 
 
-def test_the_weak_middle_needs_a_folder(annelid: Command) -> None:
+@pytest.mark.parametrize("study", ["weak-middle", "turning"])
+def test_a_study_needs_a_folder(annelid: Command, study: str) -> None:
     Path("taken").write_text("mine")
-    done = annelid("experiment", "weak-middle", "-o", "taken")
+    done = annelid("experiment", study, "-o", "taken")
     assert done.exit_code == 2
     assert "taken is a file" in done.sentence()
     assert Path("taken").read_text() == "mine"
+
+
+def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None:
+    done = annelid("plot", "nowhere", "--figure", "trak")
+    assert done.exit_code == 2
+    assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from annelid.protocols import Array
 def detection(slips: list[int], estimated: list[float]) -> Detection:
     truth = np.array(slips, dtype=bool)[:, None]
     speed = np.array(estimated)[:, None]
-    time = 0.01 * np.arange(len(slips))
+    time = np.arange(len(slips), dtype=np.float64) * 0.01
     return Detection(time, truth, np.where(truth, 0.2, 0.0), speed, np.ones_like(truth))
 
 

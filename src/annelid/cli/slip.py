@@ -52,7 +52,7 @@ def slip_command(
 
     The six-segment worm (preset riddle2025-muscles) crawls on several frictions with the paper's network, with our
     extension neurons, and with pressure neurons too (controller sns-pressure). Speed and loss are those of whole
-    cycles. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Fifteen runs of about
+    cycles. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Eighteen runs of about
     ten seconds each; docs/slip.md explains the results.
 
     \b

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PRESET = "riddle2025-muscles"
 TUNED_AT = 0.7
 """Friction at which the feedback was tuned."""
-FRICTIONS = (0.3, 0.5, 0.7, 1.0, 1.5)
+FRICTIONS = (0.3, 0.5, 0.7, 1.0, 1.2, 1.5)
 QUICK = (0.7, 1.0)
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""

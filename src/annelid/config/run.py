@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, Tag, model_validator
 
-from annelid.config.arena import Arena
+from annelid.config.arena import ArenaSection, Pipe
 from annelid.config.controllers import (
     ControllerSection,
     HeteroclinicChannel,
@@ -18,6 +18,7 @@ from annelid.config.controllers import (
 )
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
 from annelid.config.sections import Positive, Section, kind_or
+from annelid.config.turning import Descending, TurningSection
 from annelid.config.worm import WormBody
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
@@ -65,7 +66,7 @@ class Guard(Section):
     """Limits at which a run stops because its numbers have run away."""
 
     kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body")
-    height_m: Positive = Field(default=1.0, description="of any crossing above the floor")
+    height_m: Positive = Field(default=1.0, description="of any crossing above the ground, or off a pipe's wall")
     edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
     pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
 
@@ -78,8 +79,11 @@ class RunConfig(Section):
     duration_s: Positive = Field(default=5.0, description="simulated time")
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
     body: Body = WormBody()
-    arena: Arena | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
+    arena: ArenaSection | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
     controller: ControllerSection = SnsController()
+    turning: TurningSection | None = Field(
+        default=None, description="what scales the two sides of a worm with half-rings"
+    )
     sensor: StretchSensor = StretchSensor()
     clock: Clock = Clock()
     record: Record = Record()
@@ -101,6 +105,18 @@ class RunConfig(Section):
         return self
 
     @model_validator(mode="after")
+    def _the_worm_fits_into_the_entry(self) -> Self:
+        if isinstance(self.arena, Pipe) and isinstance(self.body, WormBody):
+            free, needed = self.arena.bore_m + self.arena.entry_clearance_m, self.body.mesh.radius_m
+            if free < needed:
+                raise ValueError(
+                    f"arena.bore_m = {self.arena.bore_m:g}: with arena.entry_clearance_m = "
+                    f"{self.arena.entry_clearance_m:g} it must be at least body.mesh.radius_m = {needed:g}, the worm "
+                    "that starts inside; make it narrower further on with arena.profile"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _contractions_are_of_segments_that_exist(self) -> Self:
         if isinstance(self.controller, Program):
             for i, contraction in enumerate(self.controller.contractions):
@@ -109,6 +125,19 @@ class RunConfig(Section):
                         f"controller.contractions.{i}.segment = {contraction.segment}: must be in "
                         f"1 .. {self.body.n_segments}, the segments of the body"
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _turning_needs_two_sides(self) -> Self:
+        if self.turning is not None and not (isinstance(self.body, WormBody) and self.body.rings.layout == "halves"):
+            raise ValueError(
+                f"turning.kind = {self.turning.kind!r} needs a left and a right half of every ring: "
+                "body.kind = 'worm' with body.rings.layout = 'halves'"
+            )
+        if isinstance(self.turning, Descending) and self.turning.shares is not None:
+            n = len(self.turning.shares)
+            if n != self.body.n_segments:
+                raise ValueError(f"turning.shares has {n} entries: must have {self.body.n_segments}, one a segment")
         return self
 
     @model_validator(mode="after")

@@ -53,6 +53,18 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
+    pattern = _build_pattern(config, plant)
+    if config.turning is None:
+        return pattern
+    from annelid.control.turning import TurningController
+
+    return TurningController(
+        pattern, config.turning, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s
+    )
+
+
+def _build_pattern(config: RunConfig, plant: Plant) -> Controller:
+    """Builds the controller of the peristaltic pattern, without turning."""
     section, size = config.controller, (plant.n_segments, plant.n_muscles)
     timestep_s = config.clock.control_timestep_s
     if isinstance(section, SnsController):

@@ -5,19 +5,24 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.surface import surface_of
+from annelid.arena.contact import has_moving_planes
+from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.clock import StepRatio
-from annelid.config import RunConfig, WormBody
+from annelid.config import Pipe, RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, MeshGeometry
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
+from annelid.simulation.books import Books, Engine
+from annelid.simulation.ground import MovingGround
 from annelid.simulation.skin import Touch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -37,7 +42,7 @@ ENGINE_WARNINGS = {
     mujoco.mjtWarning.mjWARN_BADQACC: "an acceleration became unbounded or NaN",
 }
 ALARM_EVERY = 10
-"""Movements of the body between two looks at the kinetic energy, which costs a pass over all joints."""
+"""Movements of the body between two looks at what is costly to tell: kinetic energy, and the height above a relief."""
 
 
 def engine_stopped(time_s: float, error: object) -> str:
@@ -46,12 +51,12 @@ def engine_stopped(time_s: float, error: object) -> str:
 
 
 def compile_worm(config: RunConfig) -> Anatomy:
-    """Builds and compiles a worm on its floor.
+    """Builds and compiles a worm in its arena.
 
     Raises:
         ConfigError: The body is planar, or the engine refuses the model.
     """
-    spec = build_spec(config)
+    spec = build_spec(config, moving_planes=True)
     assert isinstance(config.body, WormBody)
     assert config.arena is not None
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -75,14 +80,21 @@ class Worm(ABC):
 
         Args:
             config: The run's configuration.
-            anatomy: The compiled body.
+            anatomy: The compiled body; the worm's own where friction depends on the direction of sliding.
         """
         self.anatomy = anatomy
         self._config = config
+        assert config.arena is not None
+        self._surface = surface_of(config.arena)
+        in_pipe = isinstance(config.arena, Pipe)
+        self._height_words = "distance of a crossing from the pipe's wall" if in_pipe else "height of a crossing"
+        moving = has_moving_planes(config.arena)
+        self.ground = MovingGround(anatomy.model, anatomy.geometry, config.arena) if moving else None
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._control_step = 0
         self._posture: Posture
         self._forces: Forces = anatomy.no_forces()
+        self._books: Books = anatomy.bookkeeper.opened()
         self._touch = Touch.none(anatomy.n_segments)
 
     @property
@@ -135,6 +147,10 @@ class Worm(ABC):
         """Returns the generalised positions, ``(nq,)``."""
 
     @abstractmethod
+    def plastic(self) -> Array:
+        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
+
+    @abstractmethod
     def engine_state(self) -> Array:
         """Returns a copy of all that the engine's next step depends on, as `STATE_PARTS` names it."""
 
@@ -146,11 +162,33 @@ class Worm(ABC):
     def kinetic_energy_J(self) -> float:
         """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
 
+    def elastic_energy_J(self) -> float:
+        """Energy that strands, joints and springs hold, J."""
+        return self.anatomy.elasticity.energy_J(self.qpos(), self.plastic(), self._posture.spring_length)
+
+    def potential_energy_J(self) -> float:
+        """Energy of the weight, J, zero with the centre of mass at the origin."""
+        return -self.total_mass_kg * float(self.model.opt.gravity @ self._posture.center_of_mass)
+
+    def drive(self, activation: Array, actuator_state: Array) -> Array:
+        """Tells what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
+        return actuator_state.copy() if self.model.na else activation
+
+    def book(self, engine: Engine, drive: Array) -> None:
+        """Enters one physics step in the books.
+
+        Args:
+            engine: The engine's arrays named in the bookkeeper's `outputs`, after the step.
+            drive: What `drive` returned before it.
+        """
+        self._books += self.anatomy.bookkeeper.step(engine, drive)
+
     def reset(self, seed: int) -> Sensation:
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
         self.reset_engine()
         self._control_step = 0
         self._forces = self.anatomy.no_forces()
+        self._books = self.anatomy.bookkeeper.opened()
         self._touch = Touch.none(self.n_segments)
         self._posture = self.locate()
         return self.feel()
@@ -251,11 +289,15 @@ class Worm(ABC):
                 if warned[warning]:
                     return f"{words}; a shorter clock.physics_timestep_s or softer settings may help"
         guard = self._config.guard
-        height = float(self._posture.crossing[:, 2].max())
         strain, gap = float(self._forces.edge_strain), float(self._forces.pin_gap)
-        energy = 0.0
-        if self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0:
+        height = energy = 0.0
+        due = self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0
+        if due:
             energy = self.kinetic_energy_J()
+        if due or isinstance(self._surface, Plane):
+            with np.errstate(invalid="ignore", over="ignore"):
+                distance, _ = self._surface.nearest(self._posture.crossing, first_order=True)
+                height = float(np.abs(distance).max())
         if (
             height <= guard.height_m
             and strain <= guard.edge_strain
@@ -264,7 +306,7 @@ class Worm(ABC):
         ):
             return None
         readings = (
-            ("guard.height_m", "height of a crossing", height, guard.height_m, " m"),
+            ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
             ("guard.pin_gap_m", "gap at a pin", gap, guard.pin_gap_m, " m"),
             ("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"),
@@ -290,14 +332,14 @@ class Worm(ABC):
                 Signal("spring_length", ("spring",), (len(geometry.springs),), "m", "length of an axial spring"),
                 Signal("ring_length", ("muscle",), (m,), "m", "length of a ring muscle"),
                 Signal("muscle_force", ("muscle",), (m,), "N", "contractile force of a ring muscle"),
-                Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the floor on a segment"),
+                Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the arena on a segment"),
                 Signal("touch", ("segment", "side"), (n, len(SIDES)), "N", "normal force of the ground on a side"),
                 Signal("contact_count", ("segment",), (n,), "1", "number of vertices that touch the ground"),
                 Signal("slip_speed", ("segment",), (n,), "m/s", "forward speed along the ground of what touches it"),
                 Signal("slip_distance", ("segment",), (n,), "m", "way that what touches the ground has slid so far"),
                 Signal("slip_loss", ("segment",), (n,), "J", "work of a segment lost to friction so far"),
                 Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass"),
-                Signal("kinetic_energy", (), (), "J", "kinetic energy"),
+                *_energies(m),
                 *extremes,
                 Signal(
                     "crossing_position",
@@ -334,6 +376,9 @@ class Worm(ABC):
             "slip_loss": touch.slip_loss,
             "center_of_mass": posture.center_of_mass,
             "kinetic_energy": self.kinetic_energy_J(),
+            "elastic_energy": self.elastic_energy_J(),
+            "potential_energy": self.potential_energy_J(),
+            **asdict(self._books),
         }
         if self.anatomy.has_edges:
             values["edge_strain"] = forces.edge_strain
@@ -350,6 +395,7 @@ class Worm(ABC):
             "muscle_force": forces.muscle.copy(),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
+            **asdict(self._books),
             **self._touch.state(),
         }
 
@@ -360,12 +406,25 @@ class Worm(ABC):
         strain, gap = np.asarray(state["extremes"], dtype=float)
         muscle, contact = (np.array(state[name], dtype=float) for name in ("muscle_force", "contact_force"))
         self._forces = Forces(muscle, contact, strain, gap)
+        self._books = Books(*(np.array(state[field.name], dtype=float) for field in fields(Books)))
         self._touch = Touch.of_state(state)
         self._posture = self.locate()
 
 
+def _energies(n_muscles: int) -> tuple[Signal, ...]:
+    """Energies that the worm holds, and the books of what its muscles have done and where it went."""
+    return (
+        Signal("kinetic_energy", (), (), "J", "kinetic energy"),
+        Signal("elastic_energy", (), (), "J", "energy of strands and springs"),
+        Signal("potential_energy", (), (), "J", "energy of the weight"),
+        Signal("muscle_work", ("muscle",), (n_muscles,), "J", "work done by a ring muscle so far"),
+        Signal("damping_loss", (), (), "J", "energy lost to dampers so far"),
+        Signal("constraint_loss", (), (), "J", "energy lost to contacts, friction and inextensible edges so far"),
+    )
+
+
 class WormPlant(Worm):
-    """The 3D worm on its floor, with an engine of its own."""
+    """The 3D worm in its arena, with an engine of its own."""
 
     def __init__(self, config: RunConfig) -> None:
         """Builds and compiles the body.
@@ -380,6 +439,7 @@ class WormPlant(Worm):
         self.data = mujoco.MjData(self.model)
         data = self.data
         self._outputs: dict[str, Array] = {name: getattr(data, name) for name in self.anatomy.outputs}
+        self._work: dict[str, NDArray[Any]] = {name: getattr(data, name) for name in self.anatomy.bookkeeper.outputs}
 
     def reset_engine(self, state: Array | None = None) -> None:
         """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
@@ -394,9 +454,15 @@ class WormPlant(Worm):
         Raises:
             SimulationStopped: The engine gave up.
         """
-        self.data.ctrl[:] = self.control(activation, n_steps)
+        data = self.data
+        data.ctrl[:] = self.control(activation, n_steps)
         try:
-            mujoco.mj_step(self.model, self.data, n_steps)
+            for _ in range(n_steps):
+                if self.ground is not None:
+                    self.ground.lay(data)
+                drive = self.drive(activation, data.act)
+                mujoco.mj_step(self.model, data)
+                self.book(self._work, drive)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None
         # Pin gaps are read before `locate` brings positions up to the end of the step.
@@ -414,6 +480,10 @@ class WormPlant(Worm):
     def qpos(self) -> Array:
         """Returns the generalised positions, ``(nq,)``."""
         return self.data.qpos
+
+    def plastic(self) -> Array:
+        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
+        return self.data.plastic
 
     def engine_state(self) -> Array:
         """Returns a copy of all that the engine's next step depends on."""

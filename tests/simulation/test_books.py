@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -103,6 +105,31 @@ def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(ri
         assert h * per_rate + h * h * per_length == pytest.approx(metric, abs=1e-9)
         met |= set((per_length > 0).tolist())
     assert met == {True, False}
+
+
+@pytest.mark.parametrize("rings", [{}, SERVOS], ids=["muscles", "servos"])
+def test_the_books_close_with_the_matrices_of_the_engine_s_integrator(rings: dict[str, Any]) -> None:
+    """What is left of the muscles' work is what the integrator takes: weight, contacts and work are all there."""
+    place = Path(__file__).parents[2] / "benchmarks" / "energy_balance.py"
+    spec = importlib.util.spec_from_file_location("energy_balance", place)
+    assert spec is not None
+    assert spec.loader is not None
+    benchmark = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmark)
+    clock = {"control_timestep_s": 0.005, "physics_timestep_s": 0.005}
+    plant = benchmark.AuditedWorm(load_config({"clock": clock}, {"arena.floor_gap_m": 0.0, **rings}))
+    plant.reset(0)
+    start_J, elastic_J = held(plant), plant.elastic_energy_J()
+    activation = np.resize([1.0, 0.0, 0.3], plant.n_muscles)
+    for _ in range(60):
+        plant.step(activation)
+    left = remainder(plant, start_J)
+    integrator = plant.integrator_J - plant.spring_J - (plant.elastic_energy_J() - elastic_J)
+    work = float(plant.read(False)["muscle_work"].sum())
+    assert work > 0.05
+    assert left > 0.02 * work
+    assert left == pytest.approx(integrator, abs=1e-3 * work)
+    assert float(plant.read(False)["constraint_loss"]) != 0.0
 
 
 SPRING_MASS = """

@@ -9,7 +9,7 @@ from annelid.cli.paper import paper_command
 from annelid.cli.results import plot, render, show
 from annelid.cli.robustness import robustness_command
 from annelid.cli.run import run_command
-from annelid.cli.worm import build, doctor, presets
+from annelid.cli.worm import arenas, build, doctor, presets
 
 __all__ = ["app", "main"]
 
@@ -26,6 +26,7 @@ for _name, _command in (
     ("robustness", robustness_command),
     ("calibrate", calibrate_command),
     ("presets", presets),
+    ("arenas", arenas),
     ("doctor", doctor),
 ):
     app.command(_name)(_command)

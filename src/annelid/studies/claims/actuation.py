@@ -68,8 +68,8 @@ def actuation_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Cl
             "up to 2.5 N",
             f"median {median:.2f} N while contracted, peak {peak:.0f} N",
             "The muscle settles near its shortest length, where little force is left of its peak of "
-            f"{max(body.muscles.peak_forces(body.n_segments)):.0f} N: it limits length rather than force. The peak lasts a "
-            "few milliseconds at the start of a contraction and depends on the time step.",
+            f"{max(body.muscles.peak_forces(body.n_segments)):.0f} N: it limits length rather than force. The peak "
+            "lasts a few milliseconds at the start of a contraction and depends on the time step.",
             MAIN.command,
             within,
         ),

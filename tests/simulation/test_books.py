@@ -173,3 +173,19 @@ def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
     assert data.qpos[0] < -0.1
     assert books.muscle_work[0] > 0.05
     assert books.damping_loss > 0.001
+
+
+def test_a_chain_under_euler_lacks_only_the_square_of_its_changes_of_velocity() -> None:
+    """Its mass matrix turns with the strands, which costs the identity a little."""
+    chain = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler"}
+    plant = worm(0.001, **chain)
+    start_J, squares = held(plant), 0.0
+    change = np.zeros(plant.model.nv)
+    for _ in range(60):
+        before = plant.data.qvel.copy()
+        plant.step(np.array([1.0, 0.0, 0.3]))
+        mujoco.mj_mulM(plant.model, plant.data, change, plant.data.qvel - before)
+        squares += 0.5 * float(change @ (plant.data.qvel - before))
+    work = float(plant.read(False)["muscle_work"].sum())
+    assert squares > 0.02 * work
+    assert remainder(plant, start_J) == pytest.approx(squares, abs=0.01 * work)

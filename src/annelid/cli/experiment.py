@@ -202,3 +202,55 @@ def turning_command(
     path = write_readings(turned.readings, output / "turning.csv")
     for written in (path, turning_picture(turned, path.with_suffix(""))):
         typer.echo(written)
+
+
+@experiment.command("speed")
+def speed_command(
+    gaits: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PRESET|FILE.toml]...", help="Gaits.  [default: riddle2025-muscles and crawler]"),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("speed"),
+    quick: Annotated[bool, typer.Option("--quick", help="Two values of each quantity.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")] = False,
+) -> None:
+    """Find out how fast gaits crawl over friction and number of segments.
+
+    Every gait crawls on ground of friction 0.05 to 1.5, and with 3 to 12 segments, whose inner rings are all as strong
+    as its second. Speed, stride, period, cost of transport and slip are those of whole cycles.
+
+    Writes speed.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes
+    on. Some 15 runs a gait of about ten seconds each; docs/speed_of_travel.md explains the results.
+
+    \b
+    annelid experiment speed --quick
+    annelid experiment speed
+    annelid experiment speed crawler tune/best.toml -o mine
+    """
+    from rich.console import Console
+
+    from annelid.studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            readings = crawl(store, points(gaits or GAITS, "quick" if quick else "full"), jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "experiment", "speed", *(gaits or []), "-o", str(output), *(["--quick"] if quick else [])]
+        again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        for quantity in VALUES:
+            Console().print(crawling_table(readings, quantity))
+    path = output / "speed.csv"
+    write_readings(readings, path)
+    for written in (path, write_figure(readings, path.with_suffix(""))):
+        typer.echo(written)

@@ -75,7 +75,7 @@ def product(
     """Multiplies a compressed sparse matrix, whose rows follow one another, by a vector."""
     assert np.array_equal(row_starts[1:], np.cumsum(row_sizes)[:-1])
     rows = np.repeat(np.arange(len(row_sizes)), row_sizes)
-    return np.bincount(rows, values[: len(rows)] * x[columns[: len(rows)]], minlength=len(row_sizes))
+    return np.bincount(rows, values[: len(rows)] * x[columns[: len(rows)]], minlength=len(row_sizes)).astype(np.float64)
 
 
 def balance(config: RunConfig, progress: Progress) -> dict[str, float]:

@@ -29,7 +29,7 @@ GAITS = ("riddle2025-muscles", "crawler")
 Quantity = Literal["friction", "segments"]
 VALUES: Mapping[Quantity, Mapping[Effort, tuple[float, ...]]] = {
     "friction": {"full": (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5), "quick": (0.1, 0.7)},
-    "segments": {"full": (3, 4, 5, 6, 7, 8, 10, 12), "quick": (3, 6)},
+    "segments": {"full": (3, 4, 5, 6, 8, 10, 12), "quick": (3, 6)},
 }
 LABELS: Mapping[Quantity, str] = {"friction": "friction of the ground", "segments": "number of segments"}
 COLUMNS = {

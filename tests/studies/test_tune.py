@@ -26,7 +26,7 @@ from annelid.studies.tune import search as module
 from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
 from annelid.studies.tune.optimiser import CmaEs, Parzen, from_unit, generation_size, optimiser_of, to_unit
 from annelid.studies.tune.results import write_gait, write_results, write_trials
-from annelid.studies.tune.search import UNTUNED, Task, Trial, best, compromise, front, search
+from annelid.studies.tune.search import START, Task, Trial, best, compromise, front, search
 from annelid.studies.tune.space import Choice, Interval, default_variables, parse_variable, variables_of
 
 PRESET = "riddle2023-rods"
@@ -189,11 +189,11 @@ def trials_of(task: Task) -> list[Trial]:
 
 
 @pytest.mark.usefixtures("toy")
-def test_a_search_finds_the_best_gait_and_states_the_untuned_one() -> None:
+def test_a_search_finds_the_best_gait_and_states_the_start() -> None:
     # A hundred for each variable, as is usual for a CMA-ES.
     task = toy_task(200)
     found = trials_of(task)
-    assert [trial.number for trial in found] == [UNTUNED, *range(200)]
+    assert [trial.number for trial in found] == [START, *range(200)]
     assert found[0].case == Case(PRESET, {"duration_s": 1.0})
     leader = best(found, OBJECTIVES["speed"])
     assert leader is not None
@@ -313,7 +313,7 @@ def test_every_trial_is_a_row_with_its_values_and_numbers(tmp_path: Path) -> Non
     found = trials_of(task)
     write_trials(task, found, tmp_path / "trials.csv")
     rows = list(csv.DictReader((tmp_path / "trials.csv").open()))
-    assert [row["trial"] for row in rows] == ["untuned", *map(str, range(16))]
+    assert [row["trial"] for row in rows] == ["start", *map(str, range(16))]
     for row, trial in zip(rows, found, strict=True):
         for field, value in trial.values.items():
             assert float(row[field]) == pytest.approx(value)

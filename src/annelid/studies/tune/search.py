@@ -16,7 +16,7 @@ from annelid.studies.tune.judge import Judged, Objective, judge
 from annelid.studies.tune.optimiser import optimiser_of
 from annelid.studies.tune.space import Variable, own_values
 
-UNTUNED = -1
+START = -1
 """Number of the gait that the search starts from, which is no trial."""
 
 
@@ -42,7 +42,7 @@ class Task:
 
     @property
     def start(self) -> Case:
-        """The untuned run."""
+        """The run that the search starts from."""
         return Case(self.source, self.changes)
 
     @property
@@ -56,7 +56,7 @@ class Trial:
     """One run of a search.
 
     Attributes:
-        number: Its number, from 0; `UNTUNED` for the gait that the search starts from.
+        number: Its number, from 0; `START` for the gait that the search starts from.
         values: Values of the variables, by field.
         case: The run.
         judged: What was found.
@@ -73,7 +73,7 @@ class Trial:
 def search(
     task: Task, store: Store, *, jobs: int | None = None, progress: StudyProgress | None = None
 ) -> Iterator[list[Trial]]:
-    """Searches, and hands over the trials generation by generation; first the untuned gait alone.
+    """Searches, and hands over the trials generation by generation; first the start alone.
 
     One objective over numbers is searched by CMA-ES, which starts at the source's own values if they lie in the ranges;
     two objectives, or choices among the variables, by a tree-structured Parzen estimator. Generations are asked for
@@ -94,14 +94,14 @@ def search(
 
     Raises:
         MissingDependency: Optuna or cmaes is not installed.
-        AnnelidError: The untuned run cannot be built or written.
+        AnnelidError: The run that it starts from cannot be built or written.
         KeyboardInterrupt: Finished runs are kept.
     """
     optimiser = optimiser_of(task.variables, len(task.objectives), task.own, task.seed)
-    store.compute([task.start], jobs=jobs, progress=_report(progress, "untuned gait", 0, task.n_trials))
-    untuned = _trial(task.start, store, UNTUNED, {})
-    yield [untuned]
-    found = [untuned]
+    store.compute([task.start], jobs=jobs, progress=_report(progress, "the gait it starts from", 0, task.n_trials))
+    first = _trial(task.start, store, START, {})
+    yield [first]
+    found = [first]
     while (done := len(found) - 1) < task.n_trials:
         values = optimiser.ask()[: task.n_trials - done]
         cases = [task.start.but(of_trial) for of_trial in values]

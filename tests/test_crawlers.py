@@ -27,12 +27,12 @@ def test_the_crawler_does_a_fifth_of_its_length_a_second_and_better_than_untuned
     beat = rhythm(run.data["time"].values, segment_activation(run.data["activation"].values, 6))
     assert beat.wave
     assert beat.full_cycles >= 3
-    for name in ("speed_body_lengths_per_s", "slip_ratio", "cost_of_transport"):
+    for name in ("speed_body_lengths_per_s", "slip_ratio", "cost_of_transport_cables"):
         assert None not in (getattr(tuned, name), getattr(untuned, name))
     assert tuned.speed_body_lengths_per_s > 0.2  # type: ignore[operator]
     assert tuned.speed_body_lengths_per_s > untuned.speed_body_lengths_per_s  # type: ignore[operator]
     assert tuned.slip_ratio < untuned.slip_ratio  # type: ignore[operator]
-    assert tuned.cost_of_transport < untuned.cost_of_transport  # type: ignore[operator]
+    assert tuned.cost_of_transport_cables < untuned.cost_of_transport_cables  # type: ignore[operator]
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from annelid.arena.surface import Plane
 from annelid.config import load_config
 from annelid.protocols import SIDES, Array
 from annelid.simulation.skin import Skin, Touch, sides_of
@@ -143,19 +144,6 @@ def test_sides_are_quarters_and_mirror_images(turn: float, reach: float) -> None
     assert expected[int(side)] == pytest.approx(max(expected.values()), abs=1e-6)
 
 
-class Slanted:
-    """A plane with a given unit normal."""
-
-    def __init__(self, normal: Array) -> None:
-        self._normal = normal
-
-    def distance_m(self, points_m: Array) -> Array:
-        return points_m @ self._normal
-
-    def normal(self, points_m: Array) -> Array:
-        return np.broadcast_to(self._normal, points_m.shape)
-
-
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_on_any_plane_only_the_way_along_it_costs(seed: int) -> None:
@@ -164,7 +152,7 @@ def test_on_any_plane_only_the_way_along_it_costs(seed: int) -> None:
     normal, along, _ = np.linalg.qr(random.normal(size=(3, 3)))[0].T
     n_geoms, n_segments, pull, way = 40, 3, 0.4, 0.01
     rest, segment = random.normal(size=(n_geoms, 3)), random.integers(0, n_segments, n_geoms)
-    skin = Skin(rest, segment, n_segments, 0.1, Slanted(normal))
+    skin = Skin(rest, segment, n_segments, 0.1, Plane(normal, 0.0))
     pressure = random.uniform(0.0, 2.0, n_geoms) * (random.random(n_geoms) < 0.5)
     ground = pressure[:, None] * (normal - pull * along)
     axis = np.tile(along, (n_segments, 1))

@@ -40,7 +40,7 @@ def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycl
         period_s=2.0,
         speed_m_per_s=speed,
         speed_body_lengths_per_s=speed / 0.75,
-        cost_of_transport=cost,
+        cost_of_transport_cables=cost,
         slip_ratio=slip,
     )
 

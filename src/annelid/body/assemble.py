@@ -7,7 +7,9 @@ import warnings
 import mujoco
 import numpy as np
 
-from annelid.arena.floor import add_floor
+from annelid.arena.contact import add_moving_planes, has_moving_planes
+from annelid.arena.gravity import gravity_of
+from annelid.arena.scenery import add_rails, add_scenery
 from annelid.body.actuation import add_ring_actuators, add_springs
 from annelid.body.chain import add_chains
 from annelid.body.elimination import order_elimination
@@ -36,14 +38,17 @@ def mesh_of(mesh: Mesh) -> MeshGeometry:
     )
 
 
-def build_spec(config: RunConfig) -> mujoco.MjSpec:
-    """Builds the MuJoCo spec of a 3D worm on its floor.
+def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSpec:
+    """Builds the MuJoCo spec of a 3D worm in its arena.
 
     Names in the spec: sites ``crossing_<i>``, tendons ``spring_<k>`` and ``ring_<s>`` (or ``ring_<s>_left``
     and ``_right``), actuators the same as the rings, strands ``strand_<s>``.
 
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
+        moving_planes: Where the engine has no one plane for the ground, add planes that are laid under the skin before
+            every step (`annelid.simulation.ground`), and nothing to see; else all that is seen, and panels that hold
+            the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.
@@ -54,23 +59,28 @@ def build_spec(config: RunConfig) -> mujoco.MjSpec:
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
+    laid = moving_planes and has_moving_planes(arena)
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
     spec.compiler.degree = False
     spec.option.timestep = config.clock.physics_timestep_s
-    spec.option.gravity = [0.0, 0.0, -arena.gravity_m_per_s2]
+    spec.option.gravity = gravity_of(arena)
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
     if isinstance(body.formulation, Chain):
-        add_chains(spec, geometry, body, body.formulation, arena)
+        add_chains(spec, geometry, body, body.formulation, arena, vertices_touch=laid)
     else:
         add_rods(spec, geometry, body, body.formulation, arena)
     add_springs(spec, geometry, body.springs)
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:
         add_joint_friction(spec, geometry, body.joints)
-    add_floor(spec, arena, geometry.length_m)
+    if laid:
+        add_moving_planes(spec, arena)
+        add_rails(spec, arena)
+    else:
+        add_scenery(spec, arena, geometry.length_m)
     return spec
 
 

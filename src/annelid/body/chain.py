@@ -14,16 +14,24 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from annelid.arena.floor import contact_options
+from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
-from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA
+from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
 from annelid.config import Arena, Chain, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
 JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
 
 
-def add_chains(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: Arena) -> None:
+def add_chains(
+    spec: mujoco.MjSpec,
+    geometry: MeshGeometry,
+    body: WormBody,
+    formulation: Chain,
+    arena: Arena,
+    *,
+    vertices_touch: bool = False,
+) -> None:
     """Adds the mesh as chains of capsules, and the paper's solver settings.
 
     Args:
@@ -32,6 +40,7 @@ def add_chains(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, form
         body: Materials and pins.
         formulation: Joints, pins and integrator.
         arena: Contact settings, which the strands share with the floor.
+        vertices_touch: A sphere at each vertex touches the ground instead of the capsules.
     """
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{formulation.integrator.upper()}")
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
@@ -46,6 +55,7 @@ def add_chains(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, form
             body.strands,
             formulation,
             contact=contact_options(arena),
+            vertices_touch=vertices_touch,
             rgba=STRAND_RGBA[strand // geometry.n_per_plane],
         )
     for crossing in range(geometry.n_crossings):
@@ -60,6 +70,7 @@ def add_chain(
     formulation: Chain,
     *,
     contact: dict[str, list[float]] | None = None,
+    vertices_touch: bool = False,
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     root: int | None = None,
     fixed_root: bool = False,
@@ -73,6 +84,7 @@ def add_chain(
         strands: Material.
         formulation: Kind of joint and its numerical inertia.
         contact: Contact attributes; None for a chain that touches nothing.
+        vertices_touch: A sphere at each vertex touches instead of the capsules.
         rgba: Colour.
         root: Element that the tree grows from, by default the middle one.
         fixed_root: Welds the root element to the world (a cantilever).
@@ -92,10 +104,14 @@ def add_chain(
             size=[strands.radius_m, 0.0, 0.0],
             mass=strands.linear_density_kg_per_m * length,
             contype=0,
-            conaffinity=0 if contact is None else 1,
+            conaffinity=0 if contact is None or vertices_touch else 1,
             rgba=rgba,
             **(contact or {}),
         )
+        if contact is not None and vertices_touch:
+            own = {element, element + 1} if element == middle else {element, element + 1} - {joint_vertex}
+            for vertex in sorted(own):
+                add_touch(link, strands.radius_m, contact, vertices_m[vertex] - place)
         return link
 
     first = add_element(spec.worldbody, middle, middle, np.zeros(3))

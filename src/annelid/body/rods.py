@@ -21,12 +21,13 @@ from math import pi
 import mujoco
 import numpy as np
 
-from annelid.arena.floor import contact_options
+from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.config import Arena, Rods, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
 AXES = np.eye(3)
+ORIGIN = np.zeros(3)
 STRAND_RGBA = ((0.12, 0.35, 0.75, 1.0), (0.25, 0.5, 0.85, 1.0))
 PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
 EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
@@ -98,13 +99,13 @@ def _add_vertices(
         )
         pin.add_site(name=name, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
         if shared:
-            _add_touch(pin, body.strands.radius_m, contact)
+            add_touch(pin, body.strands.radius_m, contact)
             for strand in strands:
                 names[strand][vertex] = name
             continue
         for strand in strands:
             point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
-            _add_touch(point, body.strands.radius_m, contact)
+            add_touch(point, body.strands.radius_m, contact)
             _tie(spec, pin, point, formulation)
 
     between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
@@ -112,7 +113,7 @@ def _add_vertices(
         with _built_apart(spec, vertex_name(strand, "")) as part:
             for vertex in between:
                 point = add_vertex(part, str(vertex), geometry.vertices_m[strand, vertex], masses[vertex])
-                _add_touch(point, body.strands.radius_m, contact)
+                add_touch(point, body.strands.radius_m, contact)
     return names
 
 
@@ -194,10 +195,18 @@ def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> 
     return point
 
 
-def _add_touch(point: mujoco.MjsBody, radius_m: float, contact: dict[str, list[float]]) -> None:
-    """Lets a vertex touch the floor: one sphere, where a flex would make a contact for each strand of a crossing."""
+def add_touch(point: mujoco.MjsBody, radius_m: float, contact: dict[str, list[float]], place_m: Array = ORIGIN) -> None:
+    """Lets a vertex touch the ground: one sphere, where a flex would make a contact for each strand of a crossing.
+
+    Args:
+        point: The vertex' body.
+        radius_m: Radius of the strand.
+        contact: Contact attributes.
+        place_m: The vertex in the body's axes, m, ``(3,)``.
+    """
     point.add_geom(
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        pos=place_m,
         size=[radius_m, 0.0, 0.0],
         mass=0.0,
         contype=0,

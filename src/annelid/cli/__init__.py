@@ -10,7 +10,7 @@ from annelid.cli.results import plot, render, show
 from annelid.cli.robustness import robustness_command
 from annelid.cli.run import run_command
 from annelid.cli.tune import tune_command
-from annelid.cli.worm import build, doctor, presets
+from annelid.cli.worm import arenas, build, doctor, presets
 
 __all__ = ["app", "main"]
 
@@ -28,6 +28,7 @@ for _name, _command in (
     ("tune", tune_command),
     ("calibrate", calibrate_command),
     ("presets", presets),
+    ("arenas", arenas),
     ("doctor", doctor),
 ):
     app.command(_name)(_command)

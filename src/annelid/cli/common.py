@@ -30,6 +30,14 @@ FidelityLevel = Annotated[
         "  [default: as the preset has it, fast for riddle2023-rods]",
     ),
 ]
+ArenaName = Annotated[
+    str | None,
+    typer.Option(
+        "--arena",
+        metavar="ARENA|FILE.toml",
+        help="Put the 3D worm elsewhere: a name of `annelid arenas`, or a TOML file  [default: where the preset is]",
+    ),
+]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
 
@@ -65,18 +73,24 @@ def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any
     return parse_assignments(assignments or []) | given
 
 
-def config_of(source: str, overrides: dict[str, Any], segments: int | None, fidelity: str | None = None) -> RunConfig:
+def config_of(
+    source: str,
+    overrides: dict[str, Any],
+    segments: int | None,
+    fidelity: str | None = None,
+    arena: str | None = None,
+) -> RunConfig:
     """Loads a preset or a TOML file with what is changed in it.
 
     Raises:
-        ConfigError: There is no such preset, file or level of fidelity, or a value is out of range.
+        ConfigError: There is no such preset, file, level of fidelity or arena, or a value is out of range.
     """
     from annelid.config import PlanarWorm, load_config
 
     if segments is not None:
         planar = isinstance(load_config(source).body, PlanarWorm)
         overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
-    return load_config(source, overrides, fidelity=fidelity)
+    return load_config(source, overrides, fidelity=fidelity, arena=arena)
 
 
 def refuse_existing(path: Path, force: bool) -> None:

@@ -156,6 +156,54 @@ def weak_middle_command(
         typer.echo(written)
 
 
+@experiment.command("turning")
+def turning_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path(
+        "turning"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+) -> None:
+    """Find out on which radius the worm turns.
+
+    The authors' six-segment robot with half-rings crawls on flat ground under constant modulations of its two sides,
+    with three gaits: the timed pattern 3x1 with all segments modulated alike, the same with the middle segments bent
+    the other way, and the nervous system with ideal muscles.
+
+    Writes turning.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes
+    on. 21 runs of some seconds to a minute each; docs/turning.md explains the results.
+
+    \b
+    annelid experiment turning --quick
+    annelid experiment turning -o turning
+    """
+    from rich.console import Console
+
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+    from annelid.studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "experiment", "turning", "-o", str(output), *(["--quick"] if quick else [])]
+        again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        Console().print(turning_table(turned.readings))
+    path = write_readings(turned.readings, output / "turning.csv")
+    for written in (path, turning_picture(turned, path.with_suffix(""))):
+        typer.echo(written)
+
+
 @experiment.command("speed")
 def speed_command(
     gaits: Annotated[

@@ -83,7 +83,9 @@ def render(
     video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv")] = None,
     fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
-    camera: Annotated[str | None, typer.Option(help="isometric, side, top or front  [default: isometric]")] = None,
+    camera: Annotated[
+        str | None, typer.Option(help="isometric, side, top, front or course  [default: isometric]")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Draw a frame or a video of a run.

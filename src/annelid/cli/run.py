@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from annelid.cli.common import (
+    ArenaName,
     Assignments,
     FidelityLevel,
     Preset,
@@ -34,6 +35,7 @@ def run_command(
     assignments: Assignments = None,
     segments: Segments = None,
     fidelity: FidelityLevel = None,
+    arena: ArenaName = None,
     duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of every random draw.")] = None,
     out: Annotated[
@@ -82,6 +84,7 @@ def run_command(
     annelid run riddle2023                                   the paper's own worm to the letter, in a minute
     annelid run --segments 4 --fidelity accurate             four segments, finely resolved
     annelid run riddle2023-rods --set arena.friction=0.3     any field of any preset
+    annelid run --arena pipe.bend --set arena.radius=0.8     elsewhere: annelid arenas lists the places
     annelid run my.toml --duration 20 --out long             your own file, your own folder
     annelid run --resume long --duration 40                  twenty seconds more
 
@@ -107,11 +110,11 @@ def run_command(
 
     overrides = overrides_of(assignments, duration_s=duration, seed=seed)
     if resume is None:
-        config = config_of(or_default(preset, fidelity), overrides, segments, fidelity)
-    elif preset is None and segments is None and fidelity is None:
+        config = config_of(or_default(preset, fidelity), overrides, segments, fidelity, arena)
+    elif (preset, segments, fidelity, arena) == (None, None, None, None):
         config = _config_to_continue(resume, overrides)
     else:
-        raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments or --fidelity with it")
+        raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments, --fidelity or --arena")
     with _run_folder(out, config.name) as folder:
         try:
             if uncertainty is None:
@@ -127,7 +130,7 @@ def run_command(
                     jobs=jobs,
                     overwrite=force,
                     quiet=quiet,
-                    given=command_words(preset, assignments, segments, fidelity, duration, seed),
+                    given=command_words(preset, assignments, segments, fidelity, arena, duration, seed),
                 )
                 done = open_run(folder)
         except SimulationStopped as stop:

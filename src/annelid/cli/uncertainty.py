@@ -88,11 +88,18 @@ def command_words(
     assignments: list[str] | None,
     segments: int | None,
     fidelity: str | None,
+    arena: str | None,
     duration_s: float | None,
     seed: int | None,
 ) -> list[str]:
     """Returns the words of a command line that tell a worm; what is None was not given."""
-    options = {"--segments": segments, "--fidelity": fidelity, "--duration": duration_s, "--seed": seed}
+    options = {
+        "--segments": segments,
+        "--fidelity": fidelity,
+        "--arena": arena,
+        "--duration": duration_s,
+        "--seed": seed,
+    }
     words = [] if preset is None else [preset]
     words += [word for assignment in assignments or () for word in ("--set", assignment)]
     return words + [word for name, value in options.items() if value is not None for word in (name, str(value))]

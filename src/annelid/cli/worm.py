@@ -1,5 +1,5 @@
 # ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
-"""The commands on what there is before a run: `build`, `presets` and `doctor`."""
+"""The commands on what there is before a run: `build`, `presets`, `arenas` and `doctor`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import (
+    ArenaName,
     Assignments,
     FidelityLevel,
     Force,
@@ -28,19 +29,26 @@ def build(
     assignments: Assignments = None,
     segments: Segments = None,
     fidelity: FidelityLevel = None,
+    arena: ArenaName = None,
     force: Force = False,
 ) -> None:
     """Write a worm and its arena as MJCF, for plain MuJoCo.
 
     \b
     annelid build riddle2023-rods -o worm.xml
+    annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
     from annelid.body import build_spec, compile_spec
     from annelid.view.output import whole_file
 
     refuse_existing(output, force)
-    config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity)
+    config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity, arena)
+    if config.arena is not None and config.arena.has_setae:
+        raise ConfigError(
+            f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
+            "the same in both directions: leave it out or run the worm with annelid"
+        )
     spec = build_spec(config)
     try:
         compile_spec(spec)
@@ -76,6 +84,29 @@ def presets(
         typer.echo("\n".join(field_lines(load_config(or_default(name)))))
         return
     Console().print(presets_table([load_config(each) for each in preset_names()]))
+
+
+def arenas(
+    name: Annotated[str | None, typer.Argument(help="Print this arena's commented TOML.")] = None,
+) -> None:
+    """List the arenas that a 3D worm can be put into, or print one.
+
+    What it prints is a start for a file of your own; any field can be set with --set.
+
+    \b
+    annelid arenas
+    annelid arenas pipe.bend > my_pipe.toml
+    annelid run --arena my_pipe.toml --set arena.radius=0.8
+    """
+    from rich.console import Console
+
+    from annelid.config import arena_names, arena_summary, arena_text
+    from annelid.view.table import arenas_table
+
+    if name is not None:
+        typer.echo(arena_text(name), nl=False)
+        return
+    Console().print(arenas_table({each: arena_summary(each) for each in arena_names()}))
 
 
 def doctor() -> None:

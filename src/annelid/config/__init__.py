@@ -6,7 +6,7 @@ A configuration is a tree of sections (`run`, `worm`, `planar`, `controllers`). 
 sets how finely a 3D worm is resolved.
 """
 
-from annelid.config.arena import Arena
+from annelid.config.arena import Arena, ArenaSection, Floor, Pipe, Relief, Rough, Steps
 from annelid.config.checking import check_config, field_paths, fields_of
 from annelid.config.controllers import (
     AdaptiveSns,
@@ -21,7 +21,16 @@ from annelid.config.controllers import (
     TimedWave,
 )
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
-from annelid.config.loading import load_config, parse_assignments, preset_names, preset_text, toml_value
+from annelid.config.loading import (
+    arena_names,
+    arena_summary,
+    arena_text,
+    load_config,
+    parse_assignments,
+    preset_names,
+    preset_text,
+    toml_value,
+)
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
 from annelid.config.run import Clock, Guard, Record, RunConfig
 from annelid.config.sections import Section
@@ -39,6 +48,7 @@ __all__ = [
     "LEVELS",
     "AdaptiveSns",
     "Arena",
+    "ArenaSection",
     "Boxerbaum2012Body",
     "Chain",
     "Clock",
@@ -48,6 +58,7 @@ __all__ = [
     "Daltorio2013Body",
     "DynamicPlanarWorm",
     "Fidelity",
+    "Floor",
     "Guard",
     "HeadingTurning",
     "HeteroclinicChannel",
@@ -55,13 +66,16 @@ __all__ = [
     "Mesh",
     "PhaseChain",
     "Pins",
+    "Pipe",
     "PlanarBody",
     "PlanarWorm",
     "Program",
     "Record",
+    "Relief",
     "Rings",
     "RobustSns",
     "Rods",
+    "Rough",
     "RunConfig",
     "Section",
     "ServoRings",
@@ -69,12 +83,16 @@ __all__ = [
     "SnsController",
     "Springs",
     "Steered",
+    "Steps",
     "Strands",
     "StretchSensor",
     "TimedWave",
     "TouchTurning",
     "TurningSection",
     "WormBody",
+    "arena_names",
+    "arena_summary",
+    "arena_text",
     "check_config",
     "field_paths",
     "fields_of",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, get_origin
 
@@ -64,11 +64,64 @@ def _sections_of(annotation: Any) -> list[type[Section]]:
     return found
 
 
+UNITS = frozenset(
+    {"m", "s", "ms", "m2", "s2", "kg", "N", "Nm", "Nms", "Ns", "J", "W", "Pa", "Hz", "deg", "rad", "mV", "nA", "nF"}
+    | {"uS", "per"}
+)
+"""Parts of the units that end the names of fields."""
+
+
+def whole_path(path: str, tree: Mapping[str, Any]) -> str:
+    """Completes a dotted path whose field is given without its unit.
+
+    Args:
+        path: For example ``arena.radius`` for ``arena.radius_m``.
+        tree: The configuration that it belongs to, whose kinds of sections decide; need not be checked.
+
+    Returns:
+        The path of the one field that differs by a unit only, or else the path as it is.
+
+    Raises:
+        ConfigError: Several fields differ by a unit only.
+    """
+    *sections, leaf = path.split(".")
+    members: Sequence[type[BaseModel]] = [RunConfig]
+    level: Any = tree
+    for name in sections:
+        found = [s for member in members if name in member.model_fields for s in _field_sections(member, name)]
+        level = level.get(name) if isinstance(level, Mapping) else None
+        kind = level.get("kind") if isinstance(level, Mapping) else None
+        members = [s for s in found if kind is not None and _kind_of(s) == kind] or found
+    fields = dict.fromkeys(field for member in members for field in member.model_fields)
+    if leaf in fields:
+        return path
+    whole = [field for field in fields if field.startswith(f"{leaf}_") and _is_unit(field.removeprefix(f"{leaf}_"))]
+    if len(whole) > 1:
+        raise ConfigError(f"{path} is ambiguous: name one of {', '.join('.'.join((*sections, w)) for w in whole)}")
+    return ".".join((*sections, *(whole or [leaf])))
+
+
+def _field_sections(section: type[BaseModel], field: str) -> list[type[Section]]:
+    return _sections_of(section.model_fields[field].annotation)
+
+
+def _kind_of(section: type[Section]) -> Any:
+    return section.model_fields["kind"].default if "kind" in section.model_fields else None
+
+
+def _is_unit(words: str) -> bool:
+    return UNITS.issuperset(words.split("_"))
+
+
 _KINDS = {
     "worm",
     "riddle2022",
     "daltorio2013",
     "boxerbaum2012",
+    "floor",
+    "steps",
+    "rough",
+    "pipe",
     "rods",
     "chain",
     "muscle",

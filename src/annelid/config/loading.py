@@ -1,4 +1,4 @@
-"""Reading presets, TOML files and overrides into a checked configuration."""
+"""Reading presets, arenas, TOML files and overrides into a checked configuration."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from annelid.config.checking import check_config
+from annelid.config.arena import SHARED
+from annelid.config.checking import check_config, whole_path
 from annelid.config.fidelity import fidelity_changes, find_level
 from annelid.config.run import RunConfig
 from annelid.config.sections import Section
@@ -21,8 +22,7 @@ DEFAULT_BASE = "riddle2023-rods"
 
 def preset_names() -> list[str]:
     """Returns the names of the presets that come with annelid."""
-    folder = resources.files("annelid") / "presets"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return _names("presets")
 
 
 def preset_text(name: str) -> str:
@@ -31,9 +31,41 @@ def preset_text(name: str) -> str:
     Raises:
         ConfigError: No preset has that name; the sentence suggests the nearest.
     """
-    if name not in preset_names():
-        raise ConfigError(f"unknown preset {name!r}: {suggest(name, preset_names())}")
-    return (resources.files("annelid") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return _text("presets", "preset", name)
+
+
+def arena_names() -> list[str]:
+    """Returns the names of the arenas that come with annelid."""
+    return _names("arenas")
+
+
+def arena_text(name: str) -> str:
+    """Returns the commented TOML of an arena: a line about it, and its table ``[arena]``.
+
+    Raises:
+        ConfigError: No arena has that name; the sentence suggests the nearest.
+    """
+    return _text("arenas", "arena", name)
+
+
+def arena_summary(name: str) -> str:
+    """Returns an arena's line about it.
+
+    Raises:
+        ConfigError: No arena has that name; the sentence suggests the nearest.
+    """
+    return str(tomllib.loads(arena_text(name))["summary"])
+
+
+def _names(folder: str) -> list[str]:
+    entries = (resources.files("annelid") / folder).iterdir()
+    return sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml"))
+
+
+def _text(folder: str, what: str, name: str) -> str:
+    if name not in _names(folder):
+        raise ConfigError(f"unknown {what} {name!r}: {suggest(name, _names(folder))}")
+    return (resources.files("annelid") / folder / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def load_config(
@@ -41,6 +73,7 @@ def load_config(
     overrides: Mapping[str, Any] | None = None,
     *,
     fidelity: str | None = None,
+    arena: str | Path | None = None,
 ) -> RunConfig:
     """Loads a preset, a TOML file or a mapping, applies overrides, and checks all of it.
 
@@ -48,21 +81,26 @@ def load_config(
         source: Name of a preset, path of a TOML file (recognised by its suffix ``.toml``), or nested mapping.
             A file or mapping may name a preset or another file to start from with ``extends``; a file that
             neither does so nor states ``body.kind`` starts from ``riddle2023-rods``.
-        overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``; whole sections too.
-            A section whose ``kind`` changes keeps nothing of what it had before.
+        overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``; whole sections too. The
+            unit at the end of a field's name may be left out (``arena.radius``). A section whose ``kind`` changes
+            keeps nothing of what it had before.
         fidelity: How finely a 3D worm is resolved: a level of `annelid.config.LEVELS`; lies over what the source
             says and under the overrides. None leaves the source as it is.
+        arena: Where the worm is put instead: a name of `arena_names`, or a TOML file with a table ``[arena]``; lies
+            under the overrides. Friction, gravity and contacts stay the source's where the arena does not state them.
 
     Returns:
         The checked configuration.
 
     Raises:
-        ConfigError: Unknown preset, level or field, unreadable file, or a value out of its range.
+        ConfigError: Unknown preset, arena, level or field, unreadable file, or a value out of its range.
     """
     tree = _read_tree(source)
     if fidelity is not None:
         preset = _read_tree(find_level(fidelity).preset)
         tree = _overridden(tree, fidelity_changes(fidelity, tree, preset))
+    if arena is not None:
+        tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     return check_config(_overridden(tree, overrides or {}))
 
 
@@ -100,10 +138,21 @@ def toml_value(value: Any) -> str:
     return json.dumps(value)
 
 
+def _arena_instead(present: Any, name: str | Path) -> dict[str, Any]:
+    """Returns the table of another arena, with the fields of every arena from the present one where it has none."""
+    from_file = str(name).endswith(".toml")
+    stated = (_read_file(Path(name)) if from_file else tomllib.loads(arena_text(str(name)))).get("arena")
+    if not isinstance(stated, Mapping):
+        raise ConfigError(f"{name} describes no arena: it must have a table [arena]")
+    shared = present if isinstance(present, Mapping) else {}
+    return {field: shared[field] for field in SHARED if field in shared} | dict(stated)
+
+
 def _overridden(tree: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
     """Lays values given by dotted path over a tree."""
     for path, value in sorted(overrides.items(), key=_kinds_first):
         nested: Any = value
+        path = whole_path(path, tree)
         for key in reversed(path.split(".")):
             nested = {key: nested}
         tree = _merge(tree, nested)

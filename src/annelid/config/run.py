@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, Tag, model_validator
 
-from annelid.config.arena import Arena
+from annelid.config.arena import ArenaSection, Pipe
 from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
 from annelid.config.sections import Positive, Section, kind_or
@@ -59,7 +59,7 @@ class Guard(Section):
     """Limits at which a run stops because its numbers have run away."""
 
     kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body")
-    height_m: Positive = Field(default=1.0, description="of any crossing above the floor")
+    height_m: Positive = Field(default=1.0, description="of any crossing above the ground, or off a pipe's wall")
     edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
     pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
 
@@ -72,7 +72,7 @@ class RunConfig(Section):
     duration_s: Positive = Field(default=5.0, description="simulated time")
     seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
     body: Body = WormBody()
-    arena: Arena | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
+    arena: ArenaSection | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
     controller: ControllerSection = SnsController()
     turning: TurningSection | None = Field(
         default=None, description="what scales the two sides of a worm with half-rings"
@@ -95,6 +95,18 @@ class RunConfig(Section):
     def _no_ground_for_planar_worms(self) -> Self:
         if isinstance(self.body, PlanarWorm) and self.arena is not None:
             raise ValueError(f"arena has no effect on body.kind = {self.body.kind!r}, which touches no ground")
+        return self
+
+    @model_validator(mode="after")
+    def _the_worm_fits_into_the_entry(self) -> Self:
+        if isinstance(self.arena, Pipe) and isinstance(self.body, WormBody):
+            free, needed = self.arena.bore_m + self.arena.entry_clearance_m, self.body.mesh.radius_m
+            if free < needed:
+                raise ValueError(
+                    f"arena.bore_m = {self.arena.bore_m:g}: with arena.entry_clearance_m = "
+                    f"{self.arena.entry_clearance_m:g} it must be at least body.mesh.radius_m = {needed:g}, the worm "
+                    "that starts inside; make it narrower further on with arena.profile"
+                )
         return self
 
     @model_validator(mode="after")

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.contact import touching
 from annelid.arena.surface import Surface
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors, winding_speed
@@ -24,28 +25,28 @@ from annelid.simulation.books import Bookkeeper
 from annelid.simulation.elasticity import Elasticity
 from annelid.simulation.skin import Skin
 
-FLOOR = "floor"
 _NET_FORCE = 3
 """The engine's number for a contact sensor that adds up all contacts of a pair."""
 
 
 def add_contact_sensors(spec: mujoco.MjSpec) -> None:
-    """Adds, for every geom that can touch the floor, a sensor of the floor's net force on it in the world's axes.
+    """Adds, for every geom of the skin and every geom of the arena that it can touch, a sensor of the net force on it.
 
-    They change nothing in the motion, take no measurable time, and read the same in a batch as alone.
+    Forces are in the world's axes. The sensors change nothing in the motion, take no measurable time, and read the same
+    in a batch as alone.
     """
     force = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
-    for number, geom in enumerate(spec.geoms):
-        if geom.name == FLOOR or not (geom.contype or geom.conaffinity):
-            continue
-        geom.name = geom.name or f"geom_{number}"
+    grounds = [geom.name for geom in spec.geoms if geom.contype]
+    pairs = [(ground, geom.name) for geom in touching(spec) for ground in grounds]
+    pairs += [(pair.geomname1, pair.geomname2) for pair in spec.pairs]
+    for ground, skin in pairs:
         spec.add_sensor(
-            name=f"floor_on_{geom.name}",
+            name=f"{ground}_on_{skin}",
             type=mujoco.mjtSensor.mjSENS_CONTACT,
             objtype=mujoco.mjtObj.mjOBJ_GEOM,
-            objname=FLOOR,
+            objname=ground,
             reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname=geom.name,
+            refname=skin,
             intprm=[force, _NET_FORCE, 1],
         )
 
@@ -94,7 +95,7 @@ class Forces(_Rows):
 
     Attributes:
         muscle: Contractile force of every ring muscle, N, ``(n_muscles,)``.
-        contact: Force of the floor on every segment, N, ``(n_segments, 3)``.
+        contact: Force of the arena on every segment, N, ``(n_segments, 3)``.
         edge_strain: Largest strain of a rod's edge, ``()``; 0 for a chain.
         pin_gap: Largest gap between two pinned strands, m, ``()``; 0 where pins cannot part.
     """

@@ -12,15 +12,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.surface import surface_of
+from annelid.arena.contact import has_moving_planes
+from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.clock import StepRatio
-from annelid.config import RunConfig, WormBody
+from annelid.config import Pipe, RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, MeshGeometry
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
 from annelid.simulation.books import Books, Engine
+from annelid.simulation.ground import MovingGround
 from annelid.simulation.skin import Touch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -40,7 +42,7 @@ ENGINE_WARNINGS = {
     mujoco.mjtWarning.mjWARN_BADQACC: "an acceleration became unbounded or NaN",
 }
 ALARM_EVERY = 10
-"""Movements of the body between two looks at the kinetic energy, which costs a pass over all joints."""
+"""Movements of the body between two looks at what is costly to tell: kinetic energy, and the height above a relief."""
 
 
 def engine_stopped(time_s: float, error: object) -> str:
@@ -49,12 +51,12 @@ def engine_stopped(time_s: float, error: object) -> str:
 
 
 def compile_worm(config: RunConfig) -> Anatomy:
-    """Builds and compiles a worm on its floor.
+    """Builds and compiles a worm in its arena.
 
     Raises:
         ConfigError: The body is planar, or the engine refuses the model.
     """
-    spec = build_spec(config)
+    spec = build_spec(config, moving_planes=True)
     assert isinstance(config.body, WormBody)
     assert config.arena is not None
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -78,10 +80,16 @@ class Worm(ABC):
 
         Args:
             config: The run's configuration.
-            anatomy: The compiled body.
+            anatomy: The compiled body; the worm's own where friction depends on the direction of sliding.
         """
         self.anatomy = anatomy
         self._config = config
+        assert config.arena is not None
+        self._surface = surface_of(config.arena)
+        in_pipe = isinstance(config.arena, Pipe)
+        self._height_words = "distance of a crossing from the pipe's wall" if in_pipe else "height of a crossing"
+        moving = has_moving_planes(config.arena)
+        self.ground = MovingGround(anatomy.model, anatomy.geometry, config.arena) if moving else None
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._control_step = 0
         self._posture: Posture
@@ -281,11 +289,15 @@ class Worm(ABC):
                 if warned[warning]:
                     return f"{words}; a shorter clock.physics_timestep_s or softer settings may help"
         guard = self._config.guard
-        height = float(self._posture.crossing[:, 2].max())
         strain, gap = float(self._forces.edge_strain), float(self._forces.pin_gap)
-        energy = 0.0
-        if self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0:
+        height = energy = 0.0
+        due = self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0
+        if due:
             energy = self.kinetic_energy_J()
+        if due or isinstance(self._surface, Plane):
+            with np.errstate(invalid="ignore", over="ignore"):
+                distance, _ = self._surface.nearest(self._posture.crossing, first_order=True)
+                height = float(np.abs(distance).max())
         if (
             height <= guard.height_m
             and strain <= guard.edge_strain
@@ -294,7 +306,7 @@ class Worm(ABC):
         ):
             return None
         readings = (
-            ("guard.height_m", "height of a crossing", height, guard.height_m, " m"),
+            ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
             ("guard.pin_gap_m", "gap at a pin", gap, guard.pin_gap_m, " m"),
             ("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"),
@@ -320,7 +332,7 @@ class Worm(ABC):
                 Signal("spring_length", ("spring",), (len(geometry.springs),), "m", "length of an axial spring"),
                 Signal("ring_length", ("muscle",), (m,), "m", "length of a ring muscle"),
                 Signal("muscle_force", ("muscle",), (m,), "N", "contractile force of a ring muscle"),
-                Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the floor on a segment"),
+                Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the arena on a segment"),
                 Signal("touch", ("segment", "side"), (n, len(SIDES)), "N", "normal force of the ground on a side"),
                 Signal("contact_count", ("segment",), (n,), "1", "number of vertices that touch the ground"),
                 Signal("slip_speed", ("segment",), (n,), "m/s", "forward speed along the ground of what touches it"),
@@ -412,7 +424,7 @@ def _energies(n_muscles: int) -> tuple[Signal, ...]:
 
 
 class WormPlant(Worm):
-    """The 3D worm on its floor, with an engine of its own."""
+    """The 3D worm in its arena, with an engine of its own."""
 
     def __init__(self, config: RunConfig) -> None:
         """Builds and compiles the body.
@@ -446,6 +458,8 @@ class WormPlant(Worm):
         data.ctrl[:] = self.control(activation, n_steps)
         try:
             for _ in range(n_steps):
+                if self.ground is not None:
+                    self.ground.lay(data)
                 drive = self.drive(activation, data.act)
                 mujoco.mj_step(self.model, data)
                 self.book(self._work, drive)

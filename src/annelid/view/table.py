@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.paper import Published, published
@@ -85,6 +85,16 @@ def presets_table(presets: Sequence[RunConfig]) -> Table:
     table = Table("preset", "what it is", "segments", "simulated", box=None, pad_edge=False)
     for config in presets:
         table.add_row(config.name, config.summary, str(config.body.n_segments), f"{config.duration_s:g} s")
+    return table
+
+
+def arenas_table(summaries: Mapping[str, str]) -> Table:
+    """Lists arenas, their names and summaries."""
+    from rich.table import Table
+
+    table = Table("arena", "what it is", box=None, pad_edge=False)
+    for name, summary in summaries.items():
+        table.add_row(name, summary)
     return table
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import mujoco
@@ -10,7 +11,8 @@ import numpy as np
 from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
-from annelid.config import RunConfig
+from annelid.arena.surface import surface_of
+from annelid.config import RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Movement, Posture
@@ -54,6 +56,7 @@ class BodyBatch:
         self._plastic: Array = bind("plastic") if models[0].nplastic else np.empty((len(models), 0))
         self._act: Array = bind("act") if models[0].na else np.empty((len(models), 0))
         self._mass_matrix = bind("M")
+        self._mocap = (bind("mocap_pos"), bind("mocap_quat")) if models[0].nmocap else None
         self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
         self._work: dict[str, NDArray[Any]] = {name: bind(name) for name in self._anatomy.bookkeeper.outputs}
         self._scratch = mujoco.MjData(models[0])
@@ -84,6 +87,9 @@ class BodyBatch:
             self._ctrl[row] = self.worms[row].control(own, n_steps)
         going, reasons = dict(zip(rows, activation, strict=True)), {}
         for _ in range(n_steps):
+            if self._mocap is not None:
+                for row in going:
+                    self._lay_ground(row)
             stopped = self._step({row: self.worms[row].drive(own, self._act[row]) for row, own in going.items()})
             reasons |= stopped
             going = {row: own for row, own in going.items() if row not in stopped}
@@ -103,6 +109,16 @@ class BodyBatch:
             if row not in reasons:
                 self.worms[row].book({name: values[row] for name, values in self._work.items()}, drive)
         return reasons
+
+    def _lay_ground(self, row: int) -> None:
+        """Lays the planes under one body's skin."""
+        ground, scratch = self.worms[row].ground, self._scratch
+        assert ground is not None
+        assert self._mocap is not None
+        scratch.qpos[:], scratch.qvel[:] = self._qpos[row], self._qvel[row]
+        ground.lay(scratch)
+        for bound, laid in zip(self._mocap, (scratch.mocap_pos, scratch.mocap_quat), strict=True):
+            bound[row] = laid
 
     def moved(self, rows: Sequence[int]) -> list[Movement]:
         """Reads what the last movement of some bodies has come to."""
@@ -219,6 +235,12 @@ def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
     for config in configs:
         physical = config.model_dump_json(include={"body", "arena", "clock"})
         if physical not in models:
-            models[physical] = compile_worm(config)
-        anatomies.append(models[physical])
+            anatomies.append(models.setdefault(physical, compile_worm(config)))
+            continue
+        known = models[physical]
+        # Friction by the direction of sliding is set in the model, which such worms cannot share.
+        assert isinstance(config.body, WormBody)
+        assert config.arena is not None
+        own = config.arena.has_setae
+        anatomies.append(Anatomy(copy(known.model), config.body, surface_of(config.arena)) if own else known)
     return anatomies

@@ -18,7 +18,7 @@ import numpy as np
 
 from annelid.body import build_spec, compile_spec, mesh_of
 from annelid.body.actuation import crossing_site, ring_names
-from annelid.config import Arena, Rods, RunConfig, WormBody
+from annelid.config import Floor, Rods, RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.studies.calibration.loop import Loop
 
@@ -115,7 +115,7 @@ def _hastened(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
     if body.joints is not None:
         viscous = {"viscous_friction_Nms_per_rad": body.joints.viscous_friction_Nms_per_rad / haste}
         changed["joints"] = body.joints.model_copy(update=viscous)
-    afloat = Arena(gravity_m_per_s2=0.0, floor_gap_m=10.0)
+    afloat = Floor(gravity_m_per_s2=0.0, floor_gap_m=10.0)
     return config.model_copy(update={"body": body.model_copy(update=changed), "arena": afloat})
 
 

@@ -24,8 +24,8 @@ HISTORY, BEST, FRONT, FIGURE = "trials.csv", "best.toml", "front", "tuning"
 _ROWS = {
     "speed (m/s)": "speed_m_per_s",
     "body lengths/s": "speed_body_lengths_per_s",
-    "cost of transport": "cost_of_transport",
-    "the same, by cables": "cost_of_transport_cables",
+    "cost of transport": "cost_of_transport_cables",
+    "the same, net work": "cost_of_transport",
     "slip ratio": "slip_ratio",
     "period (s)": "period_s",
     "cycles": "cycles",
@@ -119,7 +119,7 @@ def gait_lines(trial: Trial) -> list[tuple[str, str]]:
         ("speed (m/s)", _short(gait.speed_m_per_s)),
         ("speed (body lengths/s)", _short(gait.speed_body_lengths_per_s)),
         ("period (s)", _short(gait.period_s)),
-        ("cost of transport", _short(gait.cost_of_transport)),
+        ("cost of transport", _short(gait.cost_of_transport_cables)),
         ("slip ratio", _short(gait.slip_ratio)),
     ]
     return [(label, number) for label, number in found if number]

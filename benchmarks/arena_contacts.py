@@ -1,0 +1,168 @@
+"""How the ground is best felt: planes that move with the skin, panels, a height field, or a mesh as a distance field.
+
+The six-segment worm with muscles walks into a bend, and over rough ground, once for each candidate. Printed are the
+time to build the model, the time of a physics step (planes are laid within it), contacts a step, the most contacts of
+one vertex, and the leak: how far the centre of a vertex, a strand's radius inside the skin, ever was outside.
+
+    python benchmarks/arena_contacts.py --seconds 4
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from time import perf_counter, process_time
+
+import mujoco
+import numpy as np
+
+from annelid.arena.contact import contact_options, touching
+from annelid.arena.panels import add_panels
+from annelid.arena.shapes import shape_of
+from annelid.arena.surface import surface_of
+from annelid.body import build_spec, compile_spec
+from annelid.config import Arena, Floor, RunConfig, load_config
+from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.assemble import build_controller
+from annelid.simulation.worm import Worm, WormPlant
+
+WORM = {
+    "arena.friction": 0.7,
+    "body.rings": {"kind": "muscle", "layout": "whole", "peak_force_N": 31.0, "length_range_m": [0.62, 1.1]},
+    "controller.gate_time_constant_ms": 300.0,
+    "sensor.tolerance_m": 0.005,
+    "sensor.startup_hold_s": 0.2,
+}
+SOFT = {"arena.contact_time_constant_s": 0.02, "arena.contact_impedance": [0.9, 0.95, 0.001]}
+"""The presets' contacts, the engine's default."""
+HARD = {
+    "clock.physics_timestep_s": 0.005,
+    "arena.contact_time_constant_s": 0.01,
+    "arena.contact_impedance": [0.99, 0.999, 0.001],
+}
+"""The engine takes no contact to be faster than two steps."""
+WALL_M = 0.03
+SDF_STEPS = 10
+Ground = Callable[[mujoco.MjSpec, Arena, float], None]
+
+
+class StillGround(WormPlant):
+    """The worm on a ground that stands still."""
+
+    def __init__(self, config: RunConfig, add_ground: Ground) -> None:
+        far = Floor(**config.arena.model_dump(include=set(Arena.model_fields)), floor_gap_m=50.0)
+        spec = build_spec(config.model_copy(update={"arena": far}))
+        add_ground(spec, config.arena, spec.stat.extent)
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        spec.delete(spec.geom("floor"))
+        _add_contact_sensors(spec)
+        Worm.__init__(self, config, Anatomy(compile_spec(spec), config.body))
+        self.ground = None
+        self.data = mujoco.MjData(self.model)
+        self._outputs = {name: getattr(self.data, name) for name in self.anatomy.outputs}
+
+
+def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
+    """Adds a sensor of the whole world's force on every vertex: one for each panel would be far too many."""
+    for geom in touching(spec):
+        spec.add_sensor(
+            name=f"world_on_{geom.name}",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname="world",
+            reftype=mujoco.mjtObj.mjOBJ_GEOM,
+            refname=geom.name,
+            intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1],
+        )
+
+
+def panels(around: int) -> Ground:
+    """Returns what adds a pipe of so many panels round it, or a height field."""
+    return lambda spec, arena, length_m: add_panels(spec, arena, length_m, around)
+
+
+def mesh_field(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
+    """Adds a pipe's wall, closed and 3 cm thick, as a mesh whose distance field the engine computes."""
+    inner = shape_of(arena, length_m)
+    surface = surface_of(arena)
+    outer = inner.vertices_m - WALL_M * surface.normal(inner.vertices_m)
+    n, around = len(inner.vertices_m), int(inner.faces[1, 1])
+    last = n - around
+    ring = np.stack([np.arange(around), (np.arange(around) + 1) % around], axis=-1)
+    rims = []
+    for start, flip in ((0, False), (last, True)):
+        a, b = start + ring[:, 0], start + ring[:, 1]
+        rim = np.concatenate([np.stack([a, b, a + n], axis=-1), np.stack([b, b + n, a + n], axis=-1)])
+        rims.append(rim[:, ::-1] if flip else rim)
+    faces = np.concatenate([inner.faces[:, ::-1], inner.faces + n, *rims])
+    corners = np.concatenate([inner.vertices_m, outer])
+    volume = np.einsum("ij,ij->", corners[faces[:, 0]], np.cross(corners[faces[:, 1]], corners[faces[:, 2]])) / 6
+    faces = faces if volume > 0 else faces[:, ::-1]
+    spec.add_mesh(name="wall", uservert=corners.ravel(), userface=faces.ravel())
+    geom = {"type": mujoco.mjtGeom.mjGEOM_SDF, "meshname": "wall", **contact_options(arena)}
+    spec.worldbody.add_geom(name="wall", **geom)
+
+
+def measure(name: str, config: RunConfig, ground: Ground | None, n_moves: int) -> None:
+    """Walks and prints a line."""
+    began = perf_counter()
+    plant = WormPlant(config) if ground is None else StillGround(config, ground)
+    built = perf_counter() - began
+    controller = build_controller(config, plant)
+    controller.reset(0)
+    sensation = plant.reset(0)
+    surface = surface_of(config.arena)
+    skin = sorted({int(g) for g in np.flatnonzero(_is_skin(plant.model))})
+    radius = config.body.strands.radius_m
+    spent, contacts, most, leak, strain = 0.0, [], 0, -radius, 0.0
+    stride = plant.steps_to_move()
+    for _ in range(n_moves):
+        for _ in range(stride):
+            activation = controller.step(sensation)
+            before = process_time()
+            sensation = plant.step(activation)
+            spent += process_time() - before
+        touched = plant.data.contact.geom
+        contacts.append(len(touched))
+        if len(touched):
+            most = max(most, int(np.bincount(touched[np.isin(touched, skin)].ravel()).max()))
+        leak = max(leak, -float(surface.distance_m(plant.data.geom_xpos[skin]).min()))
+        strain = max(strain, float(plant.read(False)["edge_strain"]))
+    travel = plant.geometry.length_m / 2 - sensation.center_of_mass_m[0]
+    print(
+        f"{name:34s} {built:6.1f} s {1e3 * spent / n_moves:8.2f} ms {np.mean(contacts):8.1f} {most:4d}"
+        f" {1e3 * leak:8.2f} mm {100 * strain:7.2f} % {100 * travel:7.1f} cm"
+    )
+
+
+def _is_skin(model: mujoco.MjModel) -> np.ndarray:
+    """Spheres that can touch: those of the strands, not of the pins."""
+    spheres = model.geom_type == int(mujoco.mjtGeom.mjGEOM_SPHERE)
+    paired = np.zeros(model.ngeom, dtype=bool)
+    paired[model.pair_geom1], paired[model.pair_geom2] = True, True
+    return spheres & (paired | (model.geom_conaffinity > 0))
+
+
+def main() -> None:
+    """Measures all candidates."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seconds", type=float, default=4.0, help="simulated time of each candidate")
+    seconds = parser.parse_args().seconds
+    heads = ("build", 8), ("step", 11), ("contacts", 8), ("most", 4), ("leak", 11), ("strain", 9), ("travel", 10)
+    print(f"{'candidate':34s}", *(f"{word:>{width}s}" for word, width in heads))
+    for name, worm in (("10 ms, soft", WORM | SOFT), ("5 ms, hard", WORM | HARD)):
+        level = load_config("riddle2025", worm, arena="floor")
+        bend = load_config("riddle2025", worm | {"arena.straight_m": 0.0}, arena="pipe.bend")
+        rough = load_config("riddle2025", worm | {"arena.start_m": 0.0}, arena="rough")
+        moves = round(seconds / bend.clock.physics_timestep_s)
+        measure(f"{name}: level floor, one plane", level, None, moves)
+        measure(f"{name}: bend, moving planes", bend, None, moves)
+        measure(f"{name}: rough, moving planes", rough, None, moves)
+    for around in (16, 32, 64):
+        measure(f"{name}: bend, {around} panels around", bend, panels(around), moves)
+    measure(f"{name}: rough, height field of 2 cm", rough, panels(0), moves)
+    measure(f"{name}: bend, mesh, {SDF_STEPS} steps only", bend, mesh_field, SDF_STEPS)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""How skin and ground touch: contact settings, and the planes that move with the skin.
+
+A level floor and guard rails are planes of the engine. Every other ground is felt through one plane for each part of
+the skin that can touch, tangent to the ground at the nearest point and paired with that part alone. The planes hang on
+mocap bodies, which are part of the engine's state, and are laid anew before every step (`annelid.simulation.ground`):
+the ground has no seams, one part has one contact, and a step costs the same on any ground (docs/arenas.md).
+"""
+
+from __future__ import annotations
+
+import mujoco
+
+from annelid.config import Arena, Floor
+
+PLANE_HALF_SIZE_M = 0.01
+"""Of a moving plane as drawn; the engine's planes have no end."""
+HIDDEN_GROUP = 4
+
+
+def contact_options(arena: Arena) -> dict[str, list[float]]:
+    """Contact attributes that worm and floor share, so that neither dilutes the other's."""
+    return {
+        "friction": [arena.friction, 0.005, 0.0001],
+        "solref": [arena.contact_time_constant_s, 1.0],
+        "solimp": [*arena.contact_impedance, 0.5, 2.0],
+    }
+
+
+def has_moving_planes(arena: Arena) -> bool:
+    """Tells whether the skin feels the ground through planes that move with it, not through a plane of the engine."""
+    return type(arena) is not Floor or arena.has_setae
+
+
+def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
+    """Returns the geoms of the skin that can touch the ground, in the order of the spec, each with a name."""
+    skin = [geom for geom in spec.geoms if geom.conaffinity and not geom.contype]
+    for number, geom in enumerate(skin):
+        geom.name = geom.name or f"skin_{number}"
+    return skin
+
+
+def plane_name(skin: str) -> str:
+    """Name of the moving plane, its body and its pair that belong to a geom of the skin."""
+    return f"ground_of_{skin}"
+
+
+def add_moving_planes(spec: mujoco.MjSpec, arena: Arena) -> None:
+    """Adds one plane on a mocap body for every geom that can touch the ground, and pairs the two.
+
+    Args:
+        spec: The worm's spec, complete but for the ground.
+        arena: Contact settings.
+    """
+    options = contact_options(arena)
+    slide, spin, roll = options.pop("friction")
+    rails = isinstance(arena, Floor) and arena.rail_gap_m is not None
+    for geom in touching(spec):
+        name = plane_name(geom.name)
+        holder = spec.worldbody.add_body(name=name, mocap=True)
+        holder.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[PLANE_HALF_SIZE_M, PLANE_HALF_SIZE_M, 1.0],
+            contype=0,
+            conaffinity=0,
+            group=HIDDEN_GROUP,
+        )
+        spec.add_pair(
+            name=name,
+            geomname1=name,
+            geomname2=geom.name,
+            condim=3,
+            friction=[slide, slide, spin, roll, roll],
+            **options,
+        )
+        geom.conaffinity = 1 if rails else 0

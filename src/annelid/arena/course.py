@@ -1,0 +1,263 @@
+"""The centre line of a pipe, made of straights and curves, and the bore along it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, cos, inf, pi, radians, sin
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.config import Pipe
+from annelid.protocols import Array
+
+AHEAD, LEFT, UP = (np.array(axis, dtype=float) for axis in ((-1, 0, 0), (0, -1, 0), (0, 0, 1)))
+"""Directions of the worm at the start: it leads towards -x, its left is -y."""
+ENTRY_RAMP_M = 0.1
+"""Length over which the entry's clearance ends, from the worm's front on."""
+ROUNDING_M = 0.02
+"""Length over which the bore's slope changes where a taper begins or ends."""
+HELIX_STEPS = 8
+"""Newton steps to the nearest point of a helix; quadratic, so that four would do near the pipe."""
+
+
+class Foot(NamedTuple):
+    """Points of a centre line that are nearest to given points.
+
+    Attributes:
+        arc_m: Arc length from the worm's front, m, ``(...)``.
+        point_m: Position, m, ``(..., 3)``.
+        tangent: Unit tangent, ``(..., 3)``.
+        curvature_per_m: Curvature vector, which points to the centre of the curve, 1/m, ``(..., 3)``.
+    """
+
+    arc_m: Array
+    point_m: Array
+    tangent: Array
+    curvature_per_m: Array
+
+
+class Piece(Protocol):
+    """One straight or curve of a centre line."""
+
+    def nearest(self, points_m: Array) -> Foot:
+        """Finds its nearest points to points, m, ``(..., 3)``."""
+        ...
+
+    def at(self, arc_m: Array) -> Foot:
+        """Finds its points at arc lengths, m, ``(...)``, which go on beyond its ends."""
+        ...
+
+
+@dataclass(frozen=True)
+class Straight:
+    """A straight between two arc lengths, either of which may be infinite.
+
+    Attributes:
+        start_m: Its point at arc length ``first_m``, or at 0 where that is infinite, ``(3,)``.
+        direction: Unit vector, ``(3,)``.
+        first_m: Arc length at its start, m.
+        last_m: Arc length at its end, m.
+    """
+
+    start_m: Array
+    direction: Array
+    first_m: float
+    last_m: float
+
+    def nearest(self, points_m: Array) -> Foot:
+        """Finds its nearest points to points, m, ``(..., 3)``."""
+        along = (points_m - self.start_m) @ self.direction + self._origin
+        return self.at(np.clip(along, self.first_m, self.last_m))
+
+    def at(self, arc_m: Array) -> Foot:
+        """Finds its points at arc lengths, m, ``(...)``."""
+        point = self.start_m + (arc_m - self._origin)[..., np.newaxis] * self.direction
+        return Foot(arc_m, point, np.broadcast_to(self.direction, point.shape), np.zeros(point.shape))
+
+    @property
+    def _origin(self) -> float:
+        return self.first_m if self.first_m > -inf else 0.0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A circular arc or a helix about an axis.
+
+    Attributes:
+        centre_m: The axis' point at the height of the curve's start, ``(3,)``.
+        outwards: Unit vector from there to the start, ``(3,)``.
+        onwards: Unit vector across it, in which the curve goes about the axis, ``(3,)``.
+        axis: Unit vector of the axis, ``(3,)``.
+        radius_m: Distance from the axis, m.
+        rise_m_per_rad: Rise along the axis per angle, m/rad; 0 for an arc.
+        angle_rad: The whole angle.
+        first_m: Arc length at its start, m.
+    """
+
+    centre_m: Array
+    outwards: Array
+    onwards: Array
+    axis: Array
+    radius_m: float
+    rise_m_per_rad: float
+    angle_rad: float
+    first_m: float
+
+    @property
+    def length_m_per_rad(self) -> float:
+        """Arc length per angle, m/rad."""
+        return float(np.hypot(self.radius_m, self.rise_m_per_rad))
+
+    @property
+    def last_m(self) -> float:
+        """Arc length at its end, m."""
+        return self.first_m + self.angle_rad * self.length_m_per_rad
+
+    def nearest(self, points_m: Array) -> Foot:
+        """Finds its nearest points to points, m, ``(..., 3)``."""
+        away = points_m - self.centre_m
+        x, y, height = (away @ axis for axis in (self.outwards, self.onwards, self.axis))
+        angle, rise = np.arctan2(y, x), self.rise_m_per_rad
+        turn = 2.0 * pi
+        # Of all turns, the one nearest in height, or for an arc the one about its middle.
+        wanted = height / rise if rise else self.angle_rad / 2
+        angle = angle + turn * np.round((wanted - angle) / turn)
+        if rise:
+            reach = self.radius_m * np.hypot(x, y)
+            azimuth = angle
+            for _ in range(HELIX_STEPS):
+                slope = reach * np.sin(angle - azimuth) - rise * (height - rise * angle)
+                bend = np.maximum(reach * np.cos(angle - azimuth) + rise**2, rise**2)
+                angle = angle - slope / bend
+        return self._at_angle(np.clip(angle, 0.0, self.angle_rad))
+
+    def at(self, arc_m: Array) -> Foot:
+        """Finds its points at arc lengths, m, ``(...)``."""
+        return self._at_angle((arc_m - self.first_m) / self.length_m_per_rad)
+
+    def _at_angle(self, angle: Array) -> Foot:
+        c, s = np.cos(angle)[..., np.newaxis], np.sin(angle)[..., np.newaxis]
+        radial, along = c * self.outwards + s * self.onwards, c * self.onwards - s * self.outwards
+        per_rad, rise = self.length_m_per_rad, self.rise_m_per_rad
+        return Foot(
+            self.first_m + angle * per_rad,
+            self.centre_m + self.radius_m * radial + (rise * angle)[..., np.newaxis] * self.axis,
+            (self.radius_m * along + rise * self.axis) / per_rad,
+            -self.radius_m / per_rad**2 * radial,
+        )
+
+
+@dataclass(frozen=True)
+class Course:
+    """A smooth centre line; it starts and ends in straights that go on for ever.
+
+    Attributes:
+        pieces: Its pieces in order.
+        joints_m: Arc lengths at which one piece ends and the next begins, m.
+    """
+
+    pieces: tuple[Piece, ...]
+    joints_m: tuple[float, ...]
+
+    def nearest(self, points_m: Array) -> Foot:
+        """Finds the line's nearest points to points, m, ``(..., 3)``."""
+        feet = [piece.nearest(points_m) for piece in self.pieces]
+        if len(feet) == 1:
+            return feet[0]
+        squares = np.stack([((points_m - foot.point_m) ** 2).sum(axis=-1) for foot in feet])
+        return _chosen(feet, squares.argmin(axis=0))
+
+    def at(self, arc_m: Array) -> Foot:
+        """Finds the line's points at arc lengths from the worm's front, m, ``(...)``."""
+        return _chosen([piece.at(arc_m) for piece in self.pieces], np.searchsorted(self.joints_m, arc_m))
+
+
+def _chosen(feet: Sequence[Foot], piece: NDArray[np.intp]) -> Foot:
+    """Takes each point from the piece that its number names."""
+    chosen = [np.array(field) for field in feet[0]]
+    for number, foot in enumerate(feet[1:], start=1):
+        mine = piece == number
+        for all_of_them, own in zip(chosen, foot, strict=True):
+            all_of_them[mine] = own[mine]
+    return Foot(*chosen)
+
+
+def course_of(pipe: Pipe) -> Course:
+    """Returns a pipe's centre line in the coordinates of the worm's model; arc lengths count from the worm's front."""
+    start = pipe.bore_m * UP
+    if pipe.course == "straight":
+        return Course((Straight(start, AHEAD, -inf, inf),), ())
+    turn = radians(pipe.turn_deg)
+    rise = pipe.pitch_m / (2 * pi) if pipe.course == "helix" else 0.0
+    curve = _curve(start + pipe.straight_m * AHEAD, AHEAD, UP, pipe.radius_m, rise, turn, pipe.straight_m)
+    pieces: list[Straight | Curve] = [Straight(start, AHEAD, -inf, pipe.straight_m), curve]
+    if pipe.course == "s":
+        end = curve.at(np.array(curve.last_m))
+        pieces.append(_curve(end.point_m, end.tangent, UP, pipe.radius_m, 0.0, -turn, curve.last_m))
+    last = pieces[-1].at(np.array(pieces[-1].last_m))
+    pieces.append(Straight(last.point_m, last.tangent, pieces[-1].last_m, inf))
+    return Course(tuple(pieces), tuple(piece.last_m for piece in pieces[:-1]))
+
+
+def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, turn_rad: float, arc_m: float) -> Curve:
+    """Joins a curve smoothly to what ends at a point; the axis of a helix leans so far that its start is level."""
+    outwards = np.sign(turn_rad) * np.cross(tangent, up)
+    lean = atan2(rise, radius)
+    onwards, axis = cos(lean) * tangent - sin(lean) * up, sin(lean) * tangent + cos(lean) * up
+    return Curve(start - radius * outwards, outwards, onwards, axis, radius, rise, abs(turn_rad), arc_m)
+
+
+@dataclass(frozen=True)
+class Bore:
+    """The radius of a pipe along its centre line: parabolas that join smoothly, constant beyond the ends.
+
+    Attributes:
+        arc_m: Arc lengths between which the slope changes evenly, m, ``(n_knots,)``.
+        slope: Slope of the radius there, ``(n_knots,)``; 0 at both ends.
+        radius_m: Radius there, m, ``(n_knots,)``.
+    """
+
+    arc_m: Array
+    slope: Array
+    radius_m: Array
+
+    def at(self, arc_m: Array) -> tuple[Array, Array]:
+        """Returns radius, m, and slope at arc lengths from the worm's front, m."""
+        inside = np.clip(arc_m, self.arc_m[0], self.arc_m[-1])
+        knot = np.clip(np.searchsorted(self.arc_m, inside) - 1, 0, len(self.arc_m) - 2)
+        slope = np.interp(inside, self.arc_m, self.slope)
+        return self.radius_m[knot] + (inside - self.arc_m[knot]) * (self.slope[knot] + slope) / 2, slope
+
+
+def bore_of(pipe: Pipe) -> Bore:
+    """Returns a pipe's bore: wider at the entry by the clearance, then as the profile says."""
+    parts = [_ramp(0.0, ENTRY_RAMP_M, -pipe.entry_clearance_m)]
+    change = pipe.narrowest_m - pipe.bore_m
+    if pipe.profile == "taper":
+        parts.append(_ramp(pipe.profile_start_m, pipe.profile_length_m, change))
+    if pipe.profile == "hourglass":
+        parts.append(_waist(pipe.profile_start_m, pipe.profile_length_m, change))
+    arc = np.unique(np.concatenate([knots for knots, _ in parts]))
+    slope = sum((np.interp(arc, *part, left=0.0, right=0.0) for part in parts), np.zeros(len(arc)))
+    rises = np.diff(arc) * (slope[1:] + slope[:-1]) / 2
+    radius = pipe.bore_m + pipe.entry_clearance_m + np.concatenate([[0.0], np.cumsum(rises)])
+    return Bore(arc, slope, radius)
+
+
+def _ramp(start: float, length: float, change: float) -> tuple[Array, Array]:
+    """Arc lengths and slopes of an even change of the radius with rounded ends."""
+    rounding = min(ROUNDING_M, length / 4)
+    slope = change / (length - rounding)
+    knots = np.array([start, start + rounding, start + length - rounding, start + length])
+    return knots, np.array([0.0, slope, slope, 0.0])
+
+
+def _waist(start: float, length: float, change: float) -> tuple[Array, Array]:
+    """Arc lengths and slopes of a parabolic waist with rounded ends, narrowest midway."""
+    rounding = min(ROUNDING_M, length / 4)
+    slope = 4.0 * change / length
+    knots = np.array([start, start + rounding, start + length - rounding, start + length])
+    return knots, np.array([0.0, slope, -slope, 0.0])

@@ -1,0 +1,105 @@
+"""The ground under a moving worm: tangent planes laid under its skin, and friction that feels which way it slides."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.arena.surface import ground_of
+from annelid.config import Arena
+from annelid.morphology import Array, MeshGeometry
+
+
+class MovingGround:
+    """Lays the planes of `annelid.arena.contact.add_moving_planes` before every step.
+
+    Where they lie follows from the engine's positions alone, and friction from its velocities too, so a run continues
+    and a batch computes to the same bits.
+    """
+
+    def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:
+        """Finds the planes.
+
+        Args:
+            model: The compiled worm; of one with setae nobody else may use it, since friction is set in it.
+            geometry: The mesh at rest.
+            arena: The ground.
+        """
+        self._model = model
+        self._surface = ground_of(arena)
+        self._skin, self._planes = _skin_and_planes(model)
+        self._setae = _Setae(model, geometry, arena, self._skin) if arena.has_setae else None
+
+    def lay(self, data: mujoco.MjData) -> None:
+        """Lays every plane where the ground is nearest to its part of the skin, and sets friction.
+
+        Args:
+            data: Positions and velocities; its kinematics are brought up to date.
+        """
+        mujoco.mj_kinematics(self._model, data)
+        places = data.geom_xpos[self._skin]
+        with np.errstate(invalid="ignore", over="ignore"):
+            distance, normal = self._surface.nearest(places, first_order=True)
+            data.mocap_pos[self._planes] = places - distance[:, np.newaxis] * normal
+            data.mocap_quat[self._planes] = facing(normal)
+            if self._setae is not None:
+                self._model.pair_friction[:, :2] = self._setae.friction(data, places)[:, np.newaxis]
+
+
+def _skin_and_planes(model: mujoco.MjModel) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Returns the geom of the skin and the mocap body of the plane of every pair, which the engine may have swapped."""
+    geoms = np.stack([model.pair_geom1, model.pair_geom2])
+    mocap = model.body_mocapid[model.geom_bodyid[geoms]]
+    plane, pair = (mocap[1] >= 0).astype(int), np.arange(model.npair)
+    return geoms[1 - plane, pair], mocap[plane, pair]
+
+
+def facing(normal: Array) -> Array:
+    """Returns quaternions that turn the z axis to unit normals by the shortest way.
+
+    Args:
+        normal: Unit vectors, ``(n, 3)``.
+
+    Returns:
+        Unit quaternions, scalar first, ``(n, 4)``.
+    """
+    x, y, z = normal.T
+    turn = np.stack([1.0 + z, -y, x, np.zeros(len(z))], axis=-1)
+    # Straight down any half turn about a level axis will do.
+    turn[z < -1.0 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
+    return turn / np.sqrt((turn * turn).sum(axis=-1))[:, np.newaxis]
+
+
+class _Setae:
+    """Friction of each part of the skin by the sign of its velocity along the worm's axis there.
+
+    A part that sticks creeps the way it is pushed, since contacts are soft, so the sign tells at rest too.
+    """
+
+    def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena, skin: NDArray[np.int32]) -> None:
+        assert arena.backward_friction is not None
+        self._model = model
+        self._forwards, self._backwards = arena.friction, arena.backward_friction
+        self._bodies = model.geom_bodyid[skin]
+        self._roots = model.body_rootid[self._bodies]
+        n_planes = len(geometry.plane_x_m)
+        self._crossing_site = np.array([model.site(f"crossing_{i}").id for i in range(geometry.n_crossings)])
+        self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        x = data.geom_xpos[skin, :1]
+        self._plane = np.abs(x - geometry.plane_x_m).argmin(axis=1)
+
+    def friction(self, data: mujoco.MjData, places: Array) -> Array:
+        """Returns the coefficient of every part of the skin, ``(n_skin,)``."""
+        mujoco.mj_comPos(self._model, data)
+        mujoco.mj_comVel(self._model, data)
+        spin, drift = data.cvel[self._bodies, :3], data.cvel[self._bodies, 3:]
+        velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
+        centres = self._mean @ data.site_xpos[self._crossing_site]
+        along = np.empty_like(centres)
+        along[1:-1] = centres[:-2] - centres[2:]
+        along[0], along[-1] = centres[0] - centres[1], centres[-2] - centres[-1]
+        forwards = (velocity * along[self._plane]).sum(axis=-1)
+        return np.where(forwards < 0.0, self._backwards, self._forwards)

@@ -1,0 +1,275 @@
+"""Worms in arenas: they rest on the ground, stay inside, slide as friction says, and compute the same in a batch."""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.arena.surface import surface_of
+from annelid.config import RunConfig, load_config
+from annelid.errors import ConfigError
+from annelid.protocols import Array
+from annelid.simulation.assemble import build_controller
+from annelid.simulation.batch.body import BatchWorm, BodyBatch, compile_worms
+from annelid.simulation.ground import facing
+from annelid.simulation.loop import simulate
+from annelid.simulation.worm import WormPlant, compile_worm
+
+RODS = "riddle2023-rods"
+RESTLESS = ("floor", "setae", "slope", "rails", "steps", "rough", "pipe", "pipe.taper", "pipe.bend", "pipe.helix")
+FINE = {"clock.physics_timestep_s": 0.005}
+
+
+def config(arena: str, preset: str = RODS, **changes: object) -> RunConfig:
+    return load_config(preset, {name.replace("__", "."): value for name, value in changes.items()}, arena=arena)
+
+
+def settled(plant: WormPlant, duration_s: float, activation: Array | None = None) -> WormPlant:
+    every = plant.steps_to_move()
+    n = round(duration_s / plant.model.opt.timestep)
+    for _ in range(n):
+        plant.stride(np.zeros(plant.n_muscles) if activation is None else activation, every)
+    return plant
+
+
+def reset(made: RunConfig) -> WormPlant:
+    plant = WormPlant(made)
+    plant.reset(0)
+    return plant
+
+
+def skin_places(plant: WormPlant) -> Array:
+    mujoco.mj_kinematics(plant.model, plant.data)
+    geoms = plant.model.pair_geom1 if plant.model.npair else np.flatnonzero(plant.model.geom_conaffinity)
+    if plant.model.npair:
+        spheres = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+        geoms = np.where(plant.model.geom_type[geoms] == spheres, geoms, plant.model.pair_geom2)
+    return plant.data.geom_xpos[geoms]
+
+
+@pytest.mark.parametrize("arena", RESTLESS)
+def test_a_worm_at_rest_is_carried_by_its_arena(arena: str) -> None:
+    made = config(arena, body__strands__joint_damping_Nms_per_rad=0.02)
+    plant = settled(reset(made), 1.2)
+    assert plant.alarm() is None
+    total = plant.feel().contact_force_N.sum(axis=0)
+    weight = -plant.total_mass_kg * plant.model.opt.gravity
+    assert total == pytest.approx(weight, abs=0.05 * float(np.linalg.norm(weight)))
+
+
+@pytest.mark.parametrize("arena", ["pipe.bend", "steps", "setae"])
+def test_a_part_of_the_skin_has_one_contact_at_most(arena: str) -> None:
+    plant = settled(reset(config(arena)), 0.6)
+    geoms = plant.data.contact.geom
+    assert len(geoms) > 3
+    assert np.unique(geoms).size == geoms.size
+
+
+def test_planes_that_move_act_on_a_level_floor_as_the_engine_s_own_plane_does() -> None:
+    """Setae whose two frictions differ in the last digit only: the same worm, to the last digit of friction."""
+    still = settled(reset(config("floor")), 0.5)
+    moving = settled(reset(config("floor", arena__backward_friction=1.0 + 1e-12)), 0.5)
+    assert still.ground is None
+    assert moving.ground is not None
+    assert moving.feel().center_of_mass_m == pytest.approx(still.feel().center_of_mass_m, abs=1e-9)
+    assert moving.feel().contact_force_N == pytest.approx(still.feel().contact_force_N, abs=1e-6)
+
+
+def test_the_chain_touches_a_pipe_with_its_vertices() -> None:
+    plant = settled(reset(config("pipe", "riddle2023")), 0.15)
+    assert plant.model.npair == plant.geometry.n_strands * plant.geometry.vertices_m.shape[1]
+    at_rest = WormPlant(config("pipe", "riddle2023"))
+    at_rest.reset(0)
+    flat = plant.geometry.vertices_m.reshape(-1, 3)
+    nearest = np.linalg.norm(skin_places(at_rest)[:, None] - flat[None], axis=-1).min(axis=0)
+    assert nearest.max() < 1e-9
+
+
+def test_planes_face_along_their_normals() -> None:
+    normals = np.random.default_rng(0).normal(size=(50, 3))
+    normals = np.concatenate([normals / np.linalg.norm(normals, axis=-1, keepdims=True), [[0.0, 0.0, -1.0]]])
+    for normal, quaternion in zip(normals, facing(normals), strict=True):
+        turned = np.empty(3)
+        mujoco.mju_rotVecQuat(turned, np.array([0.0, 0.0, 1.0]), quaternion)
+        assert turned == pytest.approx(normal, abs=1e-12)
+
+
+def sliding(slope_deg: float) -> tuple[Array, WormPlant]:
+    """Velocities of a stiff, passive worm on a slope, forwards positive, every 0.1 s."""
+    made = config(
+        "setae",
+        arena__slope_deg=slope_deg,
+        arena__friction=0.2,
+        arena__backward_friction=1.0,
+        arena__floor_gap_m=0.0,
+        body__strands__joint_damping_Nms_per_rad=0.02,
+    )
+    plant = reset(made)
+    places = []
+    for _ in range(9):
+        settled(plant, 0.1)
+        places.append(-plant.feel().center_of_mass_m[0])
+    return np.diff(places) / 0.1, plant
+
+
+def test_setae_slide_forwards_as_a_block_does_and_hold_backwards() -> None:
+    """On a slope of 20 degrees: tan 20 = 0.36 lies between the friction forwards, 0.2, and backwards, 1."""
+    down, _ = sliding(-20.0)
+    expected = 9.81 * (sin(radians(20.0)) - 0.2 * cos(radians(20.0)))
+    accelerations = np.diff(down[3:]) / 0.1
+    assert accelerations.mean() == pytest.approx(expected, rel=0.05)
+    up, _ = sliding(20.0)
+    assert np.abs(up[3:]).max() < 0.01 * down[-1]
+
+
+def breathing(arena: str, **changes: object) -> float:
+    """Travel in m, forwards positive, of a worm whose segments all contract at once, four times."""
+    plant = reset(config(arena, **changes))
+    places = []
+    for _ in range(4):
+        for activation in (0.6, 0.0):
+            settled(plant, 0.4, np.full(plant.n_muscles, activation))
+        places.append(-plant.feel().center_of_mass_m[0])
+    return places[-1] - places[0]
+
+
+def test_setae_rectify_a_breath_without_a_wave() -> None:
+    forwards = breathing("setae")
+    alike = breathing("setae", arena__backward_friction=0.3)
+    turned = breathing("setae", arena__friction=1.0, arena__backward_friction=0.3)
+    assert forwards > 0.05
+    assert turned < -0.05
+    assert abs(alike) < 0.2 * forwards
+
+
+@pytest.mark.parametrize("arena", ["pipe.s", "setae"])
+def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
+    configs = [config(arena), config(arena, arena__friction=0.6), config(arena)]
+    bodies = BodyBatch(configs, compile_worms(configs))
+    pull = np.array([1.0, 0.0, 0.3])
+    alone = [reset(made) for made in configs]
+    for worm in bodies.worms:
+        worm.reset(0)
+    every = alone[0].steps_to_move()
+    for _ in range(25):
+        felt = [stride(worm, pull, every) for worm in bodies.worms]
+        for plant, ours in zip(alone, felt, strict=True):
+            theirs = plant.stride(pull, every)
+            assert np.array_equal(ours.center_of_mass_m, theirs.center_of_mass_m)
+            assert np.array_equal(ours.contact_force_N, theirs.contact_force_N)
+    assert not np.array_equal(felt[0].center_of_mass_m, felt[1].center_of_mass_m)
+    assert np.array_equal(felt[0].center_of_mass_m, felt[2].center_of_mass_m)
+
+
+def stride(worm: BatchWorm, activation: Array, n_steps: int):
+    return worm.stride(activation, n_steps)
+
+
+def test_worms_in_pipes_of_different_shapes_make_one_batch() -> None:
+    configs = [config("pipe.bend"), config("pipe.helix"), config("pipe.taper")]
+    bodies = BodyBatch(configs, compile_worms(configs))
+    for worm in bodies.worms:
+        worm.reset(0)
+        assert worm.step(np.zeros(3)).center_of_mass_m[2] == pytest.approx(0.16, abs=0.02)
+
+
+@pytest.mark.parametrize("arena", ["pipe.taper", "setae"])
+def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path, arena: str) -> None:
+    whole = simulate(config(arena, duration_s=0.6), tmp_path / "whole", progress=False)
+    simulate(config(arena, duration_s=0.3), tmp_path / "first", progress=False)
+    rest = simulate(config(arena, duration_s=0.6), tmp_path / "rest", resume=tmp_path / "first", progress=False)
+    ours, theirs = rest.data, whole.data.isel(time=whole.data["time"] >= rest.data["time"][0])
+    for name in ("ring_length", "contact_force", "center_of_mass"):
+        assert np.array_equal(ours[name].values, theirs[name].values), name
+
+
+def test_several_physics_steps_a_control_step_lay_the_ground_before_each() -> None:
+    slow = config("pipe", clock__control_timestep_s=0.01, clock__physics_timestep_s=0.005)
+    fast = config("pipe", clock__control_timestep_s=0.005, clock__physics_timestep_s=0.005)
+    plants = [reset(slow), reset(fast)]
+    for _ in range(20):
+        plants[0].step(np.ones(3))
+        for _ in range(2):
+            plants[1].step(np.ones(3))
+    assert np.array_equal(plants[0].data.qpos, plants[1].data.qpos)
+
+
+def test_a_worm_that_climbs_is_not_too_high() -> None:
+    climbing = config("steps", arena__step_height_m=0.5, arena__step_length_m=1.0, guard__height_m=0.45)
+    plant = reset(climbing)
+    plant.data.qpos[0::1][: 3 * plant.geometry.n_crossings].reshape(-1, 3)[:, [0, 2]] += [-1.5, 1.0]
+    plant._posture = plant.locate()
+    assert plant._posture.crossing[:, 2].max() > 1.3
+    plant._control_step = 0
+    assert plant.alarm() is None
+
+
+def test_a_worm_that_leaves_its_pipe_is_stopped() -> None:
+    plant = reset(config("pipe", guard__height_m=0.3))
+    assert plant.alarm() is None
+    plant.data.qpos[: 3 * plant.geometry.n_crossings].reshape(-1, 3)[:, 1] += 0.5
+    plant._posture = plant.locate()
+    alarm = plant.alarm()
+    assert alarm is not None
+    assert "guard.height_m" in alarm
+
+
+def test_a_narrow_pipe_refuses_a_worm_that_does_not_fit_into_its_entry() -> None:
+    with pytest.raises(ConfigError, match=r"arena\.bore_m = 0\.15: .*at least body\.mesh\.radius_m = 0\.16"):
+        config("pipe", arena__bore_m=0.15)
+
+
+@pytest.mark.parametrize("arena", ["pipe", "pipe.hourglass", "rough"])
+def test_the_start_is_quiet(arena: str) -> None:
+    """The skin overlaps nothing at time zero, so all that moves is what falls: less than its weight times its gap."""
+    plant = reset(config(arena))
+    radius = 0.002
+    assert surface_of(plant._config.arena).distance_m(skin_places(plant)).min() > radius  # type: ignore[arg-type]
+    most = 0.0
+    for _ in range(20):
+        settled(plant, plant.model.opt.timestep)
+        most = max(most, plant.kinetic_energy_J())
+    assert most < plant.total_mass_kg * 9.81 * 0.01
+
+
+def leak_m(arena: str, duration_s: float) -> tuple[float, float]:
+    """How far any vertex ever was outside, m, and how far the worm got: six segments walking at 5 ms a step."""
+    made = config(arena, preset=RODS, body__mesh__n_segments=6, duration_s=duration_s, **_fine())
+    plant = reset(made)
+    controller = build_controller(made, plant)
+    controller.reset(0)
+    surface, sensation, leak = surface_of(made.arena), plant.feel(), -1.0  # type: ignore[arg-type]
+    every = plant.steps_to_move()
+    for step in range(round(duration_s / made.clock.control_timestep_s)):
+        sensation = plant.step(controller.step(sensation))
+        if (step + 1) % every == 0:
+            leak = max(leak, -float(surface.distance_m(skin_places(plant)).min()))
+        assert plant.alarm() is None
+    return leak, plant.geometry.length_m / 2 - float(sensation.center_of_mass_m[0])
+
+
+def _fine() -> dict[str, object]:
+    return {name.replace(".", "__"): value for name, value in FINE.items()}
+
+
+def test_a_walking_worm_stays_within_its_pipe() -> None:
+    leak, _ = leak_m("pipe.hourglass", 1.5)
+    assert leak < 0.001
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arena", ["pipe", "pipe.bend", "pipe.taper", "pipe.hourglass", "pipe.helix", "rough", "steps"])
+def test_a_worm_that_walks_for_half_a_minute_stays_within_its_arena(arena: str) -> None:
+    leak, _ = leak_m(arena, 30.0)
+    assert leak < 0.001
+
+
+def test_contact_sensors_name_each_part_of_the_skin_once() -> None:
+    anatomy = compile_worm(config("rails"))
+    names = [anatomy.model.sensor(i).name for i in range(anatomy.model.nsensor)]
+    assert len(set(names)) == len(names)
+    assert sum(name.startswith("rail_left") for name in names) == sum(name.startswith("floor") for name in names)

@@ -44,7 +44,8 @@ OBJECTIVES: Mapping[str, Objective] = {
         Objective("slip", "slip ratio", "less", 10.0, lambda gait: gait.slip_ratio),
     )
 }
-"""The objectives; the cost of transport is that of the cables, as the authors state it. The penalties are worse than any gait that advances: no speed, and a cost and a slip beyond reach."""
+"""The objectives. The cost of transport is that of the cables, as the authors state it. The penalties are worse than
+any gait that advances: no speed, and a cost and a slip beyond reach."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,9 @@ def test_a_field_is_varied_once() -> None:
         variables_of([f"{GATE}=80:600", f"{GATE}=100:200"], CONFIG)
 
 
-@pytest.mark.parametrize("kind", ["sns", "adaptive", "sns-robust", "sine", "timed", "shc", "phase-chain"])
+@pytest.mark.parametrize(
+    "kind", ["sns", "adaptive", "sns-robust", "sns-pressure", "sine", "timed", "shc", "phase-chain"]
+)
 def test_every_controller_has_something_to_tune(kind: str) -> None:
     assert default_variables(load_config(PRESET, {"controller.kind": kind}))
 

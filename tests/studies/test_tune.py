@@ -244,13 +244,18 @@ def test_a_worm_that_cannot_be_built_is_a_trial_with_the_penalty() -> None:
 def test_the_front_has_all_that_nothing_beats_and_nothing_else(pairs: list[tuple[int, int]]) -> None:
     objectives = objectives_of(["speed", "slip"])
     found = [
-        Trial(i, {}, Case(PRESET), Judged(a_gait(1.0 + speed, slip=float(slip)), ""), Path())
+        Trial(i, {}, Case(PRESET), Judged(a_gait(1.0 + speed, slip=float(slip)), ""), Path(str(i)))
         for i, (speed, slip) in enumerate(pairs)
     ]
     members = {trial.number for trial in front(found, objectives)}
     for i, (speed, slip) in enumerate(pairs):
         beaten = any(a >= speed and b <= slip and (a, b) != (speed, slip) for a, b in pairs)
         assert (i in members) != beaten
+
+
+def test_a_run_is_on_the_front_once() -> None:
+    twice = [Trial(i, {}, Case(PRESET), Judged(a_gait(), ""), Path("same")) for i in (START, 0)]
+    assert [trial.number for trial in front(twice, objectives_of(["speed", "slip"]))] == [START]
 
 
 def an_outcome(**changes: Any) -> Outcome:

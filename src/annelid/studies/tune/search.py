@@ -123,8 +123,11 @@ def best(trials: Sequence[Trial], objective: Objective) -> Trial | None:
 
 
 def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Trial]:
-    """Returns the Pareto front: those that walk and that no other beats in both objectives, by the first of them."""
-    walking = [trial for trial in trials if not trial.judged.problem]
+    """Returns the Pareto front: those that walk and that no other beats in both objectives, by the first of them.
+
+    Of trials with the same run the first is taken: one of them may have the start's own values.
+    """
+    walking = list({trial.path: trial for trial in reversed(trials) if not trial.judged.problem}.values())
     marks = {trial.number: scores(trial, objectives) for trial in walking}
     kept = [
         trial for trial in walking if not any(_dominates(marks[other.number], marks[trial.number]) for other in walking)

@@ -258,12 +258,10 @@ def test_a_run_is_on_the_front_once() -> None:
     assert [trial.number for trial in front(twice, objectives_of(["speed", "slip"]))] == [START]
 
 
-def an_outcome(**changes: Any) -> Outcome:
-    """Of a run in order; changes of the rhythm, ``wave`` of the summary, ``message`` of the run."""
-    names = list(Summary.__dataclass_fields__)
-    summary = Summary(**{**dict.fromkeys(names), "wave": changes.pop("wave", True)})  # type: ignore[arg-type]
+def an_outcome(message: str = "", **changes: Any) -> Outcome:
+    """Of a run in order, but for changes of the rhythm and for why it was stopped."""
+    summary = Summary(**dict.fromkeys(Summary.__dataclass_fields__))  # type: ignore[arg-type]
     rhythm = RhythmScore("ordered", "a wave", (1, 2, 3), 1.0, 0.0, 1.0, 1, 1, 1.0, 1.0)
-    message = changes.pop("message", "")
     return Outcome(Path(), summary, replace(rhythm, **changes), (), message)
 
 
@@ -272,8 +270,7 @@ def an_outcome(**changes: Any) -> Outcome:
     [
         (an_outcome(), a_gait(), ""),
         (an_outcome(verdict="disordered", reason="regular but not a wave"), a_gait(), ""),
-        (an_outcome(wave=False), a_gait(), ""),
-        (an_outcome(verdict="disordered", reason="limps", wave=False), a_gait(), "out of order: limps"),
+        (an_outcome(verdict="disordered", reason="limps"), a_gait(), "out of order: limps"),
         (an_outcome(verdict="silent", reason="stalled"), a_gait(), "silent: stalled"),
         (an_outcome(message="energy ran away"), None, "stopped: energy ran away"),
         (an_outcome(), a_gait(cycles=1), "fewer than 2 whole cycles"),

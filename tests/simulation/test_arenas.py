@@ -12,7 +12,7 @@ import pytest
 from annelid.arena.surface import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
-from annelid.protocols import Array
+from annelid.protocols import Array, Sensation
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BatchWorm, BodyBatch, compile_worms
 from annelid.simulation.ground import facing
@@ -24,7 +24,7 @@ RESTLESS = ("floor", "setae", "slope", "rails", "steps", "rough", "pipe", "pipe.
 FINE = {"clock.physics_timestep_s": 0.005}
 
 
-def config(arena: str, preset: str = RODS, **changes: object) -> RunConfig:
+def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
     return load_config(preset, {name.replace("__", "."): value for name, value in changes.items()}, arena=arena)
 
 
@@ -155,6 +155,7 @@ def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     for worm in bodies.worms:
         worm.reset(0)
     every = alone[0].steps_to_move()
+    felt: list[Sensation] = []
     for _ in range(25):
         felt = [stride(worm, pull, every) for worm in bodies.worms]
         for plant, ours in zip(alone, felt, strict=True):
@@ -165,7 +166,7 @@ def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     assert np.array_equal(felt[0].center_of_mass_m, felt[2].center_of_mass_m)
 
 
-def stride(worm: BatchWorm, activation: Array, n_steps: int):  # noqa: ANN201
+def stride(worm: BatchWorm, activation: Array, n_steps: int) -> Sensation:
     return worm.stride(activation, n_steps)
 
 
@@ -238,7 +239,7 @@ def test_the_start_is_quiet(arena: str) -> None:
 
 def leak_m(arena: str, duration_s: float) -> tuple[float, float]:
     """How far any vertex ever was outside, m, and how far the worm got: six segments walking at 5 ms a step."""
-    made = config(arena, preset=RODS, body__mesh__n_segments=6, duration_s=duration_s, **_fine())
+    made = config(arena, RODS, body__mesh__n_segments=6, duration_s=duration_s, **_fine())
     plant = reset(made)
     controller = build_controller(made, plant)
     controller.reset(0)

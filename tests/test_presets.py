@@ -160,6 +160,23 @@ def test_the_robot_with_muscles_differs_in_its_rings_and_timing_only() -> None:
     assert value_at("riddle2025-muscles", "controller.gate_time_constant_ms") == 300.0
 
 
+@pytest.mark.parametrize(("pattern", "interval_s", "waves"), [("3x1", 1.0, 1), ("2x2", 2.0, 2)])
+def test_the_timed_patterns_are_those_of_the_authors_on_the_same_robot(
+    pattern: str, interval_s: float, waves: int
+) -> None:
+    servos, timed = (load_config(name).model_dump() for name in ("riddle2025", f"riddle2025-{pattern}"))
+    assert {name for name in servos if servos[name] != timed[name]} == {"name", "summary", "duration_s", "controller"}
+    assert timed["controller"] == {
+        "kind": "timed",
+        "rise_s": 1.0,
+        "hold_s": 1.0,
+        "fall_s": 1.0,
+        "interval_s": interval_s,
+        "waves": waves,
+        "level": 1.0,
+    }
+
+
 @pytest.mark.parametrize("preset", ["wang", "riddle2025"])
 @pytest.mark.parametrize("path", ROBOTS)
 def test_the_robots_have_the_authors_mesh_and_servos(preset: str, path: str) -> None:

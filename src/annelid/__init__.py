@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from annelid.analysis import summary
+    from annelid.analysis import gait, summary
     from annelid.config import RunConfig, load_config, preset_names
     from annelid.nervous import Network
     from annelid.protocols import Controller, Plant, Sensation
@@ -34,6 +34,7 @@ _HOME = {
     "Sensation": "protocols",
     "build_controller": "simulation",
     "build_plant": "simulation",
+    "gait": "analysis",
     "load_config": "config",
     "open_run": "simulation",
     "preset_names": "config",
@@ -53,6 +54,7 @@ __all__ = [
     "__version__",
     "build_controller",
     "build_plant",
+    "gait",
     "load_config",
     "open_run",
     "preset_names",

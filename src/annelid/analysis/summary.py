@@ -46,7 +46,7 @@ class Summary:
         contraction_force_peak_N: Largest muscle force while contracted, N.
         segment_force_median_N: Per segment: median force of its muscles while contracted, N.
         segment_force_peak_N: Per segment: largest force of its muscles while contracted, N.
-        muscle_work_J: Per segment: force over shortening of its muscles, J.
+        muscle_work_J: Per segment: work of its muscles, J; where the worm keeps no books, force over shortening.
         travel_m: Displacement of the centre of mass along x, m.
         travel_path_m: Its way forth and back along x, m.
         ring_length_min_m: Shortest ring during the run, m (planar worm: height of a rhombus).
@@ -163,6 +163,9 @@ def _of_each(forces: list[np.ndarray], number: Callable[[np.ndarray], Any]) -> l
 
 
 def _work(data: xr.Dataset, n_segments: int) -> list[float | None] | None:
+    if "muscle_work" in data and data.sizes.get("time"):
+        booked = data["muscle_work"].values
+        return _numbers((booked[-1] - booked[0]).reshape(n_segments, -1).sum(axis=1))
     if "muscle_force" not in data or "ring_length" not in data or not data.sizes.get("time"):
         return None
     work = muscle_work(data["muscle_force"].values, data["ring_length"].values)

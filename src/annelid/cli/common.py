@@ -109,7 +109,10 @@ def print_table(run: Run) -> None:
     """Prints the numbers of a run, the published ones beside them."""
     from rich.console import Console
 
-    from annelid.analysis import summary
+    from annelid.analysis import gait, summary
+    from annelid.view.gait_table import add_gait
     from annelid.view.table import summary_table
 
-    Console().print(summary_table(summary(run), run.config))
+    table = summary_table(summary(run), run.config)
+    add_gait(table, gait(run))
+    Console().print(table)

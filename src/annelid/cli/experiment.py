@@ -154,3 +154,103 @@ def weak_middle_command(
     marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
     for written in (path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))):
         typer.echo(written)
+
+
+@experiment.command("turning")
+def turning_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path(
+        "turning"
+    ),
+    quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+) -> None:
+    """Find out on which radius the worm turns.
+
+    The authors' six-segment robot with half-rings crawls on flat ground under constant modulations of its two sides,
+    with three gaits: the timed pattern 3x1 with all segments modulated alike, the same with the middle segments bent
+    the other way, and the nervous system with ideal muscles.
+
+    Writes turning.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes
+    on. 21 runs of some seconds to a minute each; docs/turning.md explains the results.
+
+    \b
+    annelid experiment turning --quick
+    annelid experiment turning -o turning
+    """
+    from rich.console import Console
+
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+    from annelid.studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "experiment", "turning", "-o", str(output), *(["--quick"] if quick else [])]
+        again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        Console().print(turning_table(turned.readings))
+    path = write_readings(turned.readings, output / "turning.csv")
+    for written in (path, turning_picture(turned, path.with_suffix(""))):
+        typer.echo(written)
+
+
+@experiment.command("speed")
+def speed_command(
+    gaits: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PRESET|FILE.toml]...", help="Gaits.  [default: riddle2025-muscles and crawler]"),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("speed"),
+    quick: Annotated[bool, typer.Option("--quick", help="Two values of each quantity.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")] = False,
+) -> None:
+    """Find out how fast gaits crawl over friction and number of segments.
+
+    Every gait crawls on ground of friction 0.05 to 1.5, and with 3 to 12 segments, whose inner rings are all as strong
+    as its second. Speed, stride, period, cost of transport and slip are those of whole cycles.
+
+    Writes speed.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes
+    on. Some 15 runs a gait of about ten seconds each; docs/speed_of_travel.md explains the results.
+
+    \b
+    annelid experiment speed --quick
+    annelid experiment speed
+    annelid experiment speed crawler tune/best.toml -o mine
+    """
+    from rich.console import Console
+
+    from annelid.studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            readings = crawl(store, points(gaits or GAITS, "quick" if quick else "full"), jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "experiment", "speed", *(gaits or []), "-o", str(output), *(["--quick"] if quick else [])]
+        again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        for quantity in VALUES:
+            Console().print(crawling_table(readings, quantity))
+    path = output / "speed.csv"
+    write_readings(readings, path)
+    for written in (path, write_figure(readings, path.with_suffix(""))):
+        typer.echo(written)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -23,12 +24,13 @@ def show(
     annelid show runs/riddle2023-001
     annelid show runs/riddle2023-001 --json | jq .period_s
     """
-    from annelid.analysis import summary
+    from annelid.analysis import gait, summary
     from annelid.simulation.runfile import open_run
 
     opened = open_run(run)
     if as_json:
-        typer.echo(summary(opened).to_json())
+        numbers = summary(opened).to_dict() | {"gait": gait(opened).to_dict()}
+        typer.echo(json.dumps(numbers, indent=2, allow_nan=False))
         return
     print_table(opened)
     if opened.message:
@@ -39,27 +41,37 @@ def plot(
     run: RunPath,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: figure7.png in the run]"),
+        typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: FIGURE.png in the run]"),
     ] = None,
+    figure: Annotated[
+        str, typer.Option(metavar="FIGURE", help="figure7: potentials and lengths; track: the way, seen from above.")
+    ] = "figure7",
     force: Force = False,
 ) -> None:
-    """Draw potentials and lengths over time.
+    """Draw potentials and lengths over time, or the track.
 
-    The counterpart of the paper's figure 7.
+    The counterpart of the paper's figure 7, or where the worm crawled: the ways of its middle and of its front, its
+    outline at several times, and what stood in the way.
 
     \b
     annelid plot runs/riddle2023-001 -o figure7.pdf
+    annelid plot runs/riddle2025-001 --figure track
     """
+    from annelid.errors import RunFileError, suggest
     from annelid.simulation.runfile import open_run
+    from annelid.view.figures.track import track_figure
     from annelid.view.plots import figure7, plot_path
 
+    figures = {"figure7": figure7, "track": track_figure}
+    if figure not in figures:
+        raise RunFileError(f"unknown figure {figure!r}: {suggest(figure, figures)}")
     opened = open_run(run)
     if output is None:
-        target = opened.path.parent / "figure7.png"
+        target = opened.path.parent / f"{figure}.png"
     else:
         target = plot_path(output)
         refuse_existing(target, force)
-    typer.echo(figure7(opened, target))
+    typer.echo(figures[figure](opened, target))
 
 
 def render(
@@ -71,7 +83,9 @@ def render(
     video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv")] = None,
     fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
-    camera: Annotated[str | None, typer.Option(help="isometric, side, top or front  [default: isometric]")] = None,
+    camera: Annotated[
+        str | None, typer.Option(help="isometric, side, top, front or course  [default: isometric]")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Draw a frame or a video of a run.

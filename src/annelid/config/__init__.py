@@ -13,6 +13,7 @@ from annelid.config.controllers import (
     Contraction,
     HeteroclinicChannel,
     PhaseChain,
+    PressureSns,
     Program,
     RobustSns,
     SineWave,
@@ -34,6 +35,14 @@ from annelid.config.loading import (
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
 from annelid.config.run import Clock, Guard, Record, RunConfig
 from annelid.config.sections import Section
+from annelid.config.turning import (
+    ConstantTurning,
+    CourseTurning,
+    HeadingTurning,
+    Steered,
+    TouchTurning,
+    TurningSection,
+)
 from annelid.config.worm import Chain, Joints, Mesh, Pins, Rings, Rods, ServoRings, Springs, Strands, WormBody
 
 __all__ = [
@@ -44,12 +53,15 @@ __all__ = [
     "Boxerbaum2012Body",
     "Chain",
     "Clock",
+    "ConstantTurning",
     "Contraction",
+    "CourseTurning",
     "Daltorio2013Body",
     "DynamicPlanarWorm",
     "Fidelity",
     "Floor",
     "Guard",
+    "HeadingTurning",
     "HeteroclinicChannel",
     "Joints",
     "Mesh",
@@ -58,6 +70,7 @@ __all__ = [
     "Pipe",
     "PlanarBody",
     "PlanarWorm",
+    "PressureSns",
     "Program",
     "Record",
     "Relief",
@@ -71,10 +84,13 @@ __all__ = [
     "SineWave",
     "SnsController",
     "Springs",
+    "Steered",
     "Steps",
     "Strands",
     "StretchSensor",
     "TimedWave",
+    "TouchTurning",
+    "TurningSection",
     "WormBody",
     "arena_names",
     "arena_summary",

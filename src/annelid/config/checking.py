@@ -133,6 +133,10 @@ _KINDS = {
     "shc",
     "phase-chain",
     "adaptive",
+    "constant",
+    "heading",
+    "course",
+    "touch",
 }
 _WORDS = {
     "greater_than": "must be greater than {gt:g}",

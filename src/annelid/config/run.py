@@ -8,9 +8,17 @@ from typing import Annotated, Any, Self
 from pydantic import Field, Tag, model_validator
 
 from annelid.config.arena import ArenaSection, Pipe
-from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
+from annelid.config.controllers import (
+    ControllerSection,
+    HeteroclinicChannel,
+    PressureSns,
+    Program,
+    SnsController,
+    StretchSensor,
+)
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
 from annelid.config.sections import Positive, Section, kind_or
+from annelid.config.turning import Descending, TurningSection
 from annelid.config.worm import WormBody
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
@@ -73,6 +81,9 @@ class RunConfig(Section):
     body: Body = WormBody()
     arena: ArenaSection | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
     controller: ControllerSection = SnsController()
+    turning: TurningSection | None = Field(
+        default=None, description="what scales the two sides of a worm with half-rings"
+    )
     sensor: StretchSensor = StretchSensor()
     clock: Clock = Clock()
     record: Record = Record()
@@ -117,12 +128,34 @@ class RunConfig(Section):
         return self
 
     @model_validator(mode="after")
+    def _turning_needs_two_sides(self) -> Self:
+        if self.turning is not None and not (isinstance(self.body, WormBody) and self.body.rings.layout == "halves"):
+            raise ValueError(
+                f"turning.kind = {self.turning.kind!r} needs a left and a right half of every ring: "
+                "body.kind = 'worm' with body.rings.layout = 'halves'"
+            )
+        if isinstance(self.turning, Descending) and self.turning.shares is not None:
+            n = len(self.turning.shares)
+            if n != self.body.n_segments:
+                raise ValueError(f"turning.shares has {n} entries: must have {self.body.n_segments}, one a segment")
+        return self
+
+    @model_validator(mode="after")
     def _contact_needs_ground(self) -> Self:
         contact = isinstance(self.controller, HeteroclinicChannel) and self.controller.feedback == "contact"
         if contact and isinstance(self.body, PlanarBody | Boxerbaum2012Body):
             raise ValueError(
                 f"controller.feedback = 'contact' has no effect on body.kind = {self.body.kind!r}, which touches no "
                 "ground: choose 'none' or 'stretch'"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _pressure_needs_a_skin(self) -> Self:
+        if isinstance(self.controller, PressureSns) and not isinstance(self.body, WormBody):
+            raise ValueError(
+                f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {self.body.kind!r} "
+                "has not; only the 3D worm ('worm') has"
             )
         return self
 

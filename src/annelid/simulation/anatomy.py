@@ -21,6 +21,8 @@ from annelid.body.actuation import crossing_site, ring_names, stretch_sensors, w
 from annelid.body.rods import vertex_name
 from annelid.config import Chain, Rods, ServoRings, WormBody
 from annelid.morphology import Array, MeshGeometry
+from annelid.simulation.books import Bookkeeper
+from annelid.simulation.elasticity import Elasticity
 from annelid.simulation.skin import Skin
 
 _NET_FORCE = 3
@@ -131,6 +133,8 @@ class Anatomy:
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
+        elasticity: The energy that strands, joints and springs hold.
+        bookkeeper: What a physics step does, in work.
         outputs: Names of the engine's arrays that `forces` and `ground` need.
         skin: The geoms that can touch the ground.
     """
@@ -158,6 +162,8 @@ class Anatomy:
         self._pin_gap, pin_outputs = self._pin_reader(body)
         self.pins_can_part = self._pin_gap is not None
         edges = ("flexedge_length",) if self.has_edges else ()
+        self.elasticity = Elasticity(model, body)
+        self.bookkeeper = Bookkeeper(model, body.rings)
         self.outputs: tuple[str, ...] = ("actuator_force", "sensordata", *edges, *pin_outputs)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:

@@ -13,6 +13,7 @@ from annelid.config import (
     HeteroclinicChannel,
     PhaseChain,
     PlanarBody,
+    PressureSns,
     Program,
     RobustSns,
     RunConfig,
@@ -52,6 +53,18 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
+    pattern = _build_pattern(config, plant)
+    if config.turning is None:
+        return pattern
+    from annelid.control.turning import TurningController
+
+    return TurningController(
+        pattern, config.turning, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s
+    )
+
+
+def _build_pattern(config: RunConfig, plant: Plant) -> Controller:
+    """Builds the controller of the peristaltic pattern, without turning."""
     section, size = config.controller, (plant.n_segments, plant.n_muscles)
     timestep_s = config.clock.control_timestep_s
     if isinstance(section, SnsController):
@@ -62,6 +75,10 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
         from annelid.control.robust import RobustController
 
         return RobustController(section, *size, timestep_s)
+    if isinstance(section, PressureSns):
+        from annelid.control.pressure import PressureController
+
+        return PressureController(section, config.sensor, *size, timestep_s)
     if isinstance(section, Program):
         from annelid.control.program import ProgramController
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import asdict, fields
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,6 +21,7 @@ from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, MeshGeometry
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
+from annelid.simulation.books import Books, Engine
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.skin import Touch
 
@@ -91,6 +94,7 @@ class Worm(ABC):
         self._control_step = 0
         self._posture: Posture
         self._forces: Forces = anatomy.no_forces()
+        self._books: Books = anatomy.bookkeeper.opened()
         self._touch = Touch.none(anatomy.n_segments)
 
     @property
@@ -143,6 +147,10 @@ class Worm(ABC):
         """Returns the generalised positions, ``(nq,)``."""
 
     @abstractmethod
+    def plastic(self) -> Array:
+        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
+
+    @abstractmethod
     def engine_state(self) -> Array:
         """Returns a copy of all that the engine's next step depends on, as `STATE_PARTS` names it."""
 
@@ -154,11 +162,33 @@ class Worm(ABC):
     def kinetic_energy_J(self) -> float:
         """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
 
+    def elastic_energy_J(self) -> float:
+        """Energy that strands, joints and springs hold, J."""
+        return self.anatomy.elasticity.energy_J(self.qpos(), self.plastic(), self._posture.spring_length)
+
+    def potential_energy_J(self) -> float:
+        """Energy of the weight, J, zero with the centre of mass at the origin."""
+        return -self.total_mass_kg * float(self.model.opt.gravity @ self._posture.center_of_mass)
+
+    def drive(self, activation: Array, actuator_state: Array) -> Array:
+        """Tells what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
+        return actuator_state.copy() if self.model.na else activation
+
+    def book(self, engine: Engine, drive: Array) -> None:
+        """Enters one physics step in the books.
+
+        Args:
+            engine: The engine's arrays named in the bookkeeper's `outputs`, after the step.
+            drive: What `drive` returned before it.
+        """
+        self._books += self.anatomy.bookkeeper.step(engine, drive)
+
     def reset(self, seed: int) -> Sensation:
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
         self.reset_engine()
         self._control_step = 0
         self._forces = self.anatomy.no_forces()
+        self._books = self.anatomy.bookkeeper.opened()
         self._touch = Touch.none(self.n_segments)
         self._posture = self.locate()
         return self.feel()
@@ -309,7 +339,7 @@ class Worm(ABC):
                 Signal("slip_distance", ("segment",), (n,), "m", "way that what touches the ground has slid so far"),
                 Signal("slip_loss", ("segment",), (n,), "J", "work of a segment lost to friction so far"),
                 Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass"),
-                Signal("kinetic_energy", (), (), "J", "kinetic energy"),
+                *_energies(m),
                 *extremes,
                 Signal(
                     "crossing_position",
@@ -346,6 +376,9 @@ class Worm(ABC):
             "slip_loss": touch.slip_loss,
             "center_of_mass": posture.center_of_mass,
             "kinetic_energy": self.kinetic_energy_J(),
+            "elastic_energy": self.elastic_energy_J(),
+            "potential_energy": self.potential_energy_J(),
+            **asdict(self._books),
         }
         if self.anatomy.has_edges:
             values["edge_strain"] = forces.edge_strain
@@ -362,6 +395,7 @@ class Worm(ABC):
             "muscle_force": forces.muscle.copy(),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
+            **asdict(self._books),
             **self._touch.state(),
         }
 
@@ -372,8 +406,21 @@ class Worm(ABC):
         strain, gap = np.asarray(state["extremes"], dtype=float)
         muscle, contact = (np.array(state[name], dtype=float) for name in ("muscle_force", "contact_force"))
         self._forces = Forces(muscle, contact, strain, gap)
+        self._books = Books(*(np.array(state[field.name], dtype=float) for field in fields(Books)))
         self._touch = Touch.of_state(state)
         self._posture = self.locate()
+
+
+def _energies(n_muscles: int) -> tuple[Signal, ...]:
+    """Energies that the worm holds, and the books of what its muscles have done and where it went."""
+    return (
+        Signal("kinetic_energy", (), (), "J", "kinetic energy"),
+        Signal("elastic_energy", (), (), "J", "energy of strands and springs"),
+        Signal("potential_energy", (), (), "J", "energy of the weight"),
+        Signal("muscle_work", ("muscle",), (n_muscles,), "J", "work done by a ring muscle so far"),
+        Signal("damping_loss", (), (), "J", "energy lost to dampers so far"),
+        Signal("constraint_loss", (), (), "J", "energy lost to contacts, friction and inextensible edges so far"),
+    )
 
 
 class WormPlant(Worm):
@@ -392,6 +439,7 @@ class WormPlant(Worm):
         self.data = mujoco.MjData(self.model)
         data = self.data
         self._outputs: dict[str, Array] = {name: getattr(data, name) for name in self.anatomy.outputs}
+        self._work: dict[str, NDArray[Any]] = {name: getattr(data, name) for name in self.anatomy.bookkeeper.outputs}
 
     def reset_engine(self, state: Array | None = None) -> None:
         """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
@@ -406,14 +454,15 @@ class WormPlant(Worm):
         Raises:
             SimulationStopped: The engine gave up.
         """
-        self.data.ctrl[:] = self.control(activation, n_steps)
+        data = self.data
+        data.ctrl[:] = self.control(activation, n_steps)
         try:
-            if self.ground is None:
-                mujoco.mj_step(self.model, self.data, n_steps)
-            else:
-                for _ in range(n_steps):
-                    self.ground.lay(self.data)
-                    mujoco.mj_step(self.model, self.data)
+            for _ in range(n_steps):
+                if self.ground is not None:
+                    self.ground.lay(data)
+                drive = self.drive(activation, data.act)
+                mujoco.mj_step(self.model, data)
+                self.book(self._work, drive)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None
         # Pin gaps are read before `locate` brings positions up to the end of the step.
@@ -431,6 +480,10 @@ class WormPlant(Worm):
     def qpos(self) -> Array:
         """Returns the generalised positions, ``(nq,)``."""
         return self.data.qpos
+
+    def plastic(self) -> Array:
+        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
+        return self.data.plastic
 
     def engine_state(self) -> Array:
         """Returns a copy of all that the engine's next step depends on."""

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
@@ -88,8 +89,8 @@ class Case(Work):
 
     @property
     def stem(self) -> str:
-        """What the name of its folder begins with."""
-        return self.preset
+        """What the name of its folder begins with: the preset's name, or the file's."""
+        return Path(self.preset).name.removesuffix(".toml")
 
     @property
     def command(self) -> str:

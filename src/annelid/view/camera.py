@@ -14,8 +14,11 @@ VIEWS_DEG = {
     "side": (90.0, -8.0),
     "top": (90.0, -89.0),
     "front": (15.0, -12.0),
+    "course": (90.0, -89.0),
 }
 """Azimuth and elevation of the line of sight; the first segment is on the left, or nearest."""
+FIXED = frozenset({"course"})
+"""Views that stand still and show the whole course; the others follow the worm."""
 
 FIELD_OF_VIEW_DEG = 30.0
 MARGIN = 0.84

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import Floor, RunConfig, WormBody
 from annelid.errors import RunFileError
-from annelid.view.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_points, view_angles
+from annelid.view.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.view.gl import Canvas, find_backend
 from annelid.view.style import CONTRACTED, activation_color
 
@@ -76,8 +76,14 @@ class WormScene:
         self._target = data["crossing_position"].values.mean(axis=1)
         points = self._points_drawn()
         self._target[:, 2] = (points[:, :, 2].min() + points[:, :, 2].max()) / 2
+<<<<<<< HEAD
         self._upright = _upright(run.config)
         self._offsets = (points - self._target[:, None]).reshape(-1, 3) @ self._upright.T
+=======
+        if camera in FIXED:
+            self._target[:] = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
+        self._offsets = (points - self._target[:, None]).reshape(-1, 3)
+>>>>>>> main
         self._canvas = Canvas(self._model, width, height, backend, fine=fine)
 
     def __enter__(self) -> Self:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -52,10 +53,12 @@ class BodyBatch:
                 raise ConfigError(f"these worms differ too much for one batch: {error}") from None
         bind = self._batch.bind
         self._time, self._ctrl, self._qpos, self._qvel = (bind(name) for name in ("time", "ctrl", "qpos", "qvel"))
+        self._plastic: Array = bind("plastic") if models[0].nplastic else np.empty((len(models), 0))
         self._act: Array = bind("act") if models[0].na else np.empty((len(models), 0))
         self._mass_matrix = bind("M")
         self._mocap = (bind("mocap_pos"), bind("mocap_quat")) if models[0].nmocap else None
         self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
+        self._work: dict[str, NDArray[Any]] = {name: bind(name) for name in self._anatomy.bookkeeper.outputs}
         self._scratch = mujoco.MjData(models[0])
         self.worms = [
             BatchWorm(config, anatomy, self, row)
@@ -82,24 +85,30 @@ class BodyBatch:
         """
         for row, own in zip(rows, activation, strict=True):
             self._ctrl[row] = self.worms[row].control(own, n_steps)
-        if self._mocap is None:
-            return self._stepped(rows, n_steps)
-        reasons: dict[int, str] = {}
+        going, reasons = dict(zip(rows, activation, strict=True)), {}
         for _ in range(n_steps):
-            going = [row for row in rows if row not in reasons]
-            for row in going:
-                self._lay_ground(row)
-            reasons |= self._stepped(going, 1)
+            if self._mocap is not None:
+                for row in going:
+                    self._lay_ground(row)
+            stopped = self._step({row: self.worms[row].drive(own, self._act[row]) for row, own in going.items()})
+            reasons |= stopped
+            going = {row: own for row, own in going.items() if row not in stopped}
         return reasons
 
-    def _stepped(self, rows: Sequence[int], n_steps: int) -> dict[int, str]:
+    def _step(self, drives: Mapping[int, Array]) -> dict[int, str]:
+        """Takes one physics step with the bodies that are driven, and has their worms enter it in their books."""
+        if not drives:
+            return {}
+        reasons: dict[int, str] = {}
         try:
-            self._batch.step(rows, n_steps)
+            self._batch.step(list(drives), 1)
         except SimulationError as failure:
-            return {
-                int(row): engine_stopped(float(self._time[row]), self._batch.error(int(row))) for row in failure.ids
-            }
-        return {}
+            for row in map(int, failure.ids):
+                reasons[row] = engine_stopped(float(self._time[row]), self._batch.error(row))
+        for row, drive in drives.items():
+            if row not in reasons:
+                self.worms[row].book({name: values[row] for name, values in self._work.items()}, drive)
+        return reasons
 
     def _lay_ground(self, row: int) -> None:
         """Lays the planes under one body's skin."""
@@ -149,6 +158,10 @@ class BodyBatch:
         """Returns a body's generalised positions, ``(nq,)``."""
         return self._qpos[row]
 
+    def plastic(self, row: int) -> Array:
+        """Returns what the engine keeps of the rods' frames of a body, ``(nplastic,)``."""
+        return self._plastic[row]
+
     def engine_state(self, row: int) -> Array:
         """Returns a copy of a body's engine state."""
         return self._batch.state[row].copy()
@@ -193,6 +206,10 @@ class BatchWorm(Worm):
     def qpos(self) -> Array:
         """Returns the generalised positions, ``(nq,)``."""
         return self._bodies.qpos(self._row)
+
+    def plastic(self) -> Array:
+        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
+        return self._bodies.plastic(self._row)
 
     def engine_state(self) -> Array:
         """Returns a copy of all that the engine's next step depends on."""

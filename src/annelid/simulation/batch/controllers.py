@@ -33,7 +33,7 @@ class ControllerBatch:
             alike.setdefault(_kind(config, row), []).append(row)
         self._groups = [
             _Networks(rows, [configs[row] for row in rows], [couplings[row] for row in rows])
-            if isinstance(configs[rows[0]].controller, settings.SnsController)
+            if _is_network(configs[rows[0]])
             else _Single(rows[0], couplings[rows[0]], noisy=configs[rows[0]].sensor.noise_m > 0)
             for rows in alike.values()
         ]
@@ -64,9 +64,14 @@ class ControllerBatch:
         self._groups = [group for group in self._groups if group.rows]
 
 
+def _is_network(config: RunConfig) -> bool:
+    """Tells whether a worm's controller is a bare synthetic nervous system."""
+    return isinstance(config.controller, settings.SnsController) and config.turning is None
+
+
 def _kind(config: RunConfig, row: int) -> Hashable:
     """Tells which controllers may step together: networks alike but for what `CopySettings` holds."""
-    if not isinstance(config.controller, settings.SnsController):
+    if not _is_network(config):
         return row
     return (
         config.controller.model_dump_json(exclude={"sensor_current_nA", "kick_nA"}),

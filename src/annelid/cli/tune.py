@@ -1,0 +1,98 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `tune`."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import Assignments, Preset, or_default, overrides_of
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.errors import RunFileError
+
+
+def tune_command(
+    preset: Preset = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("tune"),
+    objective: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--objective",
+            metavar="NAME",
+            help="speed, cost-of-transport or slip; one or two of them.  [default: speed]",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="FIELD=RANGE",
+            help="A field as LOW:HIGH, LOW:HIGH:log or VALUE,VALUE,..; may be repeated."
+            "  [default: timing and sensors of the preset's controller]",
+        ),
+    ] = None,
+    assignments: Assignments = None,
+    duration: Annotated[
+        float | None, typer.Option("--duration", help="Simulated time of each run, s.  [default: the preset's]")
+    ] = None,
+    trials: Annotated[int, typer.Option("--trials", min=1, help="Runs that the search may take.")] = 100,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the optimiser.")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+) -> None:
+    """Search for a faster, cheaper or less slipping gait.
+
+    An optimiser (CMA-ES for one objective, a tree-structured Parzen estimator for two or where there are choices)
+    varies fields of controller and body. Every run is judged over its whole cycles; one that stops, falls silent or
+    out of order, or does not advance counts as no speed, a cost of transport of 100 and a slip ratio of 10.
+
+    Writes after every generation: best.toml, which `annelid run` takes; trials.csv; tuning.png and .svg; with two
+    objectives also front/, a file for each gait of the Pareto front. Runs are kept, so that a second call, also one
+    with more trials, goes on where the first was stopped. Needs the extra: pip install 'annelid[tune]'.
+
+    \b
+    annelid tune riddle2025-muscles
+    annelid tune riddle2025-muscles --vary controller.gate_time_constant_ms=80:600:log --vary sensor.tolerance_m=0:0.02
+    annelid tune riddle2025 --objective speed --objective slip --trials 200 -o front
+    annelid run tune/best.toml
+    """
+    from rich.console import Console
+
+    from annelid.studies.case import Case
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+    from annelid.studies.tune.judge import objectives_of
+    from annelid.studies.tune.results import results_table, write_results
+    from annelid.studies.tune.search import Task, Trial, search
+    from annelid.studies.tune.space import variables_of
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    source, changes = or_default(preset), overrides_of(assignments, duration_s=duration)
+    objectives = objectives_of(objective or ["speed"])
+    variables = variables_of(vary or [], Case(source, changes).config)
+    task = Task(source, changes, variables, objectives, trials, seed)
+    words = ["annelid", "tune", source, *(f"--objective={one.name}" for one in objectives)]
+    words += [word for text in vary or [] for word in ("--vary", text)]
+    words += [word for text in assignments or [] for word in ("--set", text)]
+    words += [*([f"--duration={duration:g}"] if duration is not None else []), f"--trials={trials}", f"--seed={seed}"]
+    found: list[Trial] = []
+    written: list[Path] = []
+    try:
+        with study_progress(quiet=quiet) as progress:
+            for generation in search(task, Store(output / "runs"), jobs=jobs, progress=progress):
+                found += generation
+                written = write_results(task, found, shlex.join(words), output)
+    except KeyboardInterrupt:
+        again = shlex.join([*words, "-o", str(output), *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        Console().print(results_table(task, found))
+    for path in written:
+        typer.echo(path)

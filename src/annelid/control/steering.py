@@ -1,0 +1,280 @@
+"""What scales the two sides of a worm that turns: descending neurons that are told where to go, or touch."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from annelid.clock import SLACK_S
+from annelid.config import ConstantTurning, CourseTurning, HeadingTurning, Steered, TouchTurning
+from annelid.config.sections import Section
+from annelid.config.turning import Descending
+from annelid.errors import ConfigError
+from annelid.protocols import SIDES, Array, Sensation, State
+
+Settings = TypeVar("Settings", bound=Section)
+Commanded = TypeVar("Commanded", bound=Descending)
+Aimed = TypeVar("Aimed", bound=Steered)
+LEFT, RIGHT = SIDES.index("left"), SIDES.index("right")
+
+
+def heading_angle(heading: Array) -> float:
+    """Returns the direction of a heading on the floor, rad: 0 towards -x, positive to the worm's left, towards -y.
+
+    Args:
+        heading: A vector, ``(3,)``, as `Sensation.heading`.
+    """
+    return math.atan2(-float(heading[1]), -float(heading[0]))
+
+
+def wrapped(angle_rad: float) -> float:
+    """Returns an angle in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def half_scales(modulation: ArrayLike) -> Array:
+    """Returns what modulations m in [-1, 1] leave of the left and the right activation.
+
+    Args:
+        modulation: Any shape; positive ones bend a segment to the left.
+
+    Returns:
+        ``1 - max(m, 0)`` and ``1 - max(-m, 0)``, shape ``(.., 2)``.
+    """
+    m = np.asarray(modulation, dtype=float)
+    return np.stack([1.0 - np.maximum(m, 0.0), 1.0 - np.maximum(-m, 0.0)], axis=-1)
+
+
+class Steering(ABC, Generic[Settings]):
+    """Tells at every control step what is left of the activation of the two halves of every ring."""
+
+    def __init__(self, settings: Settings, n_segments: int, control_timestep_s: float) -> None:
+        """Makes it from its section of the configuration, in its initial state."""
+        self._settings = settings
+        self._n_segments = n_segments
+        self._timestep_s = control_timestep_s
+        self.reset()
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Returns to the initial state: all halves whole."""
+
+    @abstractmethod
+    def advance(self, sensation: Sensation, n_steps: int) -> Array:
+        """Takes control steps that feel the same but for their times.
+
+        Returns:
+            Scales after the last of them, each in [0, 1], ``(n_segments, 2)``: left and right half of every ring.
+        """
+
+    @abstractmethod
+    def scales(self) -> Array:
+        """Returns the scales after the latest step, ``(n_segments, 2)``."""
+
+    @abstractmethod
+    def get_state(self) -> State:
+        """Returns copies of all that the next step depends on."""
+
+    @abstractmethod
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+
+
+class DescendingSteering(Steering[Commanded]):
+    """Two descending neurons, one a side, of which the wanted modulation drives one.
+
+    Their activity m is that of leaky neurons with one time constant; a step is exact for a drive that is constant
+    during it.
+    """
+
+    def __init__(self, settings: Commanded, n_segments: int, control_timestep_s: float) -> None:
+        """Makes it from its section of the configuration, silent."""
+        self._keeps = math.exp(-control_timestep_s / settings.descending_time_constant_s)
+        shares = settings.shares
+        self._shares = np.ones(n_segments) if shares is None else np.array(shares, dtype=float)
+        super().__init__(settings, n_segments, control_timestep_s)
+
+    @abstractmethod
+    def wanted(self, sensation: Sensation) -> float:
+        """Takes a control step, and returns the modulation that is asked for during it, in [-1, 1]."""
+
+    def reset(self) -> None:
+        """Silences the descending neurons."""
+        self._modulation = 0.0
+
+    def advance(self, sensation: Sensation, n_steps: int) -> Array:
+        """Takes control steps, as `Steering.advance`."""
+        for _ in range(n_steps):
+            wanted = self.wanted(sensation)
+            self._modulation = wanted + (self._modulation - wanted) * self._keeps
+        return self.scales()
+
+    def scales(self) -> Array:
+        """Returns what the present activity leaves of every half: of its own side's in proportion to its share."""
+        return half_scales(self._modulation * self._shares)
+
+    def get_state(self) -> State:
+        """Returns the activity of the descending neurons."""
+        return {"modulation": np.array(self._modulation)}
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        self._modulation = float(state["modulation"])
+
+
+class ConstantSteering(DescendingSteering[ConstantTurning]):
+    """A constant modulation."""
+
+    def wanted(self, sensation: Sensation) -> float:
+        """Returns the modulation of the configuration."""
+        return self._settings.modulation
+
+
+class AimedSteering(DescendingSteering[Aimed]):
+    """Proportional and derivative control of the heading.
+
+    The wanted modulation is ``gain error - rate_gain rate``, clipped. The rate of the heading is what a filter of first
+    order lags behind it, over the filter's time constant: it averages over the swings of a cycle.
+    """
+
+    def __init__(self, settings: Aimed, n_segments: int, control_timestep_s: float) -> None:
+        """Makes it from its section of the configuration, silent."""
+        self._follows = -math.expm1(-control_timestep_s / settings.rate_time_constant_s)
+        super().__init__(settings, n_segments, control_timestep_s)
+
+    @abstractmethod
+    def target(self, sensation: Sensation) -> float | None:
+        """Returns the wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
+
+    def reset(self) -> None:
+        """Forgets all headings."""
+        super().reset()
+        self._first = self._angle = self._smooth = math.nan
+
+    def wanted(self, sensation: Sensation) -> float:
+        """Takes a control step, and returns the modulation that proportional and derivative control ask for.
+
+        Raises:
+            ConfigError: A body that cannot tell its heading.
+        """
+        settings, angle = self._settings, heading_angle(sensation.heading)
+        if math.isnan(angle):
+            raise ConfigError("steering needs a body that tells its heading, and this one does not")
+        if math.isnan(self._first):
+            self._first = self._angle = self._smooth = angle
+        # Unwrapped, so that the filter does not jump.
+        self._angle += wrapped(angle - self._angle)
+        rate = (self._angle - self._smooth) / settings.rate_time_constant_s
+        self._smooth += self._follows * (self._angle - self._smooth)
+        target = self.target(sensation)
+        if target is None:
+            return 0.0
+        modulation = settings.gain_per_rad * wrapped(target - self._angle) - settings.rate_gain_s * rate
+        return min(max(modulation, -settings.largest_modulation), settings.largest_modulation)
+
+    def get_state(self) -> State:
+        """Returns the activity and the headings at the start, at the latest step, and filtered."""
+        return super().get_state() | {"headings": np.array([self._first, self._angle, self._smooth])}
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        super().set_state(state)
+        self._first, self._angle, self._smooth = np.asarray(state["headings"], dtype=float).tolist()
+
+
+class HeadingSteering(AimedSteering[HeadingTurning]):
+    """Steers to a heading relative to that of the first sensation."""
+
+    def target(self, sensation: Sensation) -> float:
+        """Returns the wanted direction on the floor, rad."""
+        return self._first + math.radians(self._settings.heading_deg)
+
+
+class CourseSteering(AimedSteering[CourseTurning]):
+    """Steers the foremost ring to one waypoint after another."""
+
+    def reset(self) -> None:
+        """Returns to the first waypoint."""
+        super().reset()
+        self._n_reached = 0
+
+    def target(self, sensation: Sensation) -> float | None:
+        """Returns the direction from the foremost ring to the next waypoint, rad; None behind the last."""
+        settings, front = self._settings, sensation.front_m
+        while self._n_reached < len(settings.waypoints):
+            x, y = settings.waypoints[self._n_reached]
+            away = np.array([x - front[0], y - front[1], 0.0])
+            if math.hypot(*away) > settings.reach_m:
+                return heading_angle(away)
+            self._n_reached += 1
+        return None
+
+    def get_state(self) -> State:
+        """Returns the state of the heading's control and how many waypoints have been reached."""
+        return super().get_state() | {"n_reached": np.array(self._n_reached)}
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        super().set_state(state)
+        self._n_reached = int(state["n_reached"])
+
+
+class TouchSteering(Steering[TouchTurning]):
+    """Turns away from what the foremost segment touches, by the authors' rule: see `config.TouchTurning`."""
+
+    def reset(self) -> None:
+        """Stops the timer, with both sides whole."""
+        self._left_s = 0.0
+        self._latched = [1.0, 1.0]
+        self._scales = [1.0, 1.0]
+
+    def advance(self, sensation: Sensation, n_steps: int) -> Array:
+        """Takes control steps under the same touch.
+
+        Raises:
+            ConfigError: A body that feels no touch.
+        """
+        if not len(sensation.touch_N):
+            raise ConfigError("turning.kind = 'touch' needs a body that feels touch on the sides of its segments")
+        front = sensation.touch_N[0]
+        difference = float(front[RIGHT] - front[LEFT])
+        for _ in range(n_steps):
+            self._step(difference)
+        return self.scales()
+
+    def _step(self, difference_N: float) -> None:
+        rule, size = self._settings, abs(difference_N)
+        if self._left_s <= SLACK_S:
+            self._latched = [1.0, 1.0]
+            self._left_s = rule.hold_s if size > rule.arm_N else 0.0
+        if self._left_s > SLACK_S:
+            if size >= rule.least_N:
+                away = 0 if difference_N > 0 else 1
+                self._latched[away] = min(self._latched[away], max((rule.full_N - size) / rule.full_N, 0.0))
+            self._left_s -= self._timestep_s
+        reach = rule.rate_per_s * self._timestep_s
+        self._scales = [
+            scale + min(max(latched - scale, -reach), reach)
+            for scale, latched in zip(self._scales, self._latched, strict=True)
+        ]
+
+    def scales(self) -> Array:
+        """Returns the scales after the latest step, those of a side alike."""
+        return np.tile(self._scales, (self._n_segments, 1))
+
+    def get_state(self) -> State:
+        """Returns what is left of the timer, s, and the latched and the present scales."""
+        return {
+            "timer": np.array(self._left_s),
+            "latched": np.array(self._latched),
+            "scales": np.array(self._scales),
+        }
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        self._left_s = float(state["timer"])
+        self._latched, self._scales = (np.asarray(state[name], dtype=float).tolist() for name in ("latched", "scales"))

@@ -1,0 +1,187 @@
+"""What is varied: fields of a configuration, each in a range or among choices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from annelid.config import RunConfig, fields_of, load_config, parse_assignments, toml_value
+from annelid.errors import ConfigError, suggest
+
+DIGITS = 4
+"""Significant digits of a value, so that a file that states it makes the same run."""
+
+LOG = "log"
+HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A number in a range.
+
+    Attributes:
+        field: Dotted path of the field.
+        low: Least value.
+        high: Largest value.
+        logarithmic: Whether equal ratios count alike, rather than equal differences.
+        whole: Whether it is a whole number.
+    """
+
+    field: str
+    low: float
+    high: float
+    logarithmic: bool = False
+    whole: bool = False
+
+    def __contains__(self, value: Any) -> bool:
+        """Whether a value lies in the range."""
+        return isinstance(value, int | float) and self.low <= value <= self.high
+
+    def rounded(self, value: float) -> float | int:
+        """Rounds a value to `DIGITS` digits, or to a whole number, and keeps it in the range."""
+        if self.whole:
+            return min(max(round(value), int(self.low)), int(self.high))
+        return min(max(float(f"{value:.{DIGITS}g}"), self.low), self.high)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of several values.
+
+    Attributes:
+        field: Dotted path of the field.
+        values: The values: numbers, words, or lists of these.
+    """
+
+    field: str
+    values: tuple[Any, ...]
+
+    def __contains__(self, value: Any) -> bool:
+        """Whether a value is one of them."""
+        return value in self.values
+
+
+Variable = Interval | Choice
+
+_CONTROLLERS: Mapping[str, tuple[str, ...]] = {
+    "sns": (
+        "controller.gate_time_constant_ms=80:900:log",
+        "controller.activation_slope_per_mV=0.1:2:log",
+        "sensor.tolerance_m=0.001:0.03:log",
+        "sensor.hysteresis_m=0:0.02",
+    ),
+    "adaptive": (
+        "controller.drive=0:1",
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "sensor.tolerance_m=0.001:0.03:log",
+        "sensor.hysteresis_m=0:0.02",
+    ),
+    "sns-robust": ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log"),
+    "sine": ("controller.period_s=0.8:10:log", "controller.waves=1:3"),
+    "timed": (
+        "controller.rise_s=0.05:2:log",
+        "controller.hold_s=0.05:2:log",
+        "controller.fall_s=0.05:2:log",
+        "controller.interval_s=0.1:2:log",
+    ),
+    "shc": (
+        "controller.growth_rate_per_s=5:100:log",
+        "controller.bias_per_s=1e-5:0.1:log",
+        "controller.stretch_cue_m=0.005:0.08:log",
+    ),
+    "phase-chain": ("controller.slowing=0.3:10:log", "controller.waves=0.5:3", "controller.drive=3:5"),
+}
+"""What is varied unless the user says otherwise, by the controller's kind: its timing and its sensors' switching."""
+
+
+def default_variables(config: RunConfig) -> list[Variable]:
+    """Returns the variables of a configuration's controller.
+
+    Raises:
+        ConfigError: The controller has no timing of its own to vary.
+    """
+    kind = config.controller.kind
+    if kind not in _CONTROLLERS:
+        raise ConfigError(f"controller.kind = {kind!r} has no fields that are varied by default: {HOW} with --vary")
+    return [parse_variable(text, config) for text in _CONTROLLERS[kind]]
+
+
+def variables_of(texts: Sequence[str], config: RunConfig) -> list[Variable]:
+    """Reads what is varied, each ``FIELD=LOW:HIGH[:log]`` or ``FIELD=VALUE,VALUE,..``; by default the controller's.
+
+    Raises:
+        ConfigError: A malformed text, an unknown field, a value out of the field's range, or a field given twice.
+    """
+    variables = [parse_variable(text, config) for text in texts] or default_variables(config)
+    fields = [variable.field for variable in variables]
+    for field in fields:
+        if fields.count(field) > 1:
+            raise ConfigError(f"{field} is varied twice: {HOW} once for each field")
+    return variables
+
+
+def parse_variable(text: str, config: RunConfig) -> Variable:
+    """Reads one variable.
+
+    Args:
+        text: ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log`` for a number, whole where the field's own value is;
+            ``FIELD=VALUE,VALUE,..`` for choices, each as TOML or plain text.
+        config: The configuration that the fields are of.
+
+    Raises:
+        ConfigError: The text is malformed, there is no such field, or a value is out of the field's range.
+    """
+    field, equals, right = (part.strip() for part in text.partition("="))
+    if not equals or not right:
+        raise ConfigError(f"{text!r} says nothing to vary: {HOW}")
+    known = fields_of(config)
+    if field not in known:
+        raise ConfigError(f"unknown field {field!r}: {suggest(field, known)}")
+    variable = _choice(field, right) if ":" not in right else _interval(field, right, value_at(config, field))
+    for end in variable.values if isinstance(variable, Choice) else (variable.low, variable.high):
+        load_config(config.model_dump(), {field: int(end) if getattr(variable, "whole", False) else end})
+    return variable
+
+
+def _choice(field: str, text: str) -> Choice:
+    # As TOML: brackets of a list keep its commas together.
+    listed = parse_assignments([f"{field}=[{text}]"])[field]
+    values = listed if isinstance(listed, list) else [word.strip() for word in text.split(",")]
+    if len(values) < 2:
+        raise ConfigError(f"{field}={text}: one value is no choice: {HOW}")
+    return Choice(field, tuple(values))
+
+
+def _interval(field: str, text: str, present: Any) -> Interval:
+    low_text, high_text, *rest = (part.strip() for part in text.split(":"))
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        raise ConfigError(f"{field}={text}: the ends of a range must be numbers: {HOW}") from None
+    if rest not in ([], [LOG]):
+        raise ConfigError(f"{field}={text}: only 'log' may follow the ends of a range: {HOW}")
+    if isinstance(present, bool | str | tuple):
+        raise ConfigError(f"{field} is {toml_value(present)}, which is no number with a range: {HOW}")
+    if not low < high:
+        raise ConfigError(f"{field}={text}: the lower end must be below the upper end")
+    if rest and low <= 0.0:
+        raise ConfigError(f"{field}={text}: a logarithmic range needs a lower end above 0")
+    whole = isinstance(present, int)
+    if whole and not (low.is_integer() and high.is_integer()):
+        raise ConfigError(f"{field}={text}: the ends must be whole numbers, as the field is")
+    return Interval(field, low, high, bool(rest), whole)
+
+
+def value_at(config: RunConfig, field: str) -> Any:
+    """Returns the value of a field by its dotted path."""
+    value: Any = config
+    for name in field.split("."):
+        value = getattr(value, name)
+    return value
+
+
+def own_values(config: RunConfig, variables: Sequence[Variable]) -> dict[str, Any] | None:
+    """Returns the configuration's own values of the variables by field; None if one is outside of what it may be."""
+    own = {variable.field: value_at(config, variable.field) for variable in variables}
+    return own if all(own[variable.field] in variable for variable in variables) else None

@@ -1,0 +1,74 @@
+"""The rows of a run's table that say how the worm gets along and where its muscles' work went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from annelid.analysis.gait import Gait
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from annelid.analysis.balance import EnergyBalance
+
+_ROWS: dict[str, tuple[str, Callable[[float], str]]] = {
+    "slip_ratio": ("slip per way", lambda x: f"{100 * x:.1f} %"),
+    "backward_ratio": ("way back per way ahead", lambda x: f"{100 * x:.1f} %"),
+    "cost_of_transport": ("cost of transport", lambda x: f"{x:.2f}"),
+    "lateral_drift": ("drift to the left per way", lambda x: f"{100 * x:.1f} %"),
+    "turning_radius_m": ("turning radius", lambda x: f"{abs(x):.2f} m to the {'left' if x > 0 else 'right'}"),
+}
+"""Field of the gait: what it is called and how it is written."""
+
+
+def add_gait(table: Table, numbers: Gait) -> None:
+    """Adds the rows that can be told as a section of their own.
+
+    Args:
+        table: The run's table; its first column is the quantity, its second this run's number.
+        numbers: The gait.
+    """
+    rows = gait_rows(numbers)
+    if not rows:
+        return
+    table.add_section()
+    for row in rows:
+        table.add_row(*row)
+
+
+def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
+    """Returns label and value of every row that can be told."""
+    rows: list[tuple[str, str]] = []
+    if numbers.speed_m_per_s is not None and numbers.stride_m is not None:
+        cycles = f"{numbers.cycles} cycle{'' if numbers.cycles == 1 else 's'}"
+        lengths = numbers.speed_body_lengths_per_s, numbers.stride_body_lengths
+        speed, stride = (f" ({x:.3f} body lengths)" if x is not None else "" for x in lengths)
+        rows.append((f"speed, {cycles}", f"{100 * numbers.speed_m_per_s:.2f} cm/s{speed.replace(')', '/s)')}"))
+        rows.append(("stride", f"{100 * numbers.stride_m:.1f} cm{stride}"))
+    if numbers.contact_duty is not None:
+        rows.append(("on the ground", f"{' / '.join(f'{100 * share:.0f}' for share in numbers.contact_duty)} %"))
+    for field, (label, text) in _ROWS.items():
+        value = getattr(numbers, field)
+        if value is not None:
+            rows.append((label, text(value)))
+    if numbers.energy is not None:
+        rows.append(("muscles' work, whole run", f"{numbers.energy.muscle_work_J:.2f} J"))
+        rows.extend(_shares(numbers.energy))
+    return rows
+
+
+def _shares(balance: EnergyBalance) -> list[tuple[str, str]]:
+    """Where the work went, in shares of it; nothing if there was next to none."""
+    if not balance.muscle_work_J > 0:
+        return []
+    held = balance.kinetic_J + balance.elastic_J + (balance.potential_J or 0.0)
+    parts = (
+        ("held", held),
+        ("slip", balance.slip_J),
+        ("contacts and edges", balance.constraints_J),
+        ("damping", balance.damping_J),
+        ("integrator", balance.numerical_J),
+    )
+    shares = [f"{name} {100 * part / balance.muscle_work_J:.0f} %" for name, part in parts if part is not None]
+    return [("of which", ", ".join(shares))]

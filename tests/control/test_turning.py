@@ -1,0 +1,339 @@
+"""Turning as a modifier of any pattern: scales, descending neurons, steering, the published rule of touch, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid import config
+from annelid.config import TimedWave, check_config, load_config
+from annelid.config.turning import TurningSection
+from annelid.control import SnsController, TimedController
+from annelid.control.steering import half_scales, heading_angle, wrapped
+from annelid.control.turning import TurningController, build_steering
+from annelid.errors import ConfigError
+from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched
+
+N = 3
+STEP_S = 0.001
+REST_M = 0.07
+
+
+def felt(
+    time_s: float = 0.0,
+    *,
+    heading_deg: float = 0.0,
+    front_m: tuple[float, float] = (0.0, 0.0),
+    left_N: float = 0.0,
+    right_N: float = 0.0,
+    longer_m: float = 0.0,
+    n_segments: int = N,
+) -> Sensation:
+    """What a worm feels whose heading is that far to the left of -x."""
+    angle = np.radians(heading_deg)
+    touch = np.zeros((n_segments, len(SIDES)))
+    touch[0, SIDES.index("left")], touch[0, SIDES.index("right")] = left_N, right_N
+    rest = np.full((n_segments, 2), REST_M)
+    return Sensation(
+        time_s,
+        rest + longer_m,
+        rest,
+        np.zeros(2 * n_segments),
+        np.zeros(2 * n_segments),
+        np.zeros((n_segments, 3)),
+        np.zeros(3),
+        touch_N=touch,
+        front_m=np.array([*front_m, 0.1]),
+        heading=np.array([-np.cos(angle), -np.sin(angle), 0.0]),
+    )
+
+
+def turned(section: TurningSection, pattern: Controller | None = None, n_segments: int = N) -> TurningController:
+    return TurningController(pattern or wave(n_segments), section, n_segments, 2 * n_segments, STEP_S)
+
+
+def wave(n_segments: int = N) -> TimedController:
+    return TimedController(TimedWave(rise_s=0.1, hold_s=0.1, fall_s=0.1, interval_s=0.1), n_segments, 2 * n_segments)
+
+
+def sns(n_segments: int = N) -> SnsController:
+    held = config.StretchSensor(startup_hold_s=0.0)
+    return SnsController(config.SnsController(), held, n_segments, 2 * n_segments, STEP_S)
+
+
+SECTIONS: list[TurningSection] = [
+    config.ConstantTurning(modulation=0.7),
+    config.HeadingTurning(heading_deg=30.0),
+    config.CourseTurning(waypoints=((-1.0, 0.5), (-2.0, 0.0))),
+    config.TouchTurning(),
+]
+
+
+def journey(n_steps: int) -> list[Sensation]:
+    """A worm that turns, moves on and touches things."""
+    random = np.random.default_rng(3)
+    return [
+        felt(
+            k * STEP_S,
+            heading_deg=float(200.0 * k / n_steps),
+            front_m=(-2.5 * k / n_steps, 0.5 * k / n_steps),
+            left_N=float(random.uniform(0.0, 9.0)),
+            right_N=float(random.uniform(0.0, 9.0)),
+            longer_m=0.03 * (k > n_steps // 2),
+        )
+        for k in range(n_steps)
+    ]
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.kind)
+class TestEveryKind:
+    def test_has_all_capabilities(self, section: TurningSection) -> None:
+        one = turned(section)
+        for capability in (Records, Stateful, StridingController, Watched):
+            assert isinstance(one, capability)
+
+    @pytest.mark.parametrize("pattern", [wave, sns])
+    def test_a_stride_is_so_many_steps_bit_for_bit(self, section: TurningSection, pattern: Any) -> None:
+        walked, strode = turned(section, pattern()), turned(section, pattern())
+        for first in range(0, 400, 10):
+            here = journey(400)[first]
+            for later in range(10):
+                stepped = walked.step(replace(here, time_s=(first + later) * STEP_S))
+            assert np.array_equal(stepped, strode.stride(here, 10))
+        before, after = walked.get_state(), strode.get_state()
+        assert before.keys() == after.keys()
+        assert all(np.array_equal(before[name], after[name], equal_nan=True) for name in before)
+
+    def test_goes_on_from_a_saved_state_bit_for_bit(self, section: TurningSection) -> None:
+        one, other = turned(section, sns()), turned(section, sns())
+        way = journey(300)
+        for here in way[:150]:
+            one.step(here)
+        other.set_state(one.get_state())
+        for here in way[150:]:
+            assert np.array_equal(one.step(here), other.step(here))
+
+    def test_resets_to_what_it_was(self, section: TurningSection) -> None:
+        one = turned(section, sns())
+        fresh = [one.step(here) for here in journey(100)]
+        one.reset(0)
+        assert np.array_equal(fresh, [one.step(here) for here in journey(100)])
+
+    def test_a_mirrored_journey_mirrors_the_activation(self, section: TurningSection) -> None:
+        mirrored = mirror_of(section)
+        one, other = turned(section), turned(mirrored)
+        for here in journey(500):
+            a, b = one.step(here), other.step(mirrored_feeling(here))
+            assert np.allclose(a.reshape(-1, 2), b.reshape(-1, 2)[:, ::-1], rtol=0.0, atol=1e-12)
+
+    def test_names_what_it_reads(self, section: TurningSection) -> None:
+        one = turned(section, sns())
+        one.step(felt())
+        named, values = one.recordable(), one.read(frame=False)
+        assert {signal.name for signal in named.signals} == set(values)
+        for signal in named.signals:
+            assert np.shape(values[signal.name]) == signal.shape
+        assert named.attrs["turning"] == section.kind
+        assert named.coords["half"] == ["left", "right"]
+
+
+def mirror_of(section: TurningSection) -> TurningSection:
+    if isinstance(section, config.ConstantTurning):
+        return section.model_copy(update={"modulation": -section.modulation})
+    if isinstance(section, config.HeadingTurning):
+        return section.model_copy(update={"heading_deg": -section.heading_deg})
+    if isinstance(section, config.CourseTurning):
+        return section.model_copy(update={"waypoints": tuple((x, -y) for x, y in section.waypoints)})
+    return section
+
+
+def mirrored_feeling(here: Sensation) -> Sensation:
+    touch = here.touch_N[:, [SIDES.index(side) for side in ("belly", "right", "back", "left")]]
+    over = np.array([1.0, -1.0, 1.0])
+    return replace(here, touch_N=touch, front_m=here.front_m * over, heading=here.heading * over)
+
+
+@given(st.floats(-1.0, 1.0))
+def test_a_modulation_takes_from_one_side_only(modulation: float) -> None:
+    left, right = half_scales(modulation)
+    assert right - left == pytest.approx(modulation)
+    assert max(left, right) == 1.0
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.lists(st.floats(0.0, 0.05), min_size=5, max_size=5))
+def test_zero_modulation_is_the_plain_nervous_system_bit_for_bit(lengthenings_m: list[float]) -> None:
+    plain, turning = sns(), turned(config.ConstantTurning(modulation=0.0), sns())
+    for k, longer_m in enumerate(lengthenings_m):
+        here = felt(k * 0.02, longer_m=longer_m)
+        assert np.array_equal(plain.stride(here, 20), turning.stride(here, 20))
+
+
+@pytest.mark.parametrize("modulation", [-1.0, -0.4, 0.6])
+def test_the_pattern_keeps_its_rhythm_and_one_side_its_size(modulation: float) -> None:
+    plain, turning = wave(), turned(config.ConstantTurning(modulation=modulation, descending_time_constant_s=1e-3))
+    settled = 50
+    for k in range(600):
+        whole, scaled = plain.step(felt(k * STEP_S)).reshape(-1, 2), turning.step(felt(k * STEP_S)).reshape(-1, 2)
+        if k >= settled:
+            assert np.allclose(scaled, whole * half_scales(modulation), rtol=1e-12, atol=1e-12)
+
+
+def test_every_segment_takes_its_share_and_a_negative_one_bends_the_other_way() -> None:
+    shares = (1.0, 0.0, -0.5)
+    section = config.ConstantTurning(modulation=0.8, shares=shares, descending_time_constant_s=1e-3)
+    scales = build_steering(section, N, STEP_S).advance(felt(), 100)
+    assert scales.tolist() == [pytest.approx([0.2, 1.0]), [1.0, 1.0], pytest.approx([1.0, 0.6])]
+    with pytest.raises(ConfigError, match=r"turning.shares has 3 entries: must have 6, one a segment"):
+        load_config("riddle2025", {"turning.shares": list(shares)})
+
+
+def test_descending_neurons_follow_with_their_time_constant() -> None:
+    steering = build_steering(config.ConstantTurning(modulation=1.0, descending_time_constant_s=0.05), 1, STEP_S)
+    for k in range(1, 200):
+        left, right = steering.advance(felt(), 1)[0]
+        assert left == pytest.approx(np.exp(-k * STEP_S / 0.05), rel=1e-9)
+        assert right == 1.0
+
+
+class TestSteering:
+    @pytest.mark.parametrize("error_deg", [-40.0, -10.0, 10.0, 40.0])
+    def test_it_turns_towards_the_wanted_heading(self, error_deg: float) -> None:
+        steering = build_steering(config.HeadingTurning(heading_deg=error_deg, gain_per_rad=1.0), 1, STEP_S)
+        left, right = steering.advance(felt(heading_deg=25.0), 20_000)[0]
+        assert right - left == pytest.approx(np.radians(error_deg), rel=1e-6)
+
+    def test_it_takes_the_shorter_way_round(self) -> None:
+        steering = build_steering(config.HeadingTurning(heading_deg=170.0, gain_per_rad=0.3), 1, STEP_S)
+        steering.advance(felt(heading_deg=0.0), 1)
+        left, right = steering.advance(felt(heading_deg=-170.0), 50_000)[0]
+        assert right - left == pytest.approx(-0.3 * np.radians(20.0), rel=1e-6)
+
+    def test_a_steady_rate_of_turning_is_taken_off(self) -> None:
+        rate_deg_per_s, slow = 5.0, 2.0
+        section = config.HeadingTurning(gain_per_rad=0.0, rate_gain_s=2.0, rate_time_constant_s=slow)
+        steering = build_steering(section, 1, STEP_S)
+        scales = np.ones(2)
+        for k in range(12_000):
+            scales = steering.advance(felt(heading_deg=wrapped_deg(rate_deg_per_s * k * STEP_S + 150.0)), 1)[0]
+        assert scales[1] - scales[0] == pytest.approx(-2.0 * np.radians(rate_deg_per_s), rel=0.01)
+
+    def test_the_largest_modulation_is_never_exceeded(self) -> None:
+        section = config.HeadingTurning(heading_deg=90.0, gain_per_rad=50.0, largest_modulation=0.4)
+        left, right = build_steering(section, 1, STEP_S).advance(felt(), 20_000)[0]
+        assert (left, right) == (pytest.approx(0.6), 1.0)
+
+    def test_waypoints_are_taken_in_order_and_left_behind(self) -> None:
+        section = config.CourseTurning(waypoints=((-1.0, -1.0), (-3.0, 1.0)), reach_m=0.2, gain_per_rad=0.5)
+        steering = build_steering(section, 1, STEP_S)
+        towards = []
+        for front in ((0.0, 0.0), (-0.95, -0.95), (-2.95, 1.05)):
+            left, right = steering.advance(felt(front_m=front), 50_000)[0]
+            towards.append(right - left)
+        first, second = np.radians(45.0), heading_angle(np.array([-2.05, 1.95, 0.0]))
+        assert towards == pytest.approx([0.5 * first, 0.5 * second, 0.0], abs=1e-6)
+        assert second < 0.0
+
+    def test_a_vehicle_with_a_turning_radius_converges_on_its_heading(self) -> None:
+        way = drive(config.HeadingTurning(heading_deg=60.0), duration_s=60.0)
+        assert way[-1, 2] == pytest.approx(60.0, abs=1.0)
+        assert way[:, 2].max() < 75.0
+
+    def test_a_vehicle_with_a_turning_radius_passes_its_waypoints(self) -> None:
+        waypoints = ((-2.0, -0.8), (-4.0, 0.0))
+        way = drive(config.CourseTurning(waypoints=waypoints), duration_s=60.0)
+        for waypoint in waypoints:
+            assert np.hypot(*(way[:, :2] - waypoint).T).min() < 0.3
+
+
+def wrapped_deg(angle_deg: float) -> float:
+    return float(np.degrees(wrapped(np.radians(angle_deg))))
+
+
+def drive(section: TurningSection, duration_s: float) -> np.ndarray:
+    """Positions (m) and heading (deg) of a point that crawls at 0.1 m/s and turns with a radius of 1.5 m at least."""
+    steering, dt = build_steering(section, 1, STEP_S), 0.01
+    x, y, heading = 0.0, 0.0, 0.0
+    way = []
+    for k in range(round(duration_s / dt)):
+        swing = np.radians(3.0) * np.sin(2.0 * np.pi * k * dt / 2.0)
+        here = felt(k * dt, front_m=(x, y), heading_deg=wrapped_deg(np.degrees(heading + swing)))
+        left, right = steering.advance(here, round(dt / STEP_S))[0]
+        heading += dt * 0.1 / 1.5 * (right - left)
+        x, y = x - dt * 0.1 * np.cos(heading), y - dt * 0.1 * np.sin(heading)
+        way.append((x, y, np.degrees(heading)))
+    return np.array(way)
+
+
+class TestTouch:
+    """The published rule, worked out by hand at steps of 10 ms: rate 0.1 a step."""
+
+    def scales(self, *forces_N: float, section: config.TouchTurning | None = None) -> list[list[float]]:
+        steering = build_steering(section or config.TouchTurning(), 1, 0.01)
+        return [
+            steering.advance(felt(left_N=max(-f, 0.0), right_N=max(f, 0.0)), 1)[0].round(9).tolist() for f in forces_N
+        ]
+
+    def test_two_newtons_do_not_start_it(self) -> None:
+        assert self.scales(2.0, -2.0, 1.5) == [[1.0, 1.0]] * 3
+
+    def test_contact_on_the_right_scales_the_left_side_to_its_latched_minimum(self) -> None:
+        # 6 N: to (15 - 6)/15 = 0.6; 9 N: to 0.4, which 3 N (0.8) and 0.5 N do not undo.
+        left = [scale for scale, _ in self.scales(6.0, 6.0, 6.0, 6.0, 6.0, 9.0, 3.0, 3.0, 0.5)]
+        assert left == [0.9, 0.8, 0.7, 0.6, 0.6, 0.5, 0.4, 0.4, 0.4]
+
+    def test_contact_on_the_left_scales_the_right_side(self) -> None:
+        assert self.scales(-6.0, -6.0)[-1] == [1.0, 0.8]
+
+    def test_a_running_timer_listens_to_one_newton(self) -> None:
+        # 2.1 N starts it; -1.5 N then scales the right side to 0.9, -0.9 N nothing.
+        assert self.scales(2.1, -1.5, -1.5)[-1] == pytest.approx([1 - 2.1 / 15, 0.9], abs=1e-9)
+        assert self.scales(2.1, -0.9, -0.9)[-1][1] == 1.0
+
+    def test_fifteen_newtons_silence_a_side(self) -> None:
+        assert self.scales(*[40.0] * 12)[-1] == [0.0, 1.0]
+
+    def test_six_seconds_later_it_goes_straight_again(self) -> None:
+        scales = self.scales(9.0, *[0.0] * 620)
+        left = [scale for scale, _ in scales]
+        # 600 steps from the one that started it; then back at the same rate.
+        assert left[599] == 0.4
+        assert left[600:607] == pytest.approx([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.0])
+
+    def test_lasting_contact_starts_it_anew(self) -> None:
+        left = [scale for scale, _ in self.scales(*[9.0] * 1300)]
+        assert left[6:] == [0.4] * 1294
+
+    def test_the_rate_does_not_depend_on_the_step(self) -> None:
+        steering = build_steering(config.TouchTurning(), 1, STEP_S)
+        assert steering.advance(felt(right_N=15.0), 50)[0, 0] == pytest.approx(0.5)
+
+
+class TestRefusals:
+    def test_whole_rings(self) -> None:
+        with pytest.raises(ConfigError, match=r"needs half-rings: 6 muscles, not 3"):
+            TurningController(wave(), config.ConstantTurning(), N, N, STEP_S)
+
+    @pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2022-planar"])
+    def test_a_worm_without_halves(self, preset: str) -> None:
+        with pytest.raises(ConfigError, match=r"turning.kind = 'touch' needs a left and a right half"):
+            load_config(preset, {"turning.kind": "touch"})
+
+    def test_a_modulation_beyond_one_and_a_course_without_waypoints(self) -> None:
+        with pytest.raises(ConfigError, match=r"turning.modulation = 1.5: must be at most 1"):
+            load_config("riddle2025", {"turning.modulation": 1.5})
+        with pytest.raises(ConfigError, match=r"turning.waypoints must be given"):
+            load_config("riddle2025", {"turning.kind": "course"})
+
+    @pytest.mark.parametrize("kind", ["heading", "touch"])
+    def test_a_body_that_does_not_feel_what_is_needed(self, kind: str) -> None:
+        section = check_config({"body": {"rings": {"layout": "halves"}}, "turning": {"kind": kind}}).turning
+        assert section is not None
+        numb = replace(felt(), touch_N=np.zeros((0, len(SIDES))), heading=np.full(3, np.nan))
+        with pytest.raises(ConfigError, match="needs a body that"):
+            turned(section).step(numb)

@@ -1,0 +1,148 @@
+"""The energy books: closed forms, the engine's own matrices, and a remainder that goes to zero with the step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from annelid.config import ServoRings, load_config
+from annelid.simulation.books import Bookkeeper
+from annelid.simulation.worm import WormPlant
+
+FREE = {"arena.floor_gap_m": 30.0, "body.rings.passive_peak": 1e-12}
+"""Far above the floor, and with muscles that do not pull on their own."""
+SERVOS = {"body.rings": {"kind": "servo", "layout": "halves", "force_limit_N": 6.0}}
+
+
+def worm(step_s: float, **changes: Any) -> WormPlant:
+    clock = {"control_timestep_s": step_s, "physics_timestep_s": step_s}
+    record = {"signals_interval_s": step_s, "frames_interval_s": 0.04}
+    plant = WormPlant(load_config({"clock": clock, "record": record}, changes))
+    plant.reset(0)
+    return plant
+
+
+def held(plant: WormPlant) -> float:
+    """Kinetic, elastic and potential energy, J."""
+    return plant.kinetic_energy_J() + plant.elastic_energy_J() + plant.potential_energy_J()
+
+
+def remainder(plant: WormPlant, start_J: float) -> float:
+    """What the books do not explain, J."""
+    read = plant.read(False)
+    losses = float(read["damping_loss"]) + float(read["constraint_loss"])
+    return float(np.sum(read["muscle_work"])) - losses - (held(plant) - start_J)
+
+
+def test_a_falling_worm_turns_potential_into_kinetic_energy() -> None:
+    """The engine falls n (n + 1) / 2 steps of g h^2; only half a square of g h a step is lost.
+
+    The hinges' holders, a millionth of the mass, do not fall.
+    """
+    step_s, n_steps, gravity = 0.002, 50, 9.81
+    plant = worm(step_s, **FREE)
+    start = plant.potential_energy_J()
+    for _ in range(n_steps):
+        plant.step(np.zeros(3))
+    mass = plant.total_mass_kg
+    assert plant.kinetic_energy_J() == pytest.approx(0.5 * mass * (gravity * n_steps * step_s) ** 2, rel=1e-5)
+    fallen = gravity * step_s**2 * n_steps * (n_steps + 1) / 2
+    assert start - plant.potential_energy_J() == pytest.approx(mass * gravity * fallen, rel=1e-5)
+    assert plant.elastic_energy_J() == pytest.approx(0.0, abs=1e-9)
+    assert remainder(plant, start) == pytest.approx(0.5 * mass * (gravity * step_s) ** 2 * n_steps, rel=1e-3)
+    read = plant.read(False)
+    assert np.abs(read["muscle_work"]).max() + abs(float(read["damping_loss"])) < 1e-9
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.002])
+def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float) -> None:
+    """Weightless, set moving lengthwise: what is missing shrinks with the step."""
+    missing, swapped, lost = [], [], []
+    for step_s in (0.002, 0.001, 0.0005):
+        quiet = {**FREE, "arena.gravity_m_per_s2": 0.0, "body.strands.joint_damping_Nms_per_rad": damping}
+        plant = worm(step_s, **quiet)
+        start = 0.0
+        for crossing, place in enumerate(plant.geometry.crossings_m):
+            speed = 0.5 * float(place[0] - plant.geometry.length_m / 2)
+            name = f"crossing_{crossing}"
+            plant.data.qvel[plant.model.joint(f"{name}_x").dofadr[0]] = speed
+            start += 0.5 * float(plant.model.body(name).mass[0]) * speed**2
+        elastic = []
+        for _ in range(round(0.1 / step_s)):
+            plant.step(np.zeros(3))
+            elastic.append(plant.elastic_energy_J())
+        missing.append(remainder(plant, start) / start)
+        swapped.append(max(elastic) / start)
+        lost.append(float(plant.read(False)["damping_loss"]) / start)
+    assert swapped[-1] > 0.2, "energy must go to and fro"
+    assert lost[-1] > 0.005 if damping else lost[-1] == 0.0
+    assert abs(missing[2]) < abs(missing[1]) < abs(missing[0])
+
+
+@pytest.mark.parametrize("rings", [{}, SERVOS], ids=["muscles", "servos"])
+def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(rings: dict[str, Any]) -> None:
+    plant = worm(0.005, **rings)
+    data, n = plant.data, plant.n_muscles
+    bookkeeper = plant.anatomy.bookkeeper
+    assert bookkeeper.slopes is not None
+    activation = np.resize([1.0, 0.0, 0.3], n)
+    met = set()
+    for _ in range(80):
+        plant.step(activation)
+        ids, h = data.efm_aid[: data.nefmA], 0.005
+        stiffness, metric = np.zeros(n), np.zeros(n)
+        stiffness[ids] = data.efm_ak[: data.nefmA]
+        metric[ids] = data.efm_as[: data.nefmA]
+        per_length, per_rate = bookkeeper.slopes(
+            data.actuator_length, data.actuator_velocity, activation, -data.actuator_force
+        )
+        assert h * per_length == pytest.approx(stiffness, abs=1e-9)
+        assert h * per_rate + h * h * per_length == pytest.approx(metric, abs=1e-9)
+        met |= set((per_length > 0).tolist())
+    assert met == {True, False}
+
+
+SPRING_MASS = """
+<mujoco>
+  <option integrator="discrete" solver="Newton" timestep="0.01" gravity="0 0 0"/>
+  <worldbody>
+    <site name="wall"/>
+    <body pos="1 0 0"><joint type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/><site name="mass"/></body>
+  </worldbody>
+  <tendon>
+    <spatial name="cable" stiffness="80" damping="1.5" springlength="0.9">
+      <site site="wall"/><site site="mass"/>
+    </spatial>
+  </tendon>
+  <actuator>
+    <general name="ring_0" tendon="cable" dyntype="integrator" biastype="affine" gainprm="200" biasprm="0 -200 -10"
+      forcerange="-30 0" ctrlrange="-1 1" actrange="0.5 1"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
+    """All is linear: of the muscle's work, the integrator takes (m dv^2 + k dx^2) / 2 and the damping of the change."""
+    model = mujoco.MjModel.from_xml_string(SPRING_MASS)
+    data = mujoco.MjData(model)
+    data.act[:] = 1.0
+    bookkeeper = Bookkeeper(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
+    mass, rate, damping = 2.0, 80.0, 1.5
+    books, expected = bookkeeper.opened(), 0.0
+    data.ctrl[:] = -0.3
+    for _ in range(80):
+        x, v = float(data.qpos[0]), float(data.qvel[0])
+        mujoco.mj_step(model, data)
+        books += bookkeeper.step({name: getattr(data, name) for name in bookkeeper.outputs}, data.ctrl)
+        dx, dv = float(data.qpos[0]) - x, float(data.qvel[0]) - v
+        expected += 0.5 * mass * dv**2 + 0.5 * rate * dx**2 + damping * dv * dx
+        held = 0.5 * mass * data.qvel[0] ** 2 + 0.5 * rate * (data.qpos[0] + 0.1) ** 2 - 0.5 * rate * 0.1**2
+        left = float(books.muscle_work[0] - books.damping_loss - books.constraint_loss) - held
+        assert left == pytest.approx(expected, abs=1e-9)
+    assert data.qpos[0] < -0.1
+    assert books.muscle_work[0] > 0.05
+    assert books.damping_loss > 0.001

@@ -1,0 +1,106 @@
+"""The study of speed over friction and number of segments: what is changed, and what it leaves behind."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from annelid.analysis.gait import Gait
+from annelid.config import ServoRings, WormBody, load_config
+from annelid.errors import ConfigError
+from annelid.studies.case import Case
+from annelid.studies.crawling import (
+    VALUES,
+    Point,
+    Reading,
+    changes_for,
+    crawling_table,
+    points,
+    write_figure,
+    write_readings,
+)
+from annelid.studies.tune.judge import Judged
+
+MUSCLES, SERVOS = "riddle2025-muscles", "riddle2025"
+
+
+@pytest.mark.parametrize("n_segments", [3, 6, 12])
+@pytest.mark.parametrize("gait", [MUSCLES, SERVOS])
+def test_longer_worms_have_rings_as_strong_as_the_second_and_ends_as_before(gait: str, n_segments: int) -> None:
+    body = load_config(gait, changes_for(gait, "segments", n_segments)).body
+    assert isinstance(body, WormBody)
+    rings = body.rings
+    forces = rings.force_limits(n_segments) if isinstance(rings, ServoRings) else rings.peak_forces(n_segments)
+    assert forces == [16.0, *[31.0] * (n_segments - 2), 16.0]
+
+
+def test_a_long_worm_is_watched_in_proportion_and_a_short_one_no_shorter() -> None:
+    before = load_config(MUSCLES).duration_s
+    after = {n: load_config(MUSCLES, changes_for(MUSCLES, "segments", n)).duration_s for n in (3, 6, 12)}
+    assert after == {3: before, 6: before, 12: 2.0 * before}
+
+
+def test_a_ground_changes_nothing_but_friction() -> None:
+    assert changes_for(MUSCLES, "friction", 0.05) == {"arena.friction": 0.05}
+
+
+def test_planar_worms_are_refused() -> None:
+    with pytest.raises(ConfigError, match="needs a 3D worm"):
+        points(["riddle2022-planar"], "quick")
+
+
+def test_both_quantities_pass_through_the_gait_s_own_worm() -> None:
+    chosen = points([MUSCLES, SERVOS], "full")
+    assert len(chosen) == 2 * sum(len(of["full"]) for of in VALUES.values())
+    for gait in (MUSCLES, SERVOS):
+        own = load_config(gait)
+        assert isinstance(own.body, WormBody)
+        assert own.arena is not None
+        present = {"friction": own.arena.friction, "segments": float(own.body.mesh.n_segments)}
+        for quantity, value in present.items():
+            point = next(one for one in chosen if (one.gait, one.quantity, one.value) == (gait, quantity, value))
+            assert load_config(gait, dict(point.case.changes)) == own
+
+
+def readings() -> list[Reading]:
+    """Of two gaits; the second does not walk with few segments."""
+    found = []
+    for point in points([MUSCLES, SERVOS], "quick"):
+        walks = point.gait == MUSCLES or point.value != 3
+        gait = Gait(cycles=3, speed_m_per_s=0.1 * point.value, cost_of_transport=1.5, slip_ratio=0.3)
+        found.append(Reading(point, Judged(gait, "" if walks else "silent: stalled")))
+    return found
+
+
+def test_every_point_is_a_row_and_what_does_not_walk_has_no_numbers(tmp_path: Path) -> None:
+    write_readings(readings(), tmp_path / "speed.csv")
+    rows = list(csv.DictReader((tmp_path / "speed.csv").open()))
+    assert len(rows) == len(readings())
+    for row, reading in zip(rows, readings(), strict=True):
+        assert (row["gait"], row["quantity"], float(row["value"])) == (
+            reading.point.gait,
+            reading.point.quantity,
+            reading.point.value,
+        )
+        if reading.judged.problem:
+            assert (row["speed_m_per_s"], row["slip_ratio"], row["problem"]) == ("", "", "silent: stalled")
+        else:
+            assert float(row["speed_m_per_s"]) == pytest.approx(0.1 * reading.point.value)
+
+
+def test_the_figure_and_the_tables_take_gaits_that_do_not_walk(tmp_path: Path) -> None:
+    picture = write_figure(readings(), tmp_path / "speed")
+    assert picture.stat().st_size > 1000
+    assert (tmp_path / "speed.svg").stat().st_size > 1000
+    for quantity, values in VALUES.items():
+        assert crawling_table(readings(), quantity).row_count == 2 * len(values["quick"])
+
+
+def test_a_reading_s_number_is_its_gait_s() -> None:
+    point = Point(MUSCLES, "friction", 0.7, Case(MUSCLES))
+    gait = Gait(cycles=3, speed_m_per_s=0.1, cost_of_transport=1.5)
+    assert Reading(point, Judged(gait, "")).number("cost_of_transport") == 1.5
+    assert Reading(point, Judged(gait, "")).number("slip_ratio") is None
+    assert Reading(point, Judged(gait, "does not advance")).number("cost_of_transport") is None

@@ -1,0 +1,337 @@
+"""Tuning: what may be varied, what the optimisers find, what counts as a gait, and what a search leaves behind."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import log
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.analysis import RhythmScore, Summary
+from annelid.analysis.gait import Gait
+from annelid.config import load_config
+from annelid.errors import ConfigError
+from annelid.studies import store as store_module
+from annelid.studies.case import Case, Work
+from annelid.studies.outcome import Outcome
+from annelid.studies.store import Store
+from annelid.studies.tune import search as module
+from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
+from annelid.studies.tune.optimiser import CmaEs, Parzen, from_unit, generation_size, optimiser_of, to_unit
+from annelid.studies.tune.results import write_gait, write_results, write_trials
+from annelid.studies.tune.search import UNTUNED, Task, Trial, best, compromise, front, search
+from annelid.studies.tune.space import Choice, Interval, default_variables, parse_variable, variables_of
+
+PRESET = "riddle2023-rods"
+GATE, TOLERANCE = "controller.gate_time_constant_ms", "sensor.tolerance_m"
+CONFIG = load_config(PRESET)
+
+
+def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycles: int = 3) -> Gait:
+    return Gait(
+        cycles=cycles,
+        period_s=2.0,
+        speed_m_per_s=speed,
+        speed_body_lengths_per_s=speed / 0.75,
+        cost_of_transport=cost,
+        slip_ratio=slip,
+    )
+
+
+def test_ranges_and_choices_are_read() -> None:
+    assert parse_variable(f"{GATE}=80:600:log", CONFIG) == Interval(GATE, 80.0, 600.0, True)
+    assert parse_variable("body.mesh.n_segments=3:6", CONFIG) == Interval("body.mesh.n_segments", 3, 6, whole=True)
+    assert parse_variable("controller.scheme=euler,heun", CONFIG) == Choice("controller.scheme", ("euler", "heun"))
+    ranges = parse_variable("body.rings.length_range_m=[0.5,1.0],[0.6,1.1]", CONFIG)
+    assert ranges == Choice("body.rings.length_range_m", ([0.5, 1.0], [0.6, 1.1]))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (GATE, "says nothing to vary"),
+        ("controller.gate_ms=1:2", "did you mean"),
+        (f"{GATE}=600:80", "lower end must be below"),
+        (f"{GATE}=0:80:log", "needs a lower end above 0"),
+        (f"{GATE}=-5:80", "gate_time_constant_ms"),
+        (f"{GATE}=a:b", "must be numbers"),
+        (f"{GATE}=1:2:lin", "only 'log'"),
+        (f"{GATE}=300", "one value is no choice"),
+        ("body.mesh.n_segments=3.5:6", "whole numbers"),
+        ("controller.scheme=1:2", "no number with a range"),
+        ("controller.scheme=euler,newton", "controller.scheme"),
+    ],
+)
+def test_what_cannot_be_varied_is_refused_in_a_sentence(text: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        parse_variable(text, CONFIG)
+
+
+def test_a_field_is_varied_once() -> None:
+    with pytest.raises(ConfigError, match="varied twice"):
+        variables_of([f"{GATE}=80:600", f"{GATE}=100:200"], CONFIG)
+
+
+@pytest.mark.parametrize("kind", ["sns", "adaptive", "sns-robust", "sine", "timed", "shc", "phase-chain"])
+def test_every_controller_has_something_to_tune(kind: str) -> None:
+    assert default_variables(load_config(PRESET, {"controller.kind": kind}))
+
+
+def test_a_program_must_be_told_what_to_vary() -> None:
+    program = {"controller": {"kind": "program", "contractions": [{"segment": 1, "start_s": 0.0, "stop_s": 1.0}]}}
+    with pytest.raises(ConfigError, match="--vary"):
+        default_variables(load_config(PRESET, program))
+
+
+@pytest.mark.parametrize("names", [["fast"], ["speed", "speed"], ["speed", "slip", "cost-of-transport"], []])
+def test_objectives_are_one_or_two_of_those_known(names: list[str]) -> None:
+    with pytest.raises(ConfigError):
+        objectives_of(names)
+
+
+@given(
+    share=st.floats(0.0, 1.0),
+    ends=st.tuples(st.floats(0.1, 10.0), st.floats(11.0, 1e3)),
+    logarithmic=st.booleans(),
+    whole=st.booleans(),
+)
+def test_a_place_in_a_range_and_its_value_are_each_other_s_inverse(
+    share: float, ends: tuple[float, float], logarithmic: bool, whole: bool
+) -> None:
+    low, high = (float(np.ceil(end)) for end in ends) if whole else ends
+    variable = Interval("x", low, high, logarithmic, whole)
+    value = from_unit(variable, share)
+    assert value in variable
+    assert isinstance(value, int) == whole
+    rounding = 0.5 if whole else 1e-3 * value
+    exact = low * (high / low) ** share if logarithmic else low + share * (high - low)
+    assert abs(value - exact) <= rounding
+    assert from_unit(variable, to_unit(variable, value)) == pytest.approx(value, rel=1e-3)
+
+
+VALLEY = (Interval("a", 1.0, 100.0, logarithmic=True), Interval("b", -1.0, 1.0))
+
+
+def valley(values: Mapping[str, Any]) -> float:
+    """Zero at a = 30, b = 0.4; 1 a fifth of each range away."""
+    return (log(values["a"] / 30.0) / log(100.0) / 0.2) ** 2 + ((values["b"] - 0.4) / 0.4) ** 2
+
+
+def test_the_evolution_strategy_finds_the_bottom_of_a_valley() -> None:
+    optimiser = CmaEs(VALLEY, {"a": 2.0, "b": -0.9}, seed=1)
+    last: list[float] = []
+    for _ in range(25):
+        last = [valley(values) for values in optimiser.ask()]
+        optimiser.tell([(one,) for one in last])
+    # A hundredth of each range from the bottom in every direction.
+    assert min(last) < 2 * 0.05**2
+
+
+def test_the_parzen_estimator_comes_nearer_than_its_random_start() -> None:
+    variables = (*VALLEY, Choice("c", ([0, 1], [1, 2])))
+    optimiser = Parzen(variables, 1, None, seed=1)
+    found = []
+    for _ in range(8):
+        asked = optimiser.ask()
+        found.append(min(valley(values) + values["c"][0] for values in asked))
+        optimiser.tell([(valley(values) + values["c"][0],) for values in asked])
+    assert min(found[2:]) < 0.5 * min(found[:2])
+
+
+def test_numbers_and_one_objective_are_for_the_evolution_strategy() -> None:
+    choice = Choice("c", (1, 2))
+    assert isinstance(optimiser_of(VALLEY, 1, None, 0), CmaEs)
+    for variables, n_objectives in (((*VALLEY, choice), 1), (VALLEY, 2), (VALLEY[:1], 1)):
+        assert isinstance(optimiser_of(variables, n_objectives, None, 0), Parzen)
+
+
+class NoStore(Store):
+    """Computes nothing and remembers what it was asked for."""
+
+    def __init__(self, refused: str = "") -> None:
+        super().__init__(Path("nowhere"))
+        self.asked: list[Work] = []
+        self._refused = refused
+
+    def compute(self, cases: Any, **_: Any) -> Mapping[str, Outcome]:
+        self.asked += cases
+        if self._refused and any(self._refused in case.command for case in cases):
+            raise ConfigError("no design rule has a solution")
+        return {}
+
+
+@pytest.fixture
+def toy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs whose speed is largest, 1 m/s, at a gate of 200 ms and a tolerance of 5 mm, and which slip with the gate."""
+
+    def judged(store: Store, case: Case) -> Judged:
+        gate, tolerance = case.config.controller.gate_time_constant_ms, case.config.sensor.tolerance_m  # type: ignore[union-attr]
+        speed = 1.0 - log(gate / 200.0) ** 2 - (tolerance / 0.005 - 1.0) ** 2
+        return Judged(a_gait(speed, slip=gate / 600.0), "" if speed > 0.0 else "does not advance")
+
+    monkeypatch.setattr(module, "judged_run", judged)
+
+
+def toy_task(n_trials: int = 40, objectives: Sequence[str] = ("speed",), seed: int = 0) -> Task:
+    variables = variables_of([f"{GATE}=80:600:log", f"{TOLERANCE}=0.001:0.02"], CONFIG)
+    return Task(PRESET, {"duration_s": 1.0}, variables, objectives_of(list(objectives)), n_trials, seed)
+
+
+def trials_of(task: Task) -> list[Trial]:
+    return [trial for generation in search(task, NoStore()) for trial in generation]
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_search_finds_the_best_gait_and_states_the_untuned_one() -> None:
+    # A hundred for each variable, as is usual for a CMA-ES.
+    task = toy_task(200)
+    found = trials_of(task)
+    assert [trial.number for trial in found] == [UNTUNED, *range(200)]
+    assert found[0].case == Case(PRESET, {"duration_s": 1.0})
+    leader = best(found, OBJECTIVES["speed"])
+    assert leader is not None
+    # A twentieth of each range from the best gait, as `to_unit` counts.
+    for variable, optimum in zip(task.variables, (200.0, 0.005), strict=True):
+        assert isinstance(variable, Interval)
+        assert abs(to_unit(variable, leader.values[variable.field]) - to_unit(variable, optimum)) < 0.05
+    assert leader.case.changes == {"duration_s": 1.0, **leader.values}
+
+
+@pytest.mark.usefixtures("toy")
+@pytest.mark.parametrize("objectives", [("speed",), ("speed", "slip")])
+def test_a_longer_search_begins_as_the_shorter_one(objectives: tuple[str, ...]) -> None:
+    """So a search that is called again, with more trials too, finds its runs in the store."""
+    short, long = trials_of(toy_task(13, objectives)), trials_of(toy_task(30, objectives))
+    assert long[: len(short)] == short
+    assert trials_of(toy_task(13, objectives, seed=1))[1:] != short[1:]
+
+
+@pytest.mark.usefixtures("toy")
+def test_two_objectives_give_a_front_between_their_best() -> None:
+    task = toy_task(60, ("speed", "slip"))
+    found = trials_of(task)
+    on_front = front(found, task.objectives)
+    speeds = [trial.judged.value(OBJECTIVES["speed"]) for trial in on_front]
+    slips = [trial.judged.value(OBJECTIVES["slip"]) for trial in on_front]
+    assert len(on_front) > 3
+    assert speeds == sorted(speeds, reverse=True)
+    assert slips == sorted(slips, reverse=True)
+    assert compromise(found, task.objectives) in on_front
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_worm_that_cannot_be_built_is_a_trial_with_the_penalty() -> None:
+    task = toy_task(8)
+    others = trials_of(task)
+    refused = others[3]
+    store = NoStore(refused=f"{GATE}={refused.values[GATE]:g}")
+    found = [trial for generation in search(task, store) for trial in generation]
+    assert found[3].judged == Judged(None, "cannot be built: no design rule has a solution")
+    assert found[3].judged.value(OBJECTIVES["speed"]) == 0.0
+    assert [trial.judged for trial in found if trial.number != 2] == [one.judged for one in others if one.number != 2]
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=1, max_size=12))
+def test_the_front_has_all_that_nothing_beats_and_nothing_else(pairs: list[tuple[int, int]]) -> None:
+    objectives = objectives_of(["speed", "slip"])
+    found = [
+        Trial(i, {}, Case(PRESET), Judged(a_gait(1.0 + speed, slip=float(slip)), ""), Path())
+        for i, (speed, slip) in enumerate(pairs)
+    ]
+    members = {trial.number for trial in front(found, objectives)}
+    for i, (speed, slip) in enumerate(pairs):
+        beaten = any(a >= speed and b <= slip and (a, b) != (speed, slip) for a, b in pairs)
+        assert (i in members) != beaten
+
+
+def an_outcome(**changes: Any) -> Outcome:
+    """Of a run in order; changes of the rhythm, ``wave`` of the summary, ``message`` of the run."""
+    names = list(Summary.__dataclass_fields__)
+    summary = Summary(**{**dict.fromkeys(names), "wave": changes.pop("wave", True)})  # type: ignore[arg-type]
+    rhythm = RhythmScore("ordered", "a wave", (1, 2, 3), 1.0, 0.0, 1.0, 1, 1, 1.0, 1.0)
+    message = changes.pop("message", "")
+    return Outcome(Path(), summary, replace(rhythm, **changes), (), message)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "gait", "words"),
+    [
+        (an_outcome(), a_gait(), ""),
+        (an_outcome(verdict="disordered", reason="regular but not a wave"), a_gait(), ""),
+        (an_outcome(wave=False), a_gait(), ""),
+        (an_outcome(verdict="disordered", reason="limps", wave=False), a_gait(), "out of order: limps"),
+        (an_outcome(verdict="silent", reason="stalled"), a_gait(), "silent: stalled"),
+        (an_outcome(message="energy ran away"), None, "stopped: energy ran away"),
+        (an_outcome(), a_gait(cycles=1), "fewer than 2 whole cycles"),
+        (an_outcome(), None, "fewer than 2 whole cycles"),
+        (an_outcome(), a_gait(speed=-0.1), "does not advance"),
+        (an_outcome(), a_gait(speed=float("nan")), "does not advance"),
+    ],
+)
+def test_what_does_not_walk_is_told_why_and_penalised(outcome: Outcome, gait: Gait | None, words: str) -> None:
+    judged = judge(outcome, gait)
+    assert judged.problem == words
+    for objective in OBJECTIVES.values():
+        assert (judged.value(objective) == objective.penalty) == bool(words)
+
+
+@pytest.mark.usefixtures("toy")
+def test_the_best_gait_is_a_file_that_makes_the_same_run(tmp_path: Path) -> None:
+    task = toy_task(20)
+    found = trials_of(task)
+    write_results(task, found, "annelid tune", tmp_path)
+    leader = best(found, OBJECTIVES["speed"])
+    assert leader is not None
+    ours, theirs = (config.model_dump() for config in (load_config(tmp_path / "best.toml"), leader.case.config))
+    for tree in (ours, theirs):
+        del tree["name"], tree["summary"], tree["record"]
+    assert ours == theirs
+    for name in ("tuning.png", "tuning.svg"):
+        assert (tmp_path / name).stat().st_size > 1000
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_gait_tuned_from_a_file_extends_that_file(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(f'extends = "{PRESET}"\nsensor.noise_m = 0.001\n')
+    task = replace(toy_task(8), source=str(tmp_path / "mine.toml"))
+    trial = trials_of(task)[4]
+    write_gait(task, trial, "annelid tune", tmp_path / "gait.toml")
+    assert load_config(tmp_path / "gait.toml").sensor == trial.case.config.sensor
+    assert trial.case.stem == "mine"
+
+
+@pytest.mark.usefixtures("toy")
+def test_every_trial_is_a_row_with_its_values_and_numbers(tmp_path: Path) -> None:
+    task = toy_task(16, ("speed", "slip"))
+    found = trials_of(task)
+    write_trials(task, found, tmp_path / "trials.csv")
+    rows = list(csv.DictReader((tmp_path / "trials.csv").open()))
+    assert [row["trial"] for row in rows] == ["untuned", *map(str, range(16))]
+    for row, trial in zip(rows, found, strict=True):
+        for field, value in trial.values.items():
+            assert float(row[field]) == pytest.approx(value)
+        assert trial.judged.gait is not None
+        assert float(row["speed_m_per_s"]) == pytest.approx(trial.judged.gait.speed_m_per_s, rel=1e-3)
+        assert row["problem"] == trial.judged.problem
+
+
+def test_a_generation_fills_the_cores_evenly() -> None:
+    sizes = [generation_size(n) for n in range(1, 20)]
+    assert sizes == sorted(sizes)
+    assert all(size >= 8 and size % 2 == 0 for size in sizes)
+
+
+def test_a_second_search_computes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    task = replace(toy_task(2), changes={"duration_s": 0.4})
+    folder = tmp_path / "runs"
+    first = [trial for generation in search(task, Store(folder), jobs=2) for trial in generation]
+    assert {trial.judged.problem for trial in first} == {"out of order: too short: fewer than two cycles"}
+    monkeypatch.setattr(store_module, "ProcessPoolExecutor", None)
+    assert [trial for generation in search(task, Store(folder)) for trial in generation] == first

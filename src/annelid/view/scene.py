@@ -76,14 +76,10 @@ class WormScene:
         self._target = data["crossing_position"].values.mean(axis=1)
         points = self._points_drawn()
         self._target[:, 2] = (points[:, :, 2].min() + points[:, :, 2].max()) / 2
-<<<<<<< HEAD
-        self._upright = _upright(run.config)
-        self._offsets = (points - self._target[:, None]).reshape(-1, 3) @ self._upright.T
-=======
         if camera in FIXED:
             self._target[:] = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
-        self._offsets = (points - self._target[:, None]).reshape(-1, 3)
->>>>>>> main
+        self._upright = _upright(run.config)
+        self._offsets = (points - self._target[:, None]).reshape(-1, 3) @ self._upright.T
         self._canvas = Canvas(self._model, width, height, backend, fine=fine)
 
     def __enter__(self) -> Self:

@@ -15,8 +15,8 @@ class MovingGround:
     """Lays the planes of `annelid.arena.contact.add_moving_planes` before every step.
 
     What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
-    the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions and
-    velocities alone, so a run continues and a batch computes to the same bits.
+    the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions
+    and velocities alone, so a run continues and a batch computes to the same bits.
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:

@@ -9,6 +9,7 @@ import mujoco
 from annelid.arena.contact import contact_options
 from annelid.arena.panels import add_panels
 from annelid.arena.shapes import Shape, shape_of
+from annelid.arena.surface import rails_of
 from annelid.config import Arena, Floor, Pipe
 
 CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
@@ -20,7 +21,6 @@ POST_RGBA = (0.75, 0.47, 0.30, 1.0)
 RAIL_RGBA = (0.55, 0.6, 0.66, 0.45)
 PIPE_ABOVE_FLOOR_M = 0.02
 """The floor below a pipe is there to be seen only."""
-GROUND_RGBA = (0.80, 0.80, 0.77, 1.0)
 PIPE_RGBA = (0.62, 0.72, 0.80, 0.28)
 
 
@@ -55,7 +55,15 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     )
     material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-    spec.worldbody.add_light(name="lamp", pos=[length_m / 2, -1.0, 2.5], dir=[0.0, 0.35, -1.0], diffuse=[0.7, 0.7, 0.7])
+    walls = isinstance(arena, Pipe) or bool(rails_of(arena))
+    spec.worldbody.add_light(
+        name="lamp",
+        pos=[length_m / 2, -1.0, 2.5],
+        dir=[0.0, 0.35, -1.0],
+        diffuse=[0.7, 0.7, 0.7],
+        # The engine would let walls that are seen through cast the shadow of solid ones.
+        castshadow=not walls,
+    )
     shape = shape_of(arena, length_m)
     if shape is not None:
         _add_shape(spec, shape, arena)
@@ -122,5 +130,5 @@ def _add_shape(spec: mujoco.MjSpec, shape: Shape, arena: Arena) -> None:
         meshname="ground",
         contype=0,
         conaffinity=0,
-        rgba=PIPE_RGBA if isinstance(arena, Pipe) else GROUND_RGBA,
+        **({"rgba": PIPE_RGBA} if isinstance(arena, Pipe) else {"material": "floor"}),
     )

@@ -9,7 +9,7 @@ import mujoco
 from annelid.arena.contact import contact_options
 from annelid.arena.panels import add_panels
 from annelid.arena.shapes import Shape, shape_of
-from annelid.arena.surface import rails_of
+from annelid.arena.surface import walls_of
 from annelid.config import Arena, Floor, Pipe
 
 CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
@@ -55,7 +55,7 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     )
     material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-    walls = isinstance(arena, Pipe) or bool(rails_of(arena))
+    walls = isinstance(arena, Pipe) or bool(walls_of(arena))
     spec.worldbody.add_light(
         name="lamp",
         pos=[length_m / 2, -1.0, 2.5],

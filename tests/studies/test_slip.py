@@ -9,11 +9,14 @@ import pytest
 
 from annelid.analysis.detector import Score
 from annelid.analysis.slip import SlipCost
-from annelid.config import PressureSns, SnsController
+from annelid.config import PressureSns, SnsController, load_config
+from annelid.errors import ConfigError
 from annelid.studies.slip.detection import CASES, write_scores
 from annelid.studies.slip.feedback import (
+    DURATION_S,
     EXTENSION,
     FEEDBACKS,
+    GAITS,
     PLAIN,
     PRESSURE,
     Reading,
@@ -26,8 +29,12 @@ from annelid.studies.slip.feedback import (
 from annelid.studies.store import Store
 
 
-def test_only_the_feedback_differs() -> None:
-    plain, extension, pressure = (case(feedback, 1.0).config for feedback in FEEDBACKS)
+@pytest.mark.parametrize("preset", GAITS)
+def test_only_the_feedback_differs(preset: str) -> None:
+    plain, extension, pressure = (case(feedback, 1.0, preset).config for feedback in FEEDBACKS)
+    published = load_config(preset)
+    assert (plain.body, plain.controller, plain.sensor) == (published.body, published.controller, published.sensor)
+    assert plain.duration_s == DURATION_S
     assert isinstance(plain.controller, SnsController)
     assert isinstance(extension.controller, PressureSns)
     assert isinstance(pressure.controller, PressureSns)
@@ -36,6 +43,11 @@ def test_only_the_feedback_differs() -> None:
     assert pressure.controller == PressureSns(network=plain.controller)
     for one in (extension, pressure):
         assert one.model_copy(update={"controller": plain.controller}) == plain
+
+
+def test_a_gait_of_another_robot_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="preset is 'riddle2023': must be one of riddle2025-muscles, crawler"):
+        slip_feedback(Store(tmp_path), [1.0], preset="riddle2023")
 
 
 def reading(feedback: str, friction: float, speed: float, loss: float) -> Reading:

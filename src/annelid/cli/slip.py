@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,10 +22,13 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the resu
 Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")]
 FOLDER = Path("slip")
+GAIT = "riddle2025-muscles"
 
 
 @contextmanager
-def _study(command: str, output: Path, quick: bool, quiet: bool) -> Iterator[tuple[Store, StudyProgress | None]]:
+def _study(
+    command: Sequence[str], output: Path, quick: bool, quiet: bool
+) -> Iterator[tuple[Store, StudyProgress | None]]:
     """Opens the store with a progress display; on Ctrl-C tells how to go on."""
     from annelid.studies.progress import study_progress
     from annelid.studies.store import Store
@@ -37,27 +40,28 @@ def _study(command: str, output: Path, quick: bool, quiet: bool) -> Iterator[tup
         with study_progress(quiet=quiet) as progress:
             yield store, progress
     except KeyboardInterrupt:
-        again = shlex.join(["annelid", "experiment", command, "-o", str(output), *(["--quick"] if quick else [])])
+        again = shlex.join(["annelid", "experiment", *command, "-o", str(output), *(["--quick"] if quick else [])])
         complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def slip_command(
     output: Output = FOLDER,
+    preset: Annotated[str, typer.Option(help="Gait that gets the feedback: riddle2025-muscles or crawler.")] = GAIT,
     quick: Annotated[bool, typer.Option("--quick", help="Two frictions only.")] = False,
     jobs: Jobs = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure what pressure feedback saves of the work lost to friction.
 
-    The six-segment worm (preset riddle2025-muscles) crawls on several frictions with the paper's network, with our
-    extension neurons, and with pressure neurons too (controller sns-pressure). Speed and loss are those of whole
-    cycles. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Eighteen runs of about
-    ten seconds each; docs/slip.md explains the results.
+    A six-segment worm crawls on several frictions with the paper's network, with our extension neurons, and with
+    pressure neurons too (controller sns-pressure). Speed and loss are those of whole cycles. Writes slip.csv, .png and
+    .svg, and keeps runs, so that an interrupted call goes on. Eighteen runs of about ten seconds each; docs/slip.md
+    explains the results.
 
     \b
     annelid experiment slip --quick
-    annelid experiment slip -o slip
+    annelid experiment slip --preset crawler -o slip-crawler
     """
     import numpy as np
     from rich.console import Console
@@ -65,6 +69,7 @@ def slip_command(
     from annelid.studies.slip.feedback import (
         FEEDBACKS,
         FRICTIONS,
+        PRESET,
         QUICK,
         TUNED_AT,
         feedback_table,
@@ -73,10 +78,10 @@ def slip_command(
     )
     from annelid.view.figures.slip import feedback_figure
 
-    with _study("slip", output, quick, quiet) as (store, progress):
-        readings = slip_feedback(store, QUICK if quick else FRICTIONS, jobs=jobs, progress=progress)
+    with _study(["slip", "--preset", preset], output, quick, quiet) as (store, progress):
+        readings = slip_feedback(store, QUICK if quick else FRICTIONS, preset=preset, jobs=jobs, progress=progress)
     if not quiet:
-        Console().print(feedback_table(readings))
+        Console().print(feedback_table(readings, preset))
     path = output / "slip.csv"
     write_readings(readings, path)
     lines = {}
@@ -85,7 +90,8 @@ def slip_command(
         rows = np.array([(friction, cost.loss_J_per_m, cost.speed_m_per_s) for friction, cost in judged])
         if len(rows):
             lines[feedback] = (rows[:, 0], rows[:, 1], rows[:, 2])
-    for written in (path, feedback_figure(lines, TUNED_AT, path.with_suffix(""))):
+    tuned_at = TUNED_AT if preset == PRESET else None
+    for written in (path, feedback_figure(lines, tuned_at, path.with_suffix(""))):
         typer.echo(written)
 
 
@@ -120,7 +126,7 @@ def slip_detector_command(
     )
     from annelid.view.figures.slip import detector_figure
 
-    with _study("slip-detector", output, quick, quiet) as (store, progress):
+    with _study(["slip-detector"], output, quick, quiet) as (store, progress):
         detections = slip_detection(store, QUICK if quick else None, jobs=jobs, progress=progress)
     told = scores(detections)
     if not quiet:

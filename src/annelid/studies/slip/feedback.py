@@ -1,7 +1,7 @@
 """What pressure feedback saves: the same six-segment worm with and without it, over frictions.
 
-The body is that of preset ``riddle2025-muscles``, the network that of its controller. Feedback was tuned by hand at one
-friction, `TUNED_AT`; every other one is a test.
+The body is that of a preset of the six-segment robot with ideal muscles, the network that of its controller. Feedback
+was tuned by hand on `PRESET` at one friction, `TUNED_AT`; every other friction is a test, and so is every other gait.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.slip import SlipCost, slip_cost
 from annelid.config import load_config
+from annelid.errors import ConfigError
 from annelid.studies.case import Case
 from annelid.studies.store import Store
 from annelid.view.output import whole_file
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 PRESET = "riddle2025-muscles"
+GAITS = (PRESET, "crawler")
+"""Presets of that robot under the paper's network, as published and tuned for speed."""
 TUNED_AT = 0.7
 """Friction at which the feedback was tuned."""
 FRICTIONS = (0.3, 0.5, 0.7, 1.0, 1.2, 1.5)
@@ -66,24 +69,30 @@ class Reading:
     one_wave: bool
 
 
-def case(feedback: str, friction: float) -> Case:
-    """Returns the run of one kind of feedback, one of `FEEDBACKS`, on one friction."""
+def case(feedback: str, friction: float, preset: str = PRESET) -> Case:
+    """Returns the run of one kind of feedback, one of `FEEDBACKS`, on one friction, with one of `GAITS`."""
     changes: dict[str, Any] = {"arena.friction": friction, "duration_s": DURATION_S}
     if feedback != PLAIN:
-        changes["controller"] = {"kind": "sns-pressure", "network": load_config(PRESET).controller.model_dump()}
+        changes["controller"] = {"kind": "sns-pressure", "network": load_config(preset).controller.model_dump()}
     if feedback == EXTENSION:
         changes["controller"]["hold"] = 0.0
-    return Case(PRESET, changes)
+    return Case(preset, changes)
 
 
 def slip_feedback(
-    store: Store, frictions: Sequence[float], *, jobs: int | None = None, progress: Progress | None = None
+    store: Store,
+    frictions: Sequence[float],
+    *,
+    preset: str = PRESET,
+    jobs: int | None = None,
+    progress: Progress | None = None,
 ) -> list[Reading]:
     """Runs the worm with every feedback on every friction, as far as the store does not have it.
 
     Args:
         store: Where runs are kept.
         frictions: Frictions of the floor.
+        preset: One of `GAITS`.
         jobs: Runs at a time, by default as many as there are cores.
         progress: Called at the start and after every run.
 
@@ -91,10 +100,13 @@ def slip_feedback(
         One reading a run, friction by friction.
 
     Raises:
+        ConfigError: Another preset.
         AnnelidError: A run cannot be made.
         KeyboardInterrupt: Finished runs are kept.
     """
-    cases = {(friction, feedback): case(feedback, friction) for friction in frictions for feedback in FEEDBACKS}
+    if preset not in GAITS:
+        raise ConfigError(f"preset is {preset!r}: must be one of {', '.join(GAITS)}")
+    cases = {(friction, feedback): case(feedback, friction, preset) for friction in frictions for feedback in FEEDBACKS}
     tell = None if progress is None else lambda done, total, share: progress("feedback", done, total, share)
     store.compute(cases.values(), jobs=jobs, progress=tell)
     return [
@@ -150,15 +162,15 @@ def write_readings(readings: Sequence[Reading], path: Path) -> None:
             )
 
 
-def feedback_table(readings: Sequence[Reading]) -> Table:
+def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> Table:
     """Tabulates speed and loss, and what feedback gains and saves on the same friction."""
     from rich.table import Table
 
-    table = Table("friction", "feedback", title="slip of the six-segment worm, over whole cycles")
+    table = Table("friction", "feedback", title=f"slip of {preset}, over whole cycles")
     for heading in ("cycles", "period (s)", "speed (cm/s)", "loss (W)", "loss (J/m)", "faster", "saved", "saved per m"):
         table.add_column(heading, justify="right")
     for one in readings:
-        mark = " (tuned here)" if one.friction == TUNED_AT else ""
+        mark = " (tuned here)" if (preset, one.friction) == (PRESET, TUNED_AT) else ""
         words = (f"{one.friction:g}{mark}", one.feedback if one.one_wave else f"{one.feedback} (no wave)")
         cost, gains = one.cost, compared(readings, one)
         if cost is None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.analysis.track import track_of
+from annelid.analysis.track import Track, track_of
 from annelid.arena.course import bore_of, course_of
 from annelid.config import Pipe
 from annelid.errors import RunFileError
@@ -92,10 +92,14 @@ def passage_of(run: Run) -> Passage:
     arena = run.config.arena
     if not isinstance(arena, Pipe):
         raise RunFileError(f"{run.path} holds a worm on a {arena.kind}, which is no pipe")
-    track, course = track_of(run), course_of(arena)
+    return passage_through(arena, track_of(run))
+
+
+def passage_through(pipe: Pipe, track: Track) -> Passage:
+    """Reads a worm's way through a pipe from its track."""
     centres = np.stack([track.crossing_m[:, ring].mean(axis=1) for ring in track.geometry.rings], axis=1)
-    arc = course.nearest(centres).arc_m
-    return Passage(track.time_s, arc, bore_of(arena).at(arc)[0], reach_of(arena))
+    arc = course_of(pipe).nearest(centres).arc_m
+    return Passage(track.time_s, arc, bore_of(pipe).at(arc)[0], reach_of(pipe))
 
 
 def reach_of(pipe: Pipe) -> tuple[float, float]:

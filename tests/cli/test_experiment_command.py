@@ -69,3 +69,10 @@ def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
     assert "force-limited" in again.out
     assert Path("weak/weak_middle.csv").read_bytes() == table
     assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
+
+
+def test_pipes_need_a_folder(annelid: Command) -> None:
+    Path("taken").write_text("mine")
+    done = annelid("experiment", "pipes", "-o", "taken")
+    assert done.exit_code == 2
+    assert "taken is a file" in done.sentence()

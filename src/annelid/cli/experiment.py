@@ -259,7 +259,7 @@ def speed_command(
 @experiment.command("pipes")
 def pipes_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("pipes"),
-    quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and two bends.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
     ] = None,
@@ -273,7 +273,7 @@ def pipes_command(
     and the robust one. Speeds are those along the pipe's centre line.
 
     Writes pipes.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes on.
-    30 runs of half a minute to a minute each; docs/pipes.md explains the results.
+    22 runs of half a minute to three minutes each; docs/pipes.md explains the results.
 
     \b
     annelid experiment pipes --quick

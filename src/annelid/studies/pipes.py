@@ -53,7 +53,7 @@ NARROW_ARENAS: Mapping[str, Mapping[str, Any]] = {
 }
 CONTACTS = {"contact_time_constant_s": 0.01, "contact_impedance": [0.99, 0.999, 0.001], "friction": 0.7}
 """As the catalogue's pipes have them, with the preset's friction."""
-NARROW_S = 40.0
+NARROW_S = 60.0
 BEND_SPEED_M_PER_S = 0.1
 """Runs in bends last as long as a worm of this speed takes to bring its middle through."""
 
@@ -157,13 +157,13 @@ def pass_pipes(
     for trial in wanted:
         run = store.run(trial.case)
         passage = passage_of(run)
-        readings.append(_reading(trial, passage, gait(run), store[trial.case].rhythm.verdict))
+        readings.append(_reading(trial, passage, gait(run), store[trial.case].summary.wave))
         if trial.arena in NARROW_ARENAS:
             ways[trial.arena, trial.gait] = Way.of(run, passage)
     return Passages(tuple(readings), ways)
 
 
-def _reading(trial: Trial, passage: Passage, found: Gait, verdict: str | None) -> Reading:
+def _reading(trial: Trial, passage: Passage, found: Gait, wave: bool | None) -> Reading:
     way = float(passage.middle_m[-1] - passage.middle_m[0])
     work = None if found.energy is None or way <= 0 else found.energy.muscle_work_J / way
     return Reading(
@@ -173,7 +173,7 @@ def _reading(trial: Trial, passage: Passage, found: Gait, verdict: str | None) -
         passage.passed,
         passage.speed_m_per_s(),
         float(passage.front_m.max()),
-        None if verdict is None else verdict == "ordered",
+        wave,
         work,
         found.slip_ratio,
         trial.case.command,

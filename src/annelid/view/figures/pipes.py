@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
 Array = NDArray[np.float64]
-WINDOW_S = 3.0
-"""Speed, drive and turns are means over this time: the slower wave's half cycle."""
+WINDOW_S = 5.25
+"""Speed and drive are means over this time, the undriven wave's cycle."""
 CM = 100.0
 _MARKERS = ("o", "s", "^", "D")
 
@@ -102,7 +102,7 @@ def pipes_figure(ways: Mapping[tuple[str, str], Way], bends: Mapping[str, BendLi
             for gait in gaits:
                 if (pipe, gait) in ways:
                     _draw(rows, ways[pipe, gait], colors[gait], gait)
-            bore = ways[next(key for key in ways if key[0] == pipe)]
+            bore = max((ways[key] for key in ways if key[0] == pipe), key=lambda way: way.front_m.max())
             order = np.argsort(bore.front_m)
             # The ring is the hexagon of six crossings that lie in the bore.
             rows[2].plot(bore.front_m[order], CM * 6.0 * bore.bore_m[order], color="0.3", linestyle=(0, (4, 3)))

@@ -268,12 +268,13 @@ def pipes_command(
     """Find out which pipes the worm passes, and how fast.
 
     The six-segment worm with ideal muscles goes through a taper and an hourglass down to a radius of 0.13 m: with one
-    nervous system whose wave keeps its pace, adapts it to the pressure on the worm's back, or is fast throughout. And
-    round bends of 90 degrees with the timed pattern 3x1, the same turning away from contact, the paper's nervous system
-    and the robust one. Speeds are those along the pipe's centre line.
+    nervous system whose wave keeps its pace, adapts it to the pressure on the worm's back, or is fast throughout; with
+    the paper's nervous system, and with the timed pattern 3x1. And round bends of 90 degrees with that pattern, the
+    same turning away from contact, the paper's nervous system and the robust one. Speeds are those along the pipe's
+    centre line.
 
     Writes pipes.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes on.
-    22 runs of half a minute to three minutes each; docs/pipes.md explains the results.
+    26 runs of half a minute to three minutes each; docs/pipes.md explains the results.
 
     \b
     annelid experiment pipes --quick

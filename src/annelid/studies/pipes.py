@@ -40,20 +40,25 @@ BEND_GAITS: Mapping[str, Mapping[str, Any]] = {
 """All on half-rings; the reactive one is the timed one that turns away from contact as the authors published it."""
 
 LIFT = 0.45
-FIXED, ADAPTIVE, FAST = "fixed", "adaptive", "fixed, fast"
+FIXED, ADAPTIVE = "fixed", "adaptive"
+SLOW_S, FAST_S = 60.0, 30.0
 NARROW_GAITS: Mapping[str, Mapping[str, Any]] = {
-    FIXED: {"controller": {"kind": "sns-robust"}},
-    ADAPTIVE: {"controller": {"kind": "sns-robust", "descending": {"lift": LIFT}}},
-    FAST: {"controller": {"kind": "sns-robust", "descending": {"lift": LIFT, "drive": 1.0}}},
+    FIXED: {"duration_s": SLOW_S, "controller": {"kind": "sns-robust"}},
+    ADAPTIVE: {"duration_s": SLOW_S, "controller": {"kind": "sns-robust", "descending": {"lift": LIFT}}},
+    "full drive": {
+        "duration_s": FAST_S,
+        "controller": {"kind": "sns-robust", "descending": {"lift": LIFT, "drive": 1.0}},
+    },
+    "paper's SNS": {"duration_s": FAST_S},
+    "timed 3x1": {"duration_s": FAST_S, **TIMED},
 }
-"""One network: without a drive, with the drive that pressed backs give, and with full drive throughout."""
+"""The first three are one network: without drive, with that of pressed backs, and with full drive throughout."""
 NARROW_ARENAS: Mapping[str, Mapping[str, Any]] = {
     "taper": {"kind": "pipe", "bore_m": 0.18, "profile": "taper", "narrowest_m": 0.13},
     "hourglass": {"kind": "pipe", "bore_m": 0.18, "profile": "hourglass", "narrowest_m": 0.13, "profile_length_m": 1.0},
 }
 CONTACTS = {"contact_time_constant_s": 0.01, "contact_impedance": [0.99, 0.999, 0.001], "friction": 0.7}
 """As the catalogue's pipes have them, with the preset's friction."""
-NARROW_S = 60.0
 BEND_SPEED_M_PER_S = 0.1
 """Runs in bends last as long as a worm of this speed takes to bring its middle through."""
 
@@ -122,7 +127,7 @@ def trials(quick: bool = False, radii_m: Sequence[float] = RADII_M) -> list[Tria
     made = []
     for arena, shape in list(NARROW_ARENAS.items())[: 1 if quick else None]:
         for name in (FIXED, ADAPTIVE) if quick else NARROW_GAITS:
-            changes = {"arena": {**shape, **CONTACTS}, **NARROW_GAITS[name], "duration_s": NARROW_S, **BASE}
+            changes = {"arena": {**shape, **CONTACTS}, **NARROW_GAITS[name], **BASE}
             made.append(Trial(arena, name, 0.0, Case(PRESET, changes)))
     for radius in QUICK_RADII_M if quick else radii_m:
         bend = {"kind": "pipe", "course": "bend", "bore_m": 0.18, "radius_m": radius, **CONTACTS}

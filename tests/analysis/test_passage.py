@@ -81,11 +81,12 @@ def passage_with(middle_m: list[float]) -> Passage:
     )
 
 
-def test_speed_counts_from_the_front_s_arrival_to_the_middle_s_departure() -> None:
-    #                    arrives  ..............  is out
-    there = passage_with([0.0, 0.25, 0.5, 0.75, 1.05, 1.1, 1.1, 1.1])
+def test_speed_is_the_front_s_between_its_arrival_and_its_departure() -> None:
+    # The foremost ring is 0.3 m ahead of the middle; the part lies between 0.5 and 1 m.
+    #                    arrives  ......  is out
+    there = passage_with([0.0, 0.25, 0.5, 0.75, 1.05, 1.1, 1.1])
     assert there.passed
-    assert there.speed_m_per_s() == pytest.approx((1.05 - 0.25) / 3)
+    assert there.speed_m_per_s() == pytest.approx(0.5 / 2)
     stuck = passage_with([0.0, 0.25, 0.5, 0.5, 0.5])
     assert not stuck.passed
     assert stuck.speed_m_per_s() == pytest.approx(0.25 / 3)

@@ -53,21 +53,19 @@ class Passage:
         return bool(self.middle_m.max() >= self.reach_m[1])
 
     def speed_m_per_s(self) -> float:
-        """Mean speed of the middle along the centre line, m/s, negative backwards.
+        """Mean speed of the foremost ring along the centre line through all that bends or narrows, m/s.
 
-        It counts from the first posture whose foremost ring has come to what bends or narrows, to the first whose
-        middle is past it, or to the end. NaN if the worm never came so far.
+        It counts from the first posture in which the ring has come there to the first in which it is past it, so that
+        worms are compared over the same way; or to the end for one that does not get so far. NaN if it never came.
         """
         inside = np.flatnonzero(self.front_m >= self.reach_m[0])
         if not inside.size:
             return float("nan")
-        first = int(inside[0])
-        out = np.flatnonzero(self.middle_m >= self.reach_m[1]) if self.reach_m[1] > 0 else np.empty(0)
-        last = int(out[0]) if out.size else len(self.time_s) - 1
+        out = np.flatnonzero(self.front_m >= self.reach_m[1]) if self.reach_m[1] > self.reach_m[0] else np.empty(0)
+        first, last = int(inside[0]), int(out[0]) if out.size else len(self.time_s) - 1
         if last <= first:
             return float("nan")
-        way = self.middle_m[last] - self.middle_m[first]
-        return float(way / (self.time_s[last] - self.time_s[first]))
+        return float((self.front_m[last] - self.front_m[first]) / (self.time_s[last] - self.time_s[first]))
 
     def speed_over_m_per_s(self, window_s: float) -> Array:
         """Speed of the middle at every posture, m/s, ``(n,)``: the slope of a line through the postures of a window.

@@ -89,7 +89,7 @@ class Reading:
         gait: As the trial's.
         radius_m: As the trial's.
         passed: Whether the middle of the worm came out of what bends or narrows.
-        speed_m_per_s: Speed along the centre line in there.
+        speed_m_per_s: Speed of the foremost ring along the centre line through there.
         front_m: Arc length that the foremost ring came to.
         in_order: Whether segments contracted in the order 1-2-..-N throughout.
         work_J_per_m: Work of the muscles per metre of the middle's way, over the whole run.

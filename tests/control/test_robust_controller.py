@@ -188,3 +188,30 @@ def test_a_body_without_skin_feels_no_pressure() -> None:
     made = driven()
     made.stride(sensation(np.zeros(N)), 500)
     assert made.read(frame=False)["drive"] == 0.0
+
+
+def test_motor_neurons_let_go_with_their_time_constant() -> None:
+    section = RobustSns(turn_ms=300.0, let_go_s=0.35)
+    made, plain = (RobustController(each, N, N, TIMESTEP_S) for each in (section, RobustSns(turn_ms=300.0)))
+    rest = sensation(np.zeros(N))
+    contracted, own = np.array([[plain.step(rest)[0], made.step(rest)[0]] for _ in range(900)]).T
+    assert own[290] == pytest.approx(1.0, abs=0.01)
+    # The contraction neuron falls within some milliseconds; from then on Euler's steps shrink the rest alike.
+    end = int(np.flatnonzero(contracted > 0.5)[-1]) + 30
+    later = own[end : end + 200]
+    assert later[1:] / later[:-1] == pytest.approx(np.full(199, 1.0 - 0.001 / 0.35), rel=1e-9)
+    assert later[0] > 0.8
+
+
+def test_motor_neurons_outlast_turns_but_do_not_change_them() -> None:
+    section = RobustSns(turn_ms=300.0, let_go_s=0.35, descending=DescendingDrive(lift=0.45))
+    made, plain = RobustController(section, N, 2 * N, TIMESTEP_S), driven()
+    touch = np.full((N, len(SIDES)), 1.0)
+    for _ in range(20):
+        activation = made.stride(pressed(touch), 50)
+        plain.stride(pressed(touch), 50)
+        assert np.array_equal(activation[::2], activation[1::2])
+    assert ((activation >= 0.0) & (activation <= 1.0)).all()
+    roles = slice(0, N * len(ROLES))
+    own, other = (np.asarray(one.read(frame=False)["potential"])[roles] for one in (made, plain))
+    assert own == pytest.approx(other, abs=1e-6)

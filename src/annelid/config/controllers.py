@@ -271,6 +271,11 @@ class RobustSns(Section):
         default="design",
         description="state of the network at the start: segment 1 contracted, all neurons at rest, or drawn by seed",
     )
+    let_go_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=0.0,
+        description="time constant with which motor neurons let go, so that several segments share the wave; 0: there "
+        "are none, and contraction and expansion neurons drive the muscles",
+    )
     descending: DescendingDrive = DescendingDrive()
 
 

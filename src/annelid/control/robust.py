@@ -9,7 +9,7 @@ from annelid.control.neural import NeuralController, design_of
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous.adaptive import DRIVE_NEURON
-from annelid.nervous.driven import DriveParameters, driven_robust_network
+from annelid.nervous.driven import MOTOR, MOTOR_SHARE, DriveParameters, add_motor_neurons, driven_robust_network
 from annelid.nervous.robust import ROLES, RobustParameters, robust_network
 from annelid.protocols import SIDES, Array, Recordable, Sensation, Signal, Values
 
@@ -21,8 +21,8 @@ class RobustController(NeuralController):
 
     One step, from t to t + dt: the segments' mean lengthening at t, graded and clipped, drives the stretch neurons
     during the whole step; activation is ``1 / (1 + exp(-slope (U1 - U2)))`` of the contraction and expansion neurons at
-    t + dt. The forces of the ground on the segments' backs drive the pressure neurons likewise, if there are any.
-    Nothing but potentials and gates is remembered.
+    t + dt, or that of the motor neurons, if there are any. The forces of the ground on the segments' backs drive the
+    pressure neurons likewise, if there are any. Nothing but potentials and gates is remembered.
 
     Raises:
         ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, network parameters for
@@ -46,6 +46,8 @@ class RobustController(NeuralController):
             if drive.lift
             else robust_network(n_segments, self._parameters)
         )
+        if config.let_go_s:
+            add_motor_neurons(network, n_segments, self._parameters, 1e3 * config.let_go_s)
         longest_s = network.stable_timestep_ms() / 1e3
         if control_timestep_s > longest_s:
             raise ConfigError(
@@ -61,6 +63,9 @@ class RobustController(NeuralController):
             scheme=config.scheme,
             slope_per_mV=config.activation_slope_per_mV,
         )
+        neurons = self._stepper.arrays.neurons
+        first = neurons.index(f"{MOTOR}_1") if config.let_go_s else len(neurons)
+        self._motor = slice(first, first + n_segments)
         self._full_nA = config.leak_conductance_uS * config.range_mV
         self.reset(0)
 
@@ -119,6 +124,13 @@ class RobustController(NeuralController):
         if not len(sensation.touch_N):
             return np.zeros(self._n_segments)
         return np.clip(sensation.touch_N[:, BACK] / self._config.descending.full_pressure_N, 0.0, 1.0)
+
+    def _activation(self, potential: Array) -> Array:
+        """Activation of every muscle, ``(.., n_muscles)``: the motor neurons' activity, if there are any."""
+        if not self._config.let_go_s:
+            return super()._activation(potential)
+        full = MOTOR_SHARE * self._parameters.range_mV
+        return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_a_segment, axis=-1)
 
     def _stretch(self, sensation: Sensation) -> Array:
         """Mean lengthening of every segment over its full scale, in [0, 1], ``(n_segments,)``."""

@@ -30,6 +30,33 @@ from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
 from annelid.nervous.robust import DISCHARGE, THRESHOLD, RobustParameters, robust_network, yield_mV
+from annelid.nervous.synapses import Synapse
+
+MOTOR = "motor"
+"""What the names of the motor neurons begin with."""
+_CHARGE = 9.0
+"""Conductance that charges a motor neuron, over its leak: it rises ten times as fast as it falls."""
+MOTOR_SHARE = _CHARGE / (1.0 + _CHARGE)
+"""Share of R at which a motor neuron rests while its segment's contraction neuron is at R or above."""
+
+
+def add_motor_neurons(network: Network, n_segments: int, parameters: RobustParameters, let_go_ms: float) -> None:
+    """Adds a motor neuron to every segment, which outlasts the contraction neuron that excites it.
+
+    It rises with a tenth of the time constant with which it lets go. So a segment is still contracted while the next
+    ones contract: several share the wave, the more the shorter the turns are.
+
+    Args:
+        network: One that `robust_network` or `driven_robust_network` has built; ``motor_1`` .. ``motor_N`` come last.
+        n_segments: Its segments.
+        parameters: What it was designed from.
+        let_go_ms: Time constant with which a motor neuron falls.
+    """
+    leak = parameters.leak_conductance_uS
+    charge = Synapse(_CHARGE * leak, parameters.range_mV, 0.0, parameters.range_mV)
+    for segment in range(1, n_segments + 1):
+        network.add_neuron(f"{MOTOR}_{segment}", Neuron(let_go_ms * leak, leak))
+        network.add_synapse(f"contraction_{segment}", f"{MOTOR}_{segment}", charge)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PRESET = "riddle2025-muscles"
 STAGE = "pipes"
 BASE: dict[str, Any] = {"record.signals_interval_s": 0.02, "record.frames_interval_s": 0.1}
-RADII_M = (0.2, 0.3, 0.6, 1.3)
+RADII_M = (0.3, 0.6, 1.3)
 QUICK_RADII_M = (0.3,)
 
 TURN_S = 0.27
@@ -31,24 +31,26 @@ TURN_S = 0.27
 TIMED = {
     "controller": {"kind": "timed", "rise_s": TURN_S, "hold_s": TURN_S, "fall_s": TURN_S, "interval_s": TURN_S},
 }
+LIFT, LET_GO_S = 0.45, 0.35
+FIXED, ADAPTIVE = "fixed", "adaptive"
+SLOW_S, FAST_S = 45.0, 30.0
+
+
+def _robust(**changes: Any) -> dict[str, Any]:
+    return {"controller": {"kind": "sns-robust", "let_go_s": LET_GO_S, **changes}}
+
+
 BEND_GAITS: Mapping[str, Mapping[str, Any]] = {
     "timed 3x1": TIMED,
     "reactive": {**TIMED, "turning": {"kind": "touch"}},
     "paper's SNS": {},
-    "robust SNS": {"controller": {"kind": "sns-robust", "turn_ms": 1e3 * TURN_S}},
+    "robust SNS": _robust(turn_ms=1e3 * TURN_S),
 }
 """All on half-rings; the reactive one is the timed one that turns away from contact as the authors published it."""
-
-LIFT = 0.45
-FIXED, ADAPTIVE = "fixed", "adaptive"
-SLOW_S, FAST_S = 60.0, 30.0
 NARROW_GAITS: Mapping[str, Mapping[str, Any]] = {
-    FIXED: {"duration_s": SLOW_S, "controller": {"kind": "sns-robust"}},
-    ADAPTIVE: {"duration_s": SLOW_S, "controller": {"kind": "sns-robust", "descending": {"lift": LIFT}}},
-    "full drive": {
-        "duration_s": FAST_S,
-        "controller": {"kind": "sns-robust", "descending": {"lift": LIFT, "drive": 1.0}},
-    },
+    FIXED: {"duration_s": SLOW_S, **_robust()},
+    ADAPTIVE: {"duration_s": SLOW_S, **_robust(descending={"lift": LIFT})},
+    "full drive": {"duration_s": FAST_S, **_robust(descending={"lift": LIFT, "drive": 1.0})},
     "paper's SNS": {"duration_s": FAST_S},
     "timed 3x1": {"duration_s": FAST_S, **TIMED},
 }

@@ -113,7 +113,7 @@ def test_a_worm_in_a_pipe_has_a_passage_and_one_on_the_floor_has_none(tmp_path: 
     assert -np.diff(passage.ring_arc_m[0]) == pytest.approx(np.full(5, 3 * 0.0374), abs=1e-3)
     assert -0.12 < passage.front_m[0] < 0.0
     on_the_floor = simulate(load_config(PRESET, {"duration_s": 0.1}), tmp_path / "floor", progress=False)
-    with pytest.raises(RunFileError, match="holds a worm on a floor, which is no pipe"):
+    with pytest.raises(RunFileError, match="holds a worm on a floor, and so no passage"):
         passage_of(open_run(on_the_floor.path))
 
 

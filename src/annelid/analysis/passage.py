@@ -89,7 +89,8 @@ def passage_of(run: Run) -> Passage:
     """
     arena = run.config.arena
     if not isinstance(arena, Pipe):
-        raise RunFileError(f"{run.path} holds a worm on a {arena.kind}, which is no pipe")
+        where = "a planar worm" if arena is None else f"a worm on a {arena.kind}"
+        raise RunFileError(f"{run.path} holds {where}, and so no passage of a pipe")
     return passage_through(arena, track_of(run))
 
 

@@ -254,3 +254,51 @@ def speed_command(
     write_readings(readings, path)
     for written in (path, write_figure(readings, path.with_suffix(""))):
         typer.echo(written)
+
+
+@experiment.command("pipes")
+def pipes_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("pipes"),
+    quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+) -> None:
+    """Find out which pipes the worm passes, and how fast.
+
+    The six-segment worm with ideal muscles goes through a taper and an hourglass down to a radius of 0.13 m: with one
+    nervous system whose wave keeps its pace, adapts it to the pressure on the worm's back, or is fast throughout; with
+    the paper's nervous system, and with the timed pattern 3x1. And round bends of 90 degrees with that pattern, the
+    same turning away from contact, the paper's nervous system and the robust one. Speeds are those along the pipe's
+    centre line.
+
+    Writes pipes.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes on.
+    22 runs of half a minute to three minutes each; docs/pipes.md explains the results.
+
+    \b
+    annelid experiment pipes --quick
+    annelid experiment pipes -o pipes
+    """
+    from rich.console import Console
+
+    from annelid.studies.pipes import pass_pipes, pipes_picture, pipes_table, trials, write_readings
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            found = pass_pipes(store, trials(quick), jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "experiment", "pipes", "-o", str(output), *(["--quick"] if quick else [])]
+        again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not quiet:
+        Console().print(pipes_table(found.readings))
+    path = write_readings(found.readings, output / "pipes.csv")
+    for written in (path, pipes_picture(found, path.with_suffix(""))):
+        typer.echo(written)

@@ -21,7 +21,7 @@ from annelid.arena.panels import add_panels
 from annelid.arena.shapes import shape_of
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
-from annelid.config import Arena, Floor, RunConfig, load_config
+from annelid.config import Arena, Floor, RunConfig, WormBody, load_config
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.worm import Worm, WormPlant
@@ -50,13 +50,15 @@ class StillGround(WormPlant):
     """The worm on a ground that stands still."""
 
     def __init__(self, config: RunConfig, add_ground: Ground) -> None:
+        assert config.arena is not None
+        assert isinstance(config.body, WormBody)
         far = Floor(**config.arena.model_dump(include=set(Arena.model_fields)), floor_gap_m=50.0)
         spec = build_spec(config.model_copy(update={"arena": far}))
         add_ground(spec, config.arena, spec.stat.extent)
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.delete(spec.geom("floor"))
         _add_contact_sensors(spec)
-        Worm.__init__(self, config, Anatomy(compile_spec(spec), config.body))
+        Worm.__init__(self, config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
         self.ground = None
         self.data = mujoco.MjData(self.model)
         self._outputs = {name: getattr(self.data, name) for name in self.anatomy.outputs}
@@ -84,6 +86,7 @@ def panels(around: int) -> Ground:
 def mesh_field(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     """Adds a pipe's wall, closed and 3 cm thick, as a mesh whose distance field the engine computes."""
     inner = shape_of(arena, length_m)
+    assert inner is not None
     surface = surface_of(arena)
     outer = inner.vertices_m - WALL_M * surface.normal(inner.vertices_m)
     n, around = len(inner.vertices_m), int(inner.faces[1, 1])
@@ -105,6 +108,8 @@ def mesh_field(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
 
 def measure(name: str, config: RunConfig, ground: Ground | None, n_moves: int) -> None:
     """Walks and prints a line."""
+    assert config.arena is not None
+    assert isinstance(config.body, WormBody)
     began = perf_counter()
     plant = WormPlant(config) if ground is None else StillGround(config, ground)
     built = perf_counter() - began

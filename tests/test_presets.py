@@ -7,7 +7,7 @@ from math import pi
 import pytest
 
 from annelid.body import mesh_of
-from annelid.config import WormBody, load_config
+from annelid.config import WormBody, fields_of, load_config
 
 PUBLISHED = {
     "duration_s": 5.0,
@@ -158,6 +158,23 @@ def test_the_robot_with_muscles_differs_in_its_rings_and_timing_only() -> None:
     own = {"length_range_m": (0.62, 1.1), "peak_force_N": (16.0, 31.0, 31.0, 31.0, 31.0, 16.0), "layout": "whole"}
     assert {name: value_at("riddle2025-muscles", f"body.rings.{name}") for name in own} == own
     assert value_at("riddle2025-muscles", "controller.gate_time_constant_ms") == 300.0
+
+
+def differing(one: str, other: str) -> set[str]:
+    """Paths of the fields in which two presets differ."""
+    configs = load_config(one), load_config(other)
+    assert fields_of(configs[0]).keys() == fields_of(configs[1]).keys()
+    return {path for path in fields_of(configs[0]) if value_at(one, path) != value_at(other, path)}
+
+
+def test_the_crawlers_have_the_robot_s_body() -> None:
+    """What a comparison of speeds forbids to tune: mass, mesh, springs, friction, and the rings' forces and speed."""
+    own = {"name", "summary", "controller.gate_time_constant_ms", "sensor.tolerance_m"}
+    assert differing("crawler", "riddle2025-muscles") == own
+    servos = {f"body.rings.{name}" for name in ("force_limit_N", "speed_limit_m_per_s")}
+    assert differing("crawler-servo", "riddle2025") == own | servos | {"duration_s"}
+    assert value_at("crawler-servo", "body.rings.speed_limit_m_per_s") == 0.064
+    assert value_at("crawler-servo", "body.rings.force_limit_N") == 13.0
 
 
 @pytest.mark.parametrize(("pattern", "interval_s", "waves"), [("3x1", 1.0, 1), ("2x2", 2.0, 2)])

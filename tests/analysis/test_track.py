@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from annelid.analysis.track import Track, track_of, turn_of
 from annelid.body import mesh_of
-from annelid.config import Mesh, load_config
+from annelid.config import Mesh, WormBody, load_config
 from annelid.errors import RunFileError
 from annelid.simulation import simulate
 
 MESH = Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2)
 GEOMETRY = mesh_of(MESH)
+N_PER_PLANE, RINGS = GEOMETRY.n_per_plane, tuple(GEOMETRY.ring_planes.tolist())
 PERIOD_S = 3.0
 
 
@@ -28,7 +29,7 @@ def moved(time_s: np.ndarray, angle_rad: np.ndarray, x_m: np.ndarray, y_m: np.nd
     # A turn to the left of what leads towards -x takes -x towards -y.
     x = cos * rest[:, 0] - sin * rest[:, 1] + x_m[:, np.newaxis]
     y = sin * rest[:, 0] + cos * rest[:, 1] + y_m[:, np.newaxis]
-    return Track(time_s, np.stack([x, y, np.broadcast_to(rest[:, 2], x.shape)], axis=-1), GEOMETRY)
+    return Track(time_s, np.stack([x, y, np.broadcast_to(rest[:, 2], x.shape)], axis=-1), N_PER_PLANE, RINGS)
 
 
 def on_a_circle(curvature_per_m: float, speed_m_per_s: float, duration_s: float, swing_rad: float = 0.0) -> Track:
@@ -82,6 +83,16 @@ def test_the_outline_is_as_long_and_wide_as_the_mesh_however_it_lies(angle: floa
     length, width = np.ptp((outline - [3.0, -2.0]) @ inwards, axis=0)
     rest = np.ptp(GEOMETRY.crossings_m, axis=0)
     assert (length, width) == (pytest.approx(rest[0]), pytest.approx(rest[1]))
+
+
+def test_rings_of_a_run_are_those_of_its_mesh(tmp_path: Path) -> None:
+    config = load_config("riddle2023-rods", {"duration_s": 0.1})
+    run = simulate(config, tmp_path / "run", progress=False)
+    assert isinstance(config.body, WormBody)
+    geometry, track = mesh_of(config.body.mesh), track_of(run)
+    assert track.ring_planes == tuple(geometry.ring_planes)
+    first = run.data["crossing_position"].values[:, geometry.rings[0], :2].mean(axis=1)
+    assert np.allclose(track.front_m, first, atol=1e-12)
 
 
 def test_planar_worms_have_no_track(tmp_path: Path) -> None:

@@ -222,3 +222,14 @@ def test_a_slope_leans_gravity_and_leaves_the_ground_level() -> None:
     assert pull[0] / -pull[2] == pytest.approx(tan(radians(10.0)))
     assert pull[0] == pytest.approx(9.81 * sin(radians(10.0)))
     assert isinstance(surface_of(Pipe()), PipeWall)
+
+
+@given(st.floats(-pi, pi), st.floats(0.0, 0.5), st.floats(0.01, 0.5))
+def test_a_post_is_as_far_as_its_axis_less_its_radius(angle: float, gap_m: float, radius_m: float) -> None:
+    surface = surface_of(Floor(posts=((-1.0, 0.3, radius_m), (50.0, 0.0, 1.0))))
+    outwards = np.array([np.cos(angle), np.sin(angle), 0.0])
+    point = np.array([-1.0, 0.3, 5.0]) + (radius_m + gap_m) * outwards
+    assert surface.distance_m(point) == pytest.approx(gap_m, abs=1e-12)
+    assert surface.normal(point) == pytest.approx(outwards, abs=1e-9)
+    floor = np.array([*point[:2], gap_m / 2 - 0.009])
+    assert surface.distance_m(floor) == pytest.approx(gap_m / 2, abs=1e-12)

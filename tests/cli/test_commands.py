@@ -5,10 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import mujoco
 import pytest
 from outcome import Command
 
-from annelid.config import field_paths, load_config, preset_names
+from annelid.config import Pipe, field_paths, load_config, preset_names
 from annelid.simulation.runfile import open_run
 
 
@@ -157,3 +158,33 @@ def test_help_and_version_come_from_the_module_as_well() -> None:
         done = subprocess.run([sys.executable, "-m", "annelid", option], capture_output=True, text=True, check=False)
         assert done.returncode == 0
         assert says in done.stdout
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None:
+    assert "pipe.hourglass" in annelid("arenas").out
+    assert 'course = "bend"' in annelid("arenas", "pipe.bend").out
+    short = ("--duration", "0.1", "--no-video", "-q", "--out", "bent")
+    walked = annelid("run", "riddle2023-rods", "--arena", "pipe.bend", "--set", "arena.radius=0.5", *short)
+    assert walked.exit_code == 0, walked.err
+    arena = open_run(Path("bent")).config.arena
+    assert isinstance(arena, Pipe)
+    assert (arena.course, arena.radius_m) == ("bend", 0.5)
+    assert annelid("run", "--resume", "bent", "--arena", "floor").exit_code == 2
+
+
+def test_a_worm_in_a_pipe_is_written_with_walls_that_stand_still(annelid: Command) -> None:
+    assert annelid("build", "riddle2023-rods", "--arena", "pipe.taper", "-o", "piped.xml").exit_code == 0
+    model = mujoco.MjModel.from_xml_path("piped.xml")
+    data = mujoco.MjData(model)
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+    assert model.nmocap == 0
+    assert data.ncon > 3
+    assert data.body("crossing_0").xpos[2] > -0.01
+
+
+def test_friction_that_depends_on_the_direction_is_not_written_as_another(annelid: Command) -> None:
+    refused = annelid("build", "riddle2023-rods", "--arena", "setae")
+    assert refused.exit_code == 2
+    assert "arena.backward_friction = 1.0 cannot be written" in refused.err

@@ -49,12 +49,19 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         assert Path(folder, file).read_text() == "mine"
 
 
-def test_the_weak_middle_needs_a_folder(annelid: Command) -> None:
+@pytest.mark.parametrize("study", ["weak-middle", "turning"])
+def test_a_study_needs_a_folder(annelid: Command, study: str) -> None:
     Path("taken").write_text("mine")
-    done = annelid("experiment", "weak-middle", "-o", "taken")
+    done = annelid("experiment", study, "-o", "taken")
     assert done.exit_code == 2
     assert "taken is a file" in done.sentence()
     assert Path("taken").read_text() == "mine"
+
+
+def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None:
+    done = annelid("plot", "nowhere", "--figure", "trak")
+    assert done.exit_code == 2
+    assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
 
 
 @pytest.mark.slow
@@ -71,8 +78,25 @@ def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
     assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
 
 
-def test_pipes_need_a_folder(annelid: Command) -> None:
-    Path("taken").write_text("mine")
-    done = annelid("experiment", "pipes", "-o", "taken")
-    assert done.exit_code == 2
-    assert "taken is a file" in done.sentence()
+@pytest.mark.parametrize("command", ["slip", "slip-detector", "pipes"])
+def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, command: str) -> None:
+    Path("taken").write_text("mine", encoding="utf-8")
+    done = annelid("experiment", command, "-o", "taken", "--quiet")
+    assert done.exit_code != 0
+    assert "taken is a file: name a folder with -o" in done.sentence()
+    assert Path("taken").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.slow
+def test_both_studies_of_slip_share_their_runs(annelid: Command) -> None:
+    done = annelid("experiment", "slip", "--quick", "-o", "s")
+    assert done.exit_code == 0, done.err
+    assert done.out.splitlines()[-2:] == [str(Path("s/slip.csv")), str(Path("s/slip.png"))]
+    runs = {path.name for path in Path("s/runs").iterdir()}
+    assert len(runs) == 6
+    done = annelid("experiment", "slip-detector", "--quick", "-o", "s")
+    assert done.exit_code == 0, done.err
+    assert {path.name for path in Path("s/runs").iterdir()} == runs
+    scores = np.genfromtxt("s/slip_detector.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert np.all(scores["precision"] > 2 * scores["base_rate"]), "far better than a blind guess"
+    assert np.all(scores["recall"] > 0.5)

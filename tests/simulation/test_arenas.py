@@ -12,7 +12,7 @@ import pytest
 from annelid.arena.surface import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
-from annelid.protocols import Array
+from annelid.protocols import Array, Sensation
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BatchWorm, BodyBatch, compile_worms
 from annelid.simulation.ground import facing
@@ -21,10 +21,9 @@ from annelid.simulation.worm import WormPlant, compile_worm
 
 RODS = "riddle2023-rods"
 RESTLESS = ("floor", "setae", "slope", "rails", "steps", "rough", "pipe", "pipe.taper", "pipe.bend", "pipe.helix")
-FINE = {"clock.physics_timestep_s": 0.005}
 
 
-def config(arena: str, preset: str = RODS, **changes: object) -> RunConfig:
+def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
     return load_config(preset, {name.replace("__", "."): value for name, value in changes.items()}, arena=arena)
 
 
@@ -70,13 +69,15 @@ def test_a_part_of_the_skin_has_one_contact_at_most(arena: str) -> None:
 
 
 def test_planes_that_move_act_on_a_level_floor_as_the_engine_s_own_plane_does() -> None:
-    """Setae whose two frictions differ in the last digit only: the same worm, to the last digit of friction."""
-    still = settled(reset(config("floor")), 0.5)
-    moving = settled(reset(config("floor", arena__backward_friction=1.0 + 1e-12)), 0.5)
+    """Setae whose two frictions differ in the last digit only; what has come to rest does not approach its planes."""
+    quick = {"body__strands__joint_damping_Nms_per_rad": 0.02}
+    still = settled(reset(config("floor", **quick)), 2.0)
+    moving = settled(reset(config("floor", arena__backward_friction=1.0 + 1e-12, **quick)), 2.0)
     assert still.ground is None
     assert moving.ground is not None
-    assert moving.feel().center_of_mass_m == pytest.approx(still.feel().center_of_mass_m, abs=1e-9)
-    assert moving.feel().contact_force_N == pytest.approx(still.feel().contact_force_N, abs=1e-6)
+    weight = still.total_mass_kg * 9.81
+    assert moving.feel().center_of_mass_m == pytest.approx(still.feel().center_of_mass_m, abs=5e-4)
+    assert moving.feel().contact_force_N == pytest.approx(still.feel().contact_force_N, abs=0.02 * weight)
 
 
 def test_the_chain_touches_a_pipe_with_its_vertices() -> None:
@@ -155,6 +156,7 @@ def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     for worm in bodies.worms:
         worm.reset(0)
     every = alone[0].steps_to_move()
+    felt: list[Sensation] = []
     for _ in range(25):
         felt = [stride(worm, pull, every) for worm in bodies.worms]
         for plant, ours in zip(alone, felt, strict=True):
@@ -165,7 +167,7 @@ def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     assert np.array_equal(felt[0].center_of_mass_m, felt[2].center_of_mass_m)
 
 
-def stride(worm: BatchWorm, activation: Array, n_steps: int):
+def stride(worm: BatchWorm, activation: Array, n_steps: int) -> Sensation:
     return worm.stride(activation, n_steps)
 
 
@@ -238,7 +240,7 @@ def test_the_start_is_quiet(arena: str) -> None:
 
 def leak_m(arena: str, duration_s: float) -> tuple[float, float]:
     """How far any vertex ever was outside, m, and how far the worm got: six segments walking at 5 ms a step."""
-    made = config(arena, preset=RODS, body__mesh__n_segments=6, duration_s=duration_s, **_fine())
+    made = config(arena, "riddle2025-muscles", duration_s=duration_s, clock__physics_timestep_s=0.005)
     plant = reset(made)
     controller = build_controller(made, plant)
     controller.reset(0)
@@ -252,13 +254,10 @@ def leak_m(arena: str, duration_s: float) -> tuple[float, float]:
     return leak, plant.geometry.length_m / 2 - float(sensation.center_of_mass_m[0])
 
 
-def _fine() -> dict[str, object]:
-    return {name.replace(".", "__"): value for name, value in FINE.items()}
-
-
 def test_a_walking_worm_stays_within_its_pipe() -> None:
-    leak, _ = leak_m("pipe.hourglass", 1.5)
+    leak, travel_m = leak_m("pipe.hourglass", 1.5)
     assert leak < 0.001
+    assert travel_m > 0.05
 
 
 @pytest.mark.slow

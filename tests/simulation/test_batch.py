@@ -99,6 +99,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "separate pins": {"body.formulation.pins": "separate", "clock.physics_timestep_s": 0.002, "duration_s": 0.04},
     "heteroclinic channel": {"controller.kind": "shc", "body.rings.layout": "halves"},
     "adaptive network": {"controller.kind": "adaptive"},
+    "pressure feedback": {"controller.kind": "sns-pressure"},
     "chain": CHAIN | {"body.formulation.integrator": "Euler"},
     "chain with direct pins, RK4": CHAIN | {"body.formulation.pins": "direct"},
 }

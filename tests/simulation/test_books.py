@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -105,6 +107,31 @@ def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(ri
     assert met == {True, False}
 
 
+@pytest.mark.parametrize("rings", [{}, SERVOS], ids=["muscles", "servos"])
+def test_the_books_close_with_the_matrices_of_the_engine_s_integrator(rings: dict[str, Any]) -> None:
+    """What is left of the muscles' work is what the integrator takes: weight, contacts and work are all there."""
+    place = Path(__file__).parents[2] / "benchmarks" / "energy_balance.py"
+    spec = importlib.util.spec_from_file_location("energy_balance", place)
+    assert spec is not None
+    assert spec.loader is not None
+    benchmark = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmark)
+    clock = {"control_timestep_s": 0.005, "physics_timestep_s": 0.005}
+    plant = benchmark.AuditedWorm(load_config({"clock": clock}, {"arena.floor_gap_m": 0.0, **rings}))
+    plant.reset(0)
+    start_J, elastic_J = held(plant), plant.elastic_energy_J()
+    activation = np.resize([1.0, 0.0, 0.3], plant.n_muscles)
+    for _ in range(60):
+        plant.step(activation)
+    left = remainder(plant, start_J)
+    integrator = plant.integrator_J - plant.spring_J - (plant.elastic_energy_J() - elastic_J)
+    work = float(np.sum(plant.read(False)["muscle_work"]))
+    assert work > 0.05
+    assert left > 0.02 * work
+    assert left == pytest.approx(integrator, abs=1e-3 * work)
+    assert float(plant.read(False)["constraint_loss"]) != 0.0
+
+
 SPRING_MASS = """
 <mujoco>
   <option integrator="discrete" solver="Newton" timestep="0.01" gravity="0 0 0"/>
@@ -146,3 +173,19 @@ def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
     assert data.qpos[0] < -0.1
     assert books.muscle_work[0] > 0.05
     assert books.damping_loss > 0.001
+
+
+def test_a_chain_under_euler_lacks_only_the_square_of_its_changes_of_velocity() -> None:
+    """Its mass matrix turns with the strands, which costs the identity a little."""
+    chain = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler"}
+    plant = worm(0.001, **chain)
+    start_J, squares = held(plant), 0.0
+    change = np.zeros(plant.model.nv)
+    for _ in range(60):
+        before = plant.data.qvel.copy()
+        plant.step(np.array([1.0, 0.0, 0.3]))
+        mujoco.mj_mulM(plant.model, plant.data, change, plant.data.qvel - before)
+        squares += 0.5 * float(change @ (plant.data.qvel - before))
+    work = float(np.sum(plant.read(False)["muscle_work"]))
+    assert squares > 0.02 * work
+    assert remainder(plant, start_J) == pytest.approx(squares, abs=0.01 * work)

@@ -25,6 +25,8 @@ SMALL = {
     "record.frames_interval_s": 0.1,
 }
 LEFT = {"turning": {"kind": "constant", "modulation": 0.8, "descending_time_constant_s": 0.05}}
+RIGHT_POST = {"arena.posts": [[0.1, 0.185, 0.03]]}
+TOUCH = {"turning": {"kind": "touch", "arm_N": 0.5, "least_N": 0.1, "full_N": 2.0}} | RIGHT_POST
 HEADING = {"turning": {"kind": "heading", "heading_deg": 40.0}}
 
 
@@ -45,7 +47,7 @@ def test_no_modulation_is_the_plain_run_bit_for_bit(tmp_path: Path) -> None:
     assert np.all(turning.data["half_scale"] == 1.0)
 
 
-@pytest.mark.parametrize("turning", [LEFT, HEADING], ids=["constant", "heading"])
+@pytest.mark.parametrize("turning", [LEFT, TOUCH, HEADING], ids=["constant", "touch", "heading"])
 def test_a_continued_run_is_the_whole_run_bit_for_bit(turning: dict[str, Any], tmp_path: Path) -> None:
     whole = simulate(config(**turning), tmp_path / "whole", progress=False)
     simulate(config(**turning, duration_s=0.2), tmp_path / "first", progress=False)
@@ -86,7 +88,8 @@ def test_opposite_modulations_turn_to_opposite_sides_by_about_as_much(tmp_path: 
 
 @pytest.mark.slow
 def test_the_nervous_system_steers_the_worm_to_a_heading(tmp_path: Path) -> None:
-    own = {"body.rings.layout": "halves", "duration_s": 20.0, "turning": {"kind": "heading", "heading_deg": 30.0}}
+    turning = {"kind": "heading", "heading_deg": 30.0, "shares": list(COUNTER)}
+    own = {"body.rings.layout": "halves", "sensor.tolerance_m": 0.008, "duration_s": 20.0, "turning": turning}
     run = simulate(load_config("riddle2025-muscles", own), tmp_path / "run", progress=False)
     assert summary(run).wave
     track = track_of(run)
@@ -99,3 +102,13 @@ def test_the_touch_of_the_floor_alone_turns_nobody(tmp_path: Path) -> None:
     sides = run.data["touch"].values[..., [SIDES.index("left"), SIDES.index("right")]]
     assert np.abs(np.diff(sides[:, 0], axis=-1)).max() < 2.0
     assert np.all(run.data["half_scale"] == 1.0)
+
+
+def test_a_post_on_the_right_is_felt_there_and_turns_the_worm_away_from_it(tmp_path: Path) -> None:
+    run = simulate(config(**TOUCH), tmp_path / "run", progress=False)
+    front = run.data["touch"].values[:, 0]
+    assert front[:, SIDES.index("right")].max() > 0.5
+    assert front[:, SIDES.index("left")].max() == 0.0
+    scales = run.data["half_scale"].values
+    assert scales[..., 0].min() < 1.0
+    assert np.all(scales[..., 1] == 1.0)

@@ -26,7 +26,7 @@ from annelid.studies.tune import search as module
 from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
 from annelid.studies.tune.optimiser import CmaEs, Parzen, from_unit, generation_size, optimiser_of, to_unit
 from annelid.studies.tune.results import write_gait, write_results, write_trials
-from annelid.studies.tune.search import UNTUNED, Task, Trial, best, compromise, front, search
+from annelid.studies.tune.search import START, Task, Trial, best, compromise, front, search
 from annelid.studies.tune.space import Choice, Interval, default_variables, parse_variable, variables_of
 
 PRESET = "riddle2023-rods"
@@ -40,7 +40,7 @@ def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycl
         period_s=2.0,
         speed_m_per_s=speed,
         speed_body_lengths_per_s=speed / 0.75,
-        cost_of_transport=cost,
+        cost_of_transport_cables=cost,
         slip_ratio=slip,
     )
 
@@ -79,7 +79,9 @@ def test_a_field_is_varied_once() -> None:
         variables_of([f"{GATE}=80:600", f"{GATE}=100:200"], CONFIG)
 
 
-@pytest.mark.parametrize("kind", ["sns", "adaptive", "sns-robust", "sine", "timed", "shc", "phase-chain"])
+@pytest.mark.parametrize(
+    "kind", ["sns", "adaptive", "sns-robust", "sns-pressure", "sine", "timed", "shc", "phase-chain"]
+)
 def test_every_controller_has_something_to_tune(kind: str) -> None:
     assert default_variables(load_config(PRESET, {"controller.kind": kind}))
 
@@ -189,11 +191,11 @@ def trials_of(task: Task) -> list[Trial]:
 
 
 @pytest.mark.usefixtures("toy")
-def test_a_search_finds_the_best_gait_and_states_the_untuned_one() -> None:
+def test_a_search_finds_the_best_gait_and_states_the_start() -> None:
     # A hundred for each variable, as is usual for a CMA-ES.
     task = toy_task(200)
     found = trials_of(task)
-    assert [trial.number for trial in found] == [UNTUNED, *range(200)]
+    assert [trial.number for trial in found] == [START, *range(200)]
     assert found[0].case == Case(PRESET, {"duration_s": 1.0})
     leader = best(found, OBJECTIVES["speed"])
     assert leader is not None
@@ -242,7 +244,7 @@ def test_a_worm_that_cannot_be_built_is_a_trial_with_the_penalty() -> None:
 def test_the_front_has_all_that_nothing_beats_and_nothing_else(pairs: list[tuple[int, int]]) -> None:
     objectives = objectives_of(["speed", "slip"])
     found = [
-        Trial(i, {}, Case(PRESET), Judged(a_gait(1.0 + speed, slip=float(slip)), ""), Path())
+        Trial(i, {}, Case(PRESET), Judged(a_gait(1.0 + speed, slip=float(slip)), ""), Path(str(i)))
         for i, (speed, slip) in enumerate(pairs)
     ]
     members = {trial.number for trial in front(found, objectives)}
@@ -251,12 +253,15 @@ def test_the_front_has_all_that_nothing_beats_and_nothing_else(pairs: list[tuple
         assert (i in members) != beaten
 
 
-def an_outcome(**changes: Any) -> Outcome:
-    """Of a run in order; changes of the rhythm, ``wave`` of the summary, ``message`` of the run."""
-    names = list(Summary.__dataclass_fields__)
-    summary = Summary(**{**dict.fromkeys(names), "wave": changes.pop("wave", True)})  # type: ignore[arg-type]
+def test_a_run_is_on_the_front_once() -> None:
+    twice = [Trial(i, {}, Case(PRESET), Judged(a_gait(), ""), Path("same")) for i in (START, 0)]
+    assert [trial.number for trial in front(twice, objectives_of(["speed", "slip"]))] == [START]
+
+
+def an_outcome(message: str = "", **changes: Any) -> Outcome:
+    """Of a run in order, but for changes of the rhythm and for why it was stopped."""
+    summary = Summary(**dict.fromkeys(Summary.__dataclass_fields__))  # type: ignore[arg-type]
     rhythm = RhythmScore("ordered", "a wave", (1, 2, 3), 1.0, 0.0, 1.0, 1, 1, 1.0, 1.0)
-    message = changes.pop("message", "")
     return Outcome(Path(), summary, replace(rhythm, **changes), (), message)
 
 
@@ -265,8 +270,7 @@ def an_outcome(**changes: Any) -> Outcome:
     [
         (an_outcome(), a_gait(), ""),
         (an_outcome(verdict="disordered", reason="regular but not a wave"), a_gait(), ""),
-        (an_outcome(wave=False), a_gait(), ""),
-        (an_outcome(verdict="disordered", reason="limps", wave=False), a_gait(), "out of order: limps"),
+        (an_outcome(verdict="disordered", reason="limps"), a_gait(), "out of order: limps"),
         (an_outcome(verdict="silent", reason="stalled"), a_gait(), "silent: stalled"),
         (an_outcome(message="energy ran away"), None, "stopped: energy ran away"),
         (an_outcome(), a_gait(cycles=1), "fewer than 2 whole cycles"),
@@ -313,7 +317,7 @@ def test_every_trial_is_a_row_with_its_values_and_numbers(tmp_path: Path) -> Non
     found = trials_of(task)
     write_trials(task, found, tmp_path / "trials.csv")
     rows = list(csv.DictReader((tmp_path / "trials.csv").open()))
-    assert [row["trial"] for row in rows] == ["untuned", *map(str, range(16))]
+    assert [row["trial"] for row in rows] == ["start", *map(str, range(16))]
     for row, trial in zip(rows, found, strict=True):
         for field, value in trial.values.items():
             assert float(row[field]) == pytest.approx(value)

@@ -50,9 +50,9 @@ def energy_balance(data: xr.Dataset) -> EnergyBalance | None:
     Returns:
         The balance; None where the worm keeps no books, or there are no two samples.
     """
-    if "muscle_work" not in data or data.sizes.get("time", 0) < 2:
-        return None
     booked = ("muscle_work", "kinetic_energy", "elastic_energy", "damping_loss")
+    if any(name not in data for name in booked) or data.sizes.get("time", 0) < 2:
+        return None
     work, kinetic, elastic, damping = (_gain(data, name) for name in booked)
     optional = ("potential_energy", "slip_loss", "constraint_loss")
     potential, slip, constraint = (_gain(data, name) if name in data else None for name in optional)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from annelid.analysis.balance import EnergyBalance, energy_balance
 from annelid.analysis.circle import fitted_circle
 from annelid.analysis.rhythm import rhythm, segment_activation
-from annelid.analysis.track import track_of
 from annelid.config import WormBody
 
 if TYPE_CHECKING:
@@ -143,6 +142,9 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     steps = np.diff(places.T, axis=0)
     if not isinstance(run.config.body, WormBody) or run.data.sizes.get("frame", 0) < 2:
         return steps, np.broadcast_to(FORWARDS, steps.shape)
+    # The mesh comes with the engine, which the numbers of a planar worm do without.
+    from annelid.analysis.track import track_of
+
     track = track_of(run)
     # Evenly over each cycle, whatever the interval of the frames.
     times = marks[:-1, np.newaxis] + np.diff(marks)[:, np.newaxis] * np.linspace(0.0, 1.0, 64, endpoint=False)

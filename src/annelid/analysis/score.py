@@ -40,6 +40,9 @@ WAVE_TOLERANCE = 0.375
 COUNT_TOLERANCE = 0.25
 """How near the number of contracted segments must be to the larger of two numbers of fronts to tell for it."""
 
+UNEVEN = "regular but not a wave"
+"""Reason of the verdict on a rhythm that fails to be ordered by its spacing only."""
+
 _DESIGN_GATE_MS = 300.0
 
 Verdict = Literal["ordered", "disordered", "silent"]
@@ -73,6 +76,11 @@ class RhythmScore:
     wave_fronts: int | None
     mean_contracted: float
     last_onset_s: float | None
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether neighbours take turns with steady periods and lags, be they those of an even wave or not."""
+        return self.verdict == "ordered" or self.reason == UNEVEN
 
     @property
     def is_one_wave(self) -> bool:
@@ -211,7 +219,7 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     else:
         winding, strays = _wave([_mean_phase(of_pair) for of_pair in lags])
         if strays > WAVE_TOLERANCE or not 0 < winding < n:
-            verdict, reason = "disordered", "regular but not a wave"
+            verdict, reason = "disordered", UNEVEN
         else:
             direction, fronts = _fronts(winding, n, mean_contracted)
             verdict, reason = "ordered", _wave_in_words(direction, fronts)

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body import mesh_of
 from annelid.config import WormBody
 from annelid.errors import RunFileError
-from annelid.morphology import MeshGeometry
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -27,12 +25,14 @@ class Track:
     Attributes:
         time_s: Shape ``(n,)``.
         crossing_m: Positions of the crossings, m, ``(n, n_crossings, 3)``.
-        geometry: The mesh.
+        n_per_plane: Crossings on each plane of crossings, which are numbered plane by plane.
+        ring_planes: Plane of each segment's ring, ``(n_segments,)``.
     """
 
     time_s: Array
     crossing_m: Array
-    geometry: MeshGeometry
+    n_per_plane: int
+    ring_planes: tuple[int, ...]
 
     @cached_property
     def middle_m(self) -> Array:
@@ -51,14 +51,19 @@ class Track:
         return np.unwrap(np.arctan2(-ahead[:, 1], -ahead[:, 0]))
 
     def _ring_centre(self, segment: int) -> Array:
-        return self.crossing_m[:, self.geometry.rings[segment], :2].mean(axis=1)
+        return self._planes[:, self.ring_planes[segment]].mean(axis=1)
+
+    @cached_property
+    def _planes(self) -> Array:
+        """Crossings seen from above, plane by plane, ``(n, n_planes, n_per_plane, 2)``."""
+        return self.crossing_m[..., :2].reshape(len(self.time_s), -1, self.n_per_plane, 2)
 
     def outline_m(self, sample: int) -> Array:
         """Returns the body's outline seen from above at a sample: a closed polygon, m, ``(n_corners, 2)``.
 
         On either side it runs along the outermost crossing of every plane.
         """
-        planes = self.crossing_m[sample, :, :2].reshape(self.geometry.n_planes, self.geometry.n_per_plane, 2)
+        planes = self._planes[sample]
         centre = planes.mean(axis=1)
         along = np.gradient(centre, axis=0)
         across = np.stack([-along[:, 1], along[:, 0]], axis=-1)[:, np.newaxis]
@@ -79,7 +84,9 @@ def track_of(run: Run) -> Track:
         raise RunFileError(f"{run.path} holds a planar worm, which crawls along a line and has no track")
     if data.sizes.get("frame", 0) < 2 or "crossing_position" not in data:
         raise RunFileError(f"{run.path} holds fewer than two recorded postures, and so no track")
-    return Track(data["frame_time"].values, data["crossing_position"].values, mesh_of(body.mesh))
+    mesh = body.mesh
+    rings = (mesh.free_planes_at_ends + mesh.planes_between_rings * segment for segment in range(mesh.n_segments))
+    return Track(data["frame_time"].values, data["crossing_position"].values, mesh.n_helices // 2, tuple(rings))
 
 
 @dataclass(frozen=True, slots=True)

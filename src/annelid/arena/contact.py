@@ -1,9 +1,10 @@
 """How skin and ground touch: contact settings, and the planes that move with the skin.
 
-A level floor and guard rails are planes of the engine. Every other ground is felt through one plane for each part of
-the skin that can touch, tangent to the ground at the nearest point and paired with that part alone. The planes hang on
-mocap bodies, which are part of the engine's state, and are laid anew before every step (`annelid.simulation.ground`):
-the ground has no seams, one part has one contact, and a step costs the same on any ground (docs/arenas.md).
+A level floor and guard rails are planes of the engine, and posts its cylinders. Every other ground is felt through one
+plane for each part of the skin that can touch, tangent to the ground at the nearest point and paired with that part
+alone. The planes hang on mocap bodies, which are part of the engine's state, and are laid anew before every step
+(`annelid.simulation.ground`): the ground has no seams, one part has one contact, and a step costs the same on any
+ground (docs/arenas.md).
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: Arena) -> None:
     """
     options = contact_options(arena)
     slide, spin, roll = options.pop("friction")
-    rails = isinstance(arena, Floor) and arena.rail_gap_m is not None
+    walls = isinstance(arena, Floor) and arena.has_walls
     for geom in touching(spec):
         name = plane_name(geom.name)
         holder = spec.worldbody.add_body(name=name, mocap=True)
@@ -73,4 +74,4 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: Arena) -> None:
             friction=[slide, slide, spin, roll, roll],
             **options,
         )
-        geom.conaffinity = 1 if rails else 0
+        geom.conaffinity = 1 if walls else 0

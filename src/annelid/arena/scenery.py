@@ -1,4 +1,4 @@
-"""What is seen of an arena: sky, light, floors, guard rails, the shapes of relief and pipes."""
+"""What is seen of an arena: sky, light, floors, guard rails and posts, the shapes of relief and pipes."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ import mujoco
 from annelid.arena.contact import contact_options
 from annelid.arena.panels import add_panels
 from annelid.arena.shapes import Shape, shape_of
+from annelid.arena.surface import walls_of
 from annelid.config import Arena, Floor, Pipe
 
 CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
 FLOOR_HALF_SIZE_M = 40.0
 RAIL_HALF_HEIGHT_M = 0.1
+POST_HALF_HEIGHT_M = 0.3
+"""Posts are about twice as high as the worm."""
+POST_RGBA = (0.75, 0.47, 0.30, 1.0)
 RAIL_RGBA = (0.55, 0.6, 0.66, 0.45)
 PIPE_ABOVE_FLOOR_M = 0.02
 """The floor below a pipe is there to be seen only."""
-GROUND_RGBA = (0.80, 0.80, 0.77, 1.0)
 PIPE_RGBA = (0.62, 0.72, 0.80, 0.28)
 
 
@@ -25,7 +28,7 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     """Adds the arena to look at, below a sky and a light.
 
     Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
-    unbounded planes; relief and pipes are shapes to see, and hidden panels that can be touched.
+    unbounded planes, posts cylinders; relief and pipes are shapes to see, and hidden panels that can be touched.
 
     Args:
         spec: The worm's spec, its lowest line at z = 0.
@@ -52,19 +55,38 @@ def add_scenery(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
     )
     material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
-    spec.worldbody.add_light(name="lamp", pos=[length_m / 2, -1.0, 2.5], dir=[0.0, 0.35, -1.0], diffuse=[0.7, 0.7, 0.7])
+    walls = isinstance(arena, Pipe) or bool(walls_of(arena))
+    spec.worldbody.add_light(
+        name="lamp",
+        pos=[length_m / 2, -1.0, 2.5],
+        dir=[0.0, 0.35, -1.0],
+        diffuse=[0.7, 0.7, 0.7],
+        # The engine would let walls that are seen through cast the shadow of solid ones.
+        castshadow=not walls,
+    )
     shape = shape_of(arena, length_m)
     if shape is not None:
         _add_shape(spec, shape, arena)
         add_panels(spec, arena, length_m)
     if isinstance(arena, Pipe) or shape is None:
         _add_floor(spec, arena, length_m)
-    add_rails(spec, arena)
+    add_walls(spec, arena)
 
 
-def add_rails(spec: mujoco.MjSpec, arena: Arena) -> None:
-    """Adds the two guard rails, if there are any: upright planes, drawn 20 cm high."""
-    if not isinstance(arena, Floor) or arena.rail_gap_m is None:
+def add_walls(spec: mujoco.MjSpec, arena: Arena) -> None:
+    """Adds what stands upright, if anything: guard rails, which are planes drawn 20 cm high, and posts."""
+    if not isinstance(arena, Floor):
+        return
+    for number, (x, y, radius) in enumerate(arena.posts or ()):
+        spec.worldbody.add_geom(
+            name=f"post_{number}",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[x, y, POST_HALF_HEIGHT_M - arena.floor_gap_m],
+            size=[radius, POST_HALF_HEIGHT_M, 0.0],
+            rgba=POST_RGBA,
+            **contact_options(arena),
+        )
+    if arena.rail_gap_m is None:
         return
     for name, side, turn in (("rail_left", -1.0, -sqrt(0.5)), ("rail_right", 1.0, sqrt(0.5))):
         spec.worldbody.add_geom(
@@ -108,5 +130,5 @@ def _add_shape(spec: mujoco.MjSpec, shape: Shape, arena: Arena) -> None:
         meshname="ground",
         contype=0,
         conaffinity=0,
-        rgba=PIPE_RGBA if isinstance(arena, Pipe) else GROUND_RGBA,
+        **({"rgba": PIPE_RGBA} if isinstance(arena, Pipe) else {"material": "floor"}),
     )

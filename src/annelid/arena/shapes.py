@@ -103,7 +103,7 @@ def _flight(stairs: Stairs) -> Shape:
     across = np.linspace(-GROUND_HALF_WIDTH_M, GROUND_HALF_WIDTH_M, 9)
     x, y = np.meshgrid(-line[:, 0], across, indexing="ij")
     z = np.broadcast_to(line[:, 1:] + stairs.level_m, x.shape)
-    return Shape(np.stack([x, y, z], axis=-1).reshape(-1, 3), _grid_faces(*x.shape))
+    return Shape(np.stack([x, y, z], axis=-1).reshape(-1, 3), _grid_faces(*x.shape)[:, ::-1])
 
 
 def _field(hills: Hills) -> Shape:
@@ -111,7 +111,7 @@ def _field(hills: Hills) -> Shape:
     across = np.arange(-GROUND_HALF_WIDTH_M, GROUND_HALF_WIDTH_M, GROUND_GRAIN_M)
     x, y = np.meshgrid(-ahead, across, indexing="ij")
     height, _ = hills.ground.height(np.stack([x, y], axis=-1))
-    return Shape(np.stack([x, y, height + hills.level_m], axis=-1).reshape(-1, 3), _grid_faces(*x.shape))
+    return Shape(np.stack([x, y, height + hills.level_m], axis=-1).reshape(-1, 3), _grid_faces(*x.shape)[:, ::-1])
 
 
 def _grid_faces(n_along: int, n_across: int, *, closed: bool = False) -> NDArray[np.int32]:

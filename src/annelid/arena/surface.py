@@ -89,8 +89,28 @@ class Plane(_Nearest):
 
 
 @dataclass(frozen=True)
+class Round(_Nearest):
+    """An upright post without an upper end.
+
+    Attributes:
+        axis_m: x and y of its axis, m, ``(2,)``.
+        radius_m: Its radius, m.
+    """
+
+    axis_m: Array
+    radius_m: float
+
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
+        """Returns distances from it, m, and directions away from its axis."""
+        away = points_m[..., :2] - self.axis_m
+        distance = _lengths(away)
+        outwards = away / np.maximum(distance, 1e-12)[..., np.newaxis]
+        return distance - self.radius_m, np.concatenate([outwards, np.zeros((*distance.shape, 1))], axis=-1)
+
+
+@dataclass(frozen=True)
 class Between(_Nearest):
-    """Free space within several surfaces, as a floor and two rails.
+    """Free space within several surfaces, as a floor, two rails and posts.
 
     Attributes:
         parts: The surfaces.
@@ -216,7 +236,7 @@ def _lengths(vectors: Array) -> Array:
 
 
 def ground_of(arena: Arena) -> Surface:
-    """Returns the surface of an arena without its guard rails."""
+    """Returns the surface of an arena without its guard rails and posts."""
     if isinstance(arena, Pipe):
         return PipeWall(course_of(arena), bore_of(arena))
     assert isinstance(arena, Floor)
@@ -228,15 +248,18 @@ def ground_of(arena: Arena) -> Surface:
     return Plane(UP, level)
 
 
-def rails_of(arena: Arena) -> tuple[Plane, ...]:
-    """Returns the guard rails of an arena: none, or the left and the right one."""
-    if not isinstance(arena, Floor) or arena.rail_gap_m is None:
+def walls_of(arena: Arena) -> tuple[Surface, ...]:
+    """Returns what stands upright in an arena: the left and the right guard rail, and the posts."""
+    if not isinstance(arena, Floor):
         return ()
+    posts = tuple(Round(np.array([x, y]), radius) for x, y, radius in arena.posts or ())
+    if arena.rail_gap_m is None:
+        return posts
     side = np.array([0.0, 1.0, 0.0])
-    return Plane(side, -arena.rail_gap_m / 2), Plane(-side, -arena.rail_gap_m / 2)
+    return Plane(side, -arena.rail_gap_m / 2), Plane(-side, -arena.rail_gap_m / 2), *posts
 
 
 def surface_of(arena: Arena) -> Surface:
     """Returns the surface of a configured arena, in the coordinates of the worm's model (lowest line at z = 0)."""
-    ground, rails = ground_of(arena), rails_of(arena)
-    return Between((ground, *rails)) if rails else ground
+    ground, walls = ground_of(arena), walls_of(arena)
+    return Between((ground, *walls)) if walls else ground

@@ -9,7 +9,7 @@ import numpy as np
 
 from annelid.arena.contact import add_moving_planes, has_moving_planes
 from annelid.arena.gravity import gravity_of
-from annelid.arena.scenery import add_rails, add_scenery
+from annelid.arena.scenery import add_scenery, add_walls
 from annelid.body.actuation import add_ring_actuators, add_springs
 from annelid.body.chain import add_chains
 from annelid.body.elimination import order_elimination
@@ -78,7 +78,7 @@ def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSp
         add_joint_friction(spec, geometry, body.joints)
     if laid:
         add_moving_planes(spec, arena)
-        add_rails(spec, arena)
+        add_walls(spec, arena)
     else:
         add_scenery(spec, arena, geometry.length_m)
     return spec

@@ -9,6 +9,8 @@ from pydantic import Field, Tag, model_validator
 from annelid.config.sections import Impedance, NonNegative, Positive, Section, kind_or
 
 Friction = Annotated[float, Field(ge=0.01, le=100)]
+Place = Annotated[float, Field(ge=-1e4, le=1e4)]
+Post = tuple[Place, Place, Annotated[float, Field(gt=0, le=100)]]
 Slope = Annotated[float, Field(ge=-60, le=60)]
 
 
@@ -36,7 +38,7 @@ SHARED = tuple(Arena.model_fields)
 
 
 class Floor(Arena):
-    """A plane: level, or a slope that the worm climbs; between guard rails if wanted."""
+    """A plane: level, or a slope that the worm climbs; between guard rails and with posts if wanted."""
 
     kind: Literal["floor"] = "floor"
     floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
@@ -46,6 +48,16 @@ class Floor(Arena):
     rail_gap_m: Positive | None = Field(
         default=None, description="distance of two upright guard rails, the worm midway (not set: none)"
     )
+    posts: tuple[Post, ...] | None = Field(
+        default=None,
+        description="x, y and radius of upright round posts, m; the worm starts along 0 <= x <= its length, leads "
+        "towards -x, and its left is -y (not set: none)",
+    )
+
+    @property
+    def has_walls(self) -> bool:
+        """Whether rails or posts stand on it."""
+        return self.rail_gap_m is not None or bool(self.posts)
 
 
 class Relief(Floor):

@@ -161,7 +161,11 @@ _WORDS = {
 
 
 def _explain(detail: ErrorDetails) -> str:
-    path = ".".join(str(part) for part in detail["loc"] if part not in _KINDS and not _is_type_label(part))
+    loc = detail["loc"]
+    # What follows a kind is a field, even where it is called as another kind is.
+    kinds = [part in _KINDS and (not i or loc[i - 1] not in _KINDS) for i, part in enumerate(loc)]
+    parts = [str(part) for part, is_kind in zip(loc, kinds, strict=True) if not is_kind and not _is_type_label(part)]
+    path = ".".join(parts)
     kind = detail["type"]
     if kind == "extra_forbidden":
         return f"unknown field {path!r}: {_nearest_fields(detail['loc'])}"

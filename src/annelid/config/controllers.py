@@ -233,6 +233,40 @@ class DescendingDrive(Section):
     )
 
 
+class PressureSns(Section):
+    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.pressure`.
+
+    A segment that bears load holds itself expanded until the one before it is extended. Lengths and loads are those of
+    the six-segment robot, of 0.16 m radius and 19 N.
+    """
+
+    kind: Literal["sns-pressure"] = "sns-pressure"
+    network: SnsController = SnsController()
+    light_N: NonNegative = Field(default=1.0, description="load of a segment up to which its pressure neuron rests")
+    full_N: Positive = Field(default=6.0, description="load that drives it to R")
+    extending_m: NonNegative = Field(default=0.056, description="lengthening from which a segment lets the next one go")
+    extended_m: Positive = Field(default=0.070, description="lengthening at which it does so in full")
+    hold: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.6, description="potential, over R, that full pressure alone gives the sensory neuron; 0 for none"
+    )
+    release: Annotated[float, Field(ge=0, le=20)] = Field(
+        default=2.0, description="stretch sensors' currents that a full extension neuron cancels; 0 for none"
+    )
+    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=10)] = Field(
+        default=0.06, description="time constant of the pressure neurons"
+    )
+
+    @model_validator(mode="after")
+    def _scales_rise(self) -> Self:
+        for low, high in (("light_N", "full_N"), ("extending_m", "extended_m")):
+            if not getattr(self, low) < getattr(self, high):
+                raise ValueError(
+                    f"controller.{low} = {getattr(self, low):g} must be less than controller.{high} = "
+                    f"{getattr(self, high):g}"
+                )
+        return self
+
+
 class RobustSns(Section):
     """A peristalsis network whose rhythm goes on whatever its sensors say: `annelid.nervous.robust`.
 
@@ -287,6 +321,7 @@ ControllerSection = Annotated[
     | Annotated[HeteroclinicChannel, Tag("shc")]
     | Annotated[PhaseChain, Tag("phase-chain")]
     | Annotated[AdaptiveSns, Tag("adaptive")]
-    | Annotated[RobustSns, Tag("sns-robust")],
+    | Annotated[RobustSns, Tag("sns-robust")]
+    | Annotated[PressureSns, Tag("sns-pressure")],
     kind_or("sns"),
 ]

@@ -8,7 +8,14 @@ from typing import Annotated, Any, Self
 from pydantic import Field, Tag, model_validator
 
 from annelid.config.arena import ArenaSection, Pipe
-from annelid.config.controllers import ControllerSection, HeteroclinicChannel, Program, SnsController, StretchSensor
+from annelid.config.controllers import (
+    ControllerSection,
+    HeteroclinicChannel,
+    PressureSns,
+    Program,
+    SnsController,
+    StretchSensor,
+)
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
 from annelid.config.sections import Positive, Section, kind_or
 from annelid.config.turning import Descending, TurningSection
@@ -140,6 +147,15 @@ class RunConfig(Section):
             raise ValueError(
                 f"controller.feedback = 'contact' has no effect on body.kind = {self.body.kind!r}, which touches no "
                 "ground: choose 'none' or 'stretch'"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _pressure_needs_a_skin(self) -> Self:
+        if isinstance(self.controller, PressureSns) and not isinstance(self.body, WormBody):
+            raise ValueError(
+                f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {self.body.kind!r} "
+                "has not; only the 3D worm ('worm') has"
             )
         return self
 

@@ -45,7 +45,7 @@ class Steered(Descending):
         default=2.0, description="time constant of the filter that tells the rate of the heading; about one cycle"
     )
     largest_modulation: Annotated[float, Field(gt=0, le=1)] = Field(
-        default=1.0, description="size of the modulation that is never exceeded"
+        default=0.9, description="size of the modulation that is never exceeded"
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -156,23 +155,6 @@ class SnsController(PeristalsisController):
             "n_steps": np.array(n_taken),
         }
         return after, self._activation(potential)
-
-    def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
-        """Cuts steps under one sensation where the inputs change: after the kick, and at the end of the hold.
-
-        Returns:
-            For every piece its number of steps and the time at its beginning, s.
-        """
-        held = self._sensor.held_at(time_s)
-        if n_steps == 1 or (n_taken > 0 and not held):
-            return [(n_steps, time_s)]
-        first = round(time_s / self._timestep_s)
-        times_s = [time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
-        cuts = {0, n_steps} | ({1} if n_taken == 0 else set())
-        if held:
-            cuts.add(sum(self._sensor.held_at(time) for time in times_s))
-        ends = sorted(cuts)
-        return [(end - start, times_s[start]) for start, end in pairwise(ends)]
 
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""

@@ -13,6 +13,7 @@ from annelid.config import (
     HeteroclinicChannel,
     PhaseChain,
     PlanarBody,
+    PressureSns,
     Program,
     RobustSns,
     RunConfig,
@@ -74,6 +75,10 @@ def _build_pattern(config: RunConfig, plant: Plant) -> Controller:
         from annelid.control.robust import RobustController
 
         return RobustController(section, *size, timestep_s)
+    if isinstance(section, PressureSns):
+        from annelid.control.pressure import PressureController
+
+        return PressureController(section, config.sensor, *size, timestep_s)
     if isinstance(section, Program):
         from annelid.control.program import ProgramController
 

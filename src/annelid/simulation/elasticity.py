@@ -105,25 +105,23 @@ class _Rods:
         self._torsion = body.strands.shear_modulus_Pa * per_length / 2
         self._frames_at_rest = self._frames(_plastic_at_rest(model))
         tangent, direction, _ = self._frames_at_rest
-        self._curvature_at_rest = _seen_by_both(tangent, direction, np.zeros(self._shape))
+        self._seen_at_rest = _Neighbours(tangent, direction).seen(np.zeros(self._shape))
 
     def energy_J(self, qpos: Array, plastic: Array) -> float:
         edge = np.diff(self._place + qpos[self._slide], axis=-1)
         tangent = edge / np.sqrt(_dot(edge, edge))
         old_tangent, old_direction, turns = self._frames(plastic) if plastic.any() else self._frames_at_rest
-        direction = _transported(old_direction, old_tangent, tangent)
+        # Transport in time: what is across the old tangent turns with the least turn from the old to the new.
+        lean = _dot(tangent, old_direction) / (1.0 + _dot(tangent, old_tangent))
+        direction = old_direction - (old_tangent + tangent) * lean
         angle = qpos[self._hinge]
-        here = _transported(direction[..., :-1], tangent[..., :-1], tangent[..., 1:])
-        there = direction[..., 1:]
-        turn = np.arctan2(_dot(_cross(here, there), tangent[..., 1:]), _dot(here, there))
+        neighbours = _Neighbours(tangent, direction)
+        turn = neighbours.turn()
         # A rod may be wound by more than half a turn between two edges.
-        turn += 2 * pi * np.round((turns - turn) / (2 * pi))
+        turn += 2 * pi * np.rint((turns - turn) / (2 * pi))
         twist = angle[:, 1:] - angle[:, :-1] + turn
-        bend = [
-            seen - rest
-            for seen, rest in zip(_seen_by_both(tangent, direction, angle), self._curvature_at_rest, strict=True)
-        ]
-        squares = 0.5 * sum(part.real**2 + part.imag**2 for part in bend)
+        bent = neighbours.seen(angle) - self._seen_at_rest
+        squares = 0.5 * (bent.real**2 + bent.imag**2).sum(axis=0)
         return float((self._bending * squares + self._torsion * twist * twist).sum())
 
     def _frames(self, plastic: Array) -> tuple[Array, Array, Array]:
@@ -141,27 +139,29 @@ def _plastic_at_rest(model: mujoco.MjModel) -> Array:
     return data.plastic.copy()
 
 
-def _seen_by_both(tangent: Array, direction: Array, angle: Array) -> tuple[Seen, Seen]:
-    """Curvature between neighbouring edges in the material frame of the one in front, and of the one behind.
+class _Neighbours:
+    """Neighbouring edges by the scalar products of their axes: tangent, direction, and the vector across both."""
 
-    Returns:
-        Two complex arrays, ``(strand, edge - 1)``: the part along the turned direction, and 1j times that across it.
-    """
-    front, rear = tangent[..., :-1], tangent[..., 1:]
-    curvature = 2.0 * _cross(front, rear) / (1.0 + _dot(front, rear))
-    across = _cross(tangent, direction)
-    turned = np.exp(-1j * angle)
-    sides = [
-        (_dot(curvature, direction[..., part]) + 1j * _dot(curvature, across[..., part])) * turned[..., part]
-        for part in (slice(None, -1), slice(1, None))
-    ]
-    return sides[0], sides[1]
+    def __init__(self, tangent: Array, direction: Array) -> None:
+        axes = np.stack([tangent, direction, _cross(tangent, direction)])
+        self._product = np.einsum("piab,qiab->pqab", axes[..., :-1], axes[..., 1:])
+        self._scale = 1.0 / (1.0 + self._product[0, 0])
 
+    def turn(self) -> Array:
+        """Angle from the direction of the one in front, transported to the one behind, to that one's."""
+        lean = self._product[1, 0] * self._scale
+        along, across = (self._product[1, axis] - self._product[0, axis] * lean for axis in (1, 2))
+        return np.arctan2(-across, along)
 
-def _transported(vector: Array, old: Array, new: Array) -> Array:
-    """Turns vectors by the smallest turn from one unit tangent to another."""
-    axis, cosine = _cross(old, new), _dot(old, new)
-    return cosine * vector + _cross(axis, vector) + axis * (_dot(axis, vector) / (1.0 + cosine))
+    def seen(self, angle: Array) -> Seen:
+        """Curvature in the material frame of the edge in front, and of the one behind, ``(2, strand, edge - 1)``.
+
+        The real part is that along the direction turned by the edge's angle, the imaginary part that across it.
+        """
+        product, turned = self._product, np.exp(-1j * angle)
+        front = (1j * product[1, 0] - product[2, 0]) * turned[:, :-1]
+        rear = (product[0, 2] - 1j * product[0, 1]) * turned[:, 1:]
+        return 2.0 * self._scale * np.stack([front, rear])
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -14,8 +14,9 @@ from annelid.morphology import Array, MeshGeometry
 class MovingGround:
     """Lays the planes of `annelid.arena.contact.add_moving_planes` before every step.
 
-    Where they lie follows from the engine's positions alone, and friction from its velocities too, so a run continues
-    and a batch computes to the same bits.
+    What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
+    the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions
+    and velocities alone, so a run continues and a batch computes to the same bits.
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:
@@ -29,6 +30,8 @@ class MovingGround:
         self._model = model
         self._surface = ground_of(arena)
         self._skin, self._planes = _skin_and_planes(model)
+        self._bodies = model.geom_bodyid[self._skin]
+        self._roots = model.body_rootid[self._bodies]
         self._setae = _Setae(model, geometry, arena, self._skin) if arena.has_setae else None
 
     def lay(self, data: mujoco.MjData) -> None:
@@ -37,14 +40,19 @@ class MovingGround:
         Args:
             data: Positions and velocities; its kinematics are brought up to date.
         """
-        mujoco.mj_kinematics(self._model, data)
+        model = self._model
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
+            stage(model, data)
         places = data.geom_xpos[self._skin]
+        spin, drift = data.cvel[self._bodies, :3], data.cvel[self._bodies, 3:]
         with np.errstate(invalid="ignore", over="ignore"):
+            velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
             distance, normal = self._surface.nearest(places, first_order=True)
-            data.mocap_pos[self._planes] = places - distance[:, np.newaxis] * normal
+            ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
+            data.mocap_pos[self._planes] = places - (distance - ahead)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
             if self._setae is not None:
-                self._model.pair_friction[:, :2] = self._setae.friction(data, places)[:, np.newaxis]
+                model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
 
 
 def _skin_and_planes(model: mujoco.MjModel) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -79,10 +87,7 @@ class _Setae:
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena, skin: NDArray[np.int32]) -> None:
         assert arena.backward_friction is not None
-        self._model = model
         self._forwards, self._backwards = arena.friction, arena.backward_friction
-        self._bodies = model.geom_bodyid[skin]
-        self._roots = model.body_rootid[self._bodies]
         n_planes = len(geometry.plane_x_m)
         self._crossing_site = np.array([model.site(f"crossing_{i}").id for i in range(geometry.n_crossings)])
         self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
@@ -91,12 +96,8 @@ class _Setae:
         x = data.geom_xpos[skin, :1]
         self._plane = np.abs(x - geometry.plane_x_m).argmin(axis=1)
 
-    def friction(self, data: mujoco.MjData, places: Array) -> Array:
-        """Returns the coefficient of every part of the skin, ``(n_skin,)``."""
-        mujoco.mj_comPos(self._model, data)
-        mujoco.mj_comVel(self._model, data)
-        spin, drift = data.cvel[self._bodies, :3], data.cvel[self._bodies, 3:]
-        velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
+    def friction(self, data: mujoco.MjData, velocity: Array) -> Array:
+        """Returns the coefficient of every part of the skin by its velocity, m/s, ``(n_skin, 3)``; ``(n_skin,)``."""
         centres = self._mean @ data.site_xpos[self._crossing_site]
         along = np.empty_like(centres)
         along[1:-1] = centres[:-2] - centres[2:]

@@ -79,6 +79,8 @@ class Skin:
         self.side = sides_of(rest_m[:, 1], rest_m[:, 2] - radius_m)
         self._n_segments = n_segments
         self._surface = surface
+        self._member = np.eye(n_segments)[segment]
+        self._quarter = len(SIDES) * segment + self.side
 
     def felt(
         self, so_far: Touch, ground_N: Array, before_m: Array, after_m: Array, axis: Array, time_s: float
@@ -93,28 +95,35 @@ class Skin:
             axis: Unit vectors along the body towards its front at each segment, ``(n_segments, 3)``.
             time_s: How long it took, s.
         """
-        # A few belly vertices touch, of hundreds; sums run in the geoms' order, so that they are always the same bits.
-        touching = np.flatnonzero(ground_N.any(axis=-1))
-        force, segment = ground_N[touching], self.segment[touching]
-        normal = self._surface.normal(before_m[touching])
-        pressure = (force * normal).sum(axis=-1)
-        moved = after_m[touching] - before_m[touching]
-        along = moved - (moved * normal).sum(axis=-1)[:, np.newaxis] * normal
-        forwards = (along * axis[segment]).sum(axis=-1)
-        lost = -(force * along).sum(axis=-1)
-
-        n = self._n_segments
-        quarter = len(SIDES) * segment + self.side[touching]
-        weight = np.bincount(segment, pressure, n)
+        # A few belly vertices touch, of hundreds.
+        touching = np.flatnonzero(_dot(ground_N, ground_N))
+        force, segment = ground_N.take(touching, axis=0), self.segment.take(touching)
+        before = before_m.take(touching, axis=0)
+        normal = self._surface.normal(before)
+        moved = after_m.take(touching, axis=0) - before
+        pressure = _dot(force, normal)
+        along = moved - _dot(moved, normal)[:, np.newaxis] * normal
+        of_each = np.empty((5, len(touching)))
+        of_each[0] = pressure
+        of_each[1] = pressure * _dot(along, axis.take(segment, axis=0))
+        of_each[2] = pressure * np.sqrt(_dot(along, along))
+        of_each[3] = _dot(force, along)
+        of_each[4] = 1.0
+        weight, forwards, way, work, count = of_each @ self._member.take(touching, axis=0)
         carried = np.where(weight > 0.0, weight, 1.0)
-        slid = np.bincount(segment, pressure * np.sqrt((along * along).sum(axis=-1)), n)
+        quarter = np.bincount(self._quarter.take(touching), pressure, self._n_segments * len(SIDES))
         return Touch(
-            normal=np.bincount(quarter, pressure, n * len(SIDES)).reshape(n, len(SIDES)).astype(float, copy=False),
-            count=np.bincount(segment, minlength=n).astype(float),
-            slip_speed=np.bincount(segment, pressure * forwards, n) / carried / time_s,
-            slip_distance=so_far.slip_distance + slid / carried,
-            slip_loss=so_far.slip_loss + np.bincount(segment, lost, n),
+            normal=quarter.reshape(-1, len(SIDES)).astype(float, copy=False),
+            count=count,
+            slip_speed=forwards / (carried * time_s),
+            slip_distance=so_far.slip_distance + way / carried,
+            slip_loss=so_far.slip_loss - work,
         )
+
+
+def _dot(first: Array, second: Array) -> Array:
+    """Scalar products of vectors along the last axis, ``(n,)``."""
+    return np.einsum("ij,ij->i", first, second)
 
 
 def sides_of(left_right_m: Array, up_m: Array) -> NDArray[np.int64]:

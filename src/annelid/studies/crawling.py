@@ -29,7 +29,7 @@ GAITS = ("riddle2025-muscles", "crawler")
 Quantity = Literal["friction", "segments"]
 VALUES: Mapping[Quantity, Mapping[Effort, tuple[float, ...]]] = {
     "friction": {"full": (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5), "quick": (0.1, 0.7)},
-    "segments": {"full": (3, 4, 5, 6, 7, 8, 10, 12), "quick": (3, 6)},
+    "segments": {"full": (3, 4, 5, 6, 8, 10, 12), "quick": (3, 6)},
 }
 LABELS: Mapping[Quantity, str] = {"friction": "friction of the ground", "segments": "number of segments"}
 COLUMNS = {
@@ -37,7 +37,8 @@ COLUMNS = {
     "speed_body_lengths_per_s": "body lengths/s",
     "stride_m": "stride (m)",
     "period_s": "period (s)",
-    "cost_of_transport": "cost of transport",
+    "cost_of_transport_cables": "cost of transport",
+    "cost_of_transport": "the same, net work",
     "slip_ratio": "slip ratio",
 }
 """Numbers of a gait that are written, with their heads in a table."""
@@ -185,7 +186,7 @@ def _line(readings: Sequence[Reading], gait: str, quantity: Quantity) -> Line:
         _name(gait),
         tuple(one.point.value for one in own),
         column("speed_body_lengths_per_s"),
-        column("cost_of_transport"),
+        column("cost_of_transport_cables"),
         column("slip_ratio"),
     )
 

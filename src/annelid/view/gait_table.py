@@ -66,7 +66,7 @@ def _shares(balance: EnergyBalance) -> list[tuple[str, str]]:
     parts = (
         ("held", held),
         ("slip", balance.slip_J),
-        ("contacts and edges", balance.constraints_J),
+        ("other constraints", balance.constraints_J),
         ("damping", balance.damping_J),
         ("integrator", balance.numerical_J),
     )

@@ -157,7 +157,13 @@ class Canvas:
             self._context = None
 
     def draw(
-        self, data: mujoco.MjData, camera: mujoco.MjvCamera, option: mujoco.MjvOption, caption: str = ""
+        self,
+        data: mujoco.MjData,
+        camera: mujoco.MjvCamera,
+        option: mujoco.MjvOption,
+        caption: str = "",
+        *,
+        upright: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:
         """Draws the model in its present posture.
 
@@ -166,6 +172,8 @@ class Canvas:
             camera: Where it is seen from.
             option: What is shown.
             caption: Words in the lower left corner.
+            upright: Rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``; by
+                default the same.
 
         Returns:
             Pixels, shape ``(height, width, 3)``.
@@ -174,6 +182,10 @@ class Canvas:
 
         width, height = self._size
         mujoco.mjv_updateScene(self._model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene)
+        if upright is not None:
+            for eye in self._scene.camera:
+                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ upright
+                eye.forward, eye.up = eye.forward @ upright, eye.up @ upright
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         view = mujoco.MjrRect(0, 0, width, height)
         mujoco.mjr_render(view, self._scene, self._buffers)

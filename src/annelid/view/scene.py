@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import RunConfig, WormBody
+from annelid.config import Floor, RunConfig, WormBody
 from annelid.errors import RunFileError
 from annelid.view.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.view.gl import Canvas, find_backend
@@ -78,7 +78,11 @@ class WormScene:
         self._target[:, 2] = (points[:, :, 2].min() + points[:, :, 2].max()) / 2
         if camera in FIXED:
             self._target[:] = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
-        self._offsets = (points - self._target[:, None]).reshape(-1, 3)
+        self._upright = _upright(run.config)
+        self._offsets = (points - self._target[:, None]).reshape(-1, 3) @ self._upright.T
+        if camera in FIXED:
+            far = fitting_distance(self._offsets, *self._angles, self._aspect) / self._model.stat.extent
+            self._model.vis.map.fogstart, self._model.vis.map.fogend = 2.0 * far, 6.0 * far
         self._canvas = Canvas(self._model, width, height, backend, fine=fine)
 
     def __enter__(self) -> Self:
@@ -101,7 +105,8 @@ class WormScene:
         _pose(self._model, self._posture, self._run.data["qpos"].values[frame])
         self._color_rings(float(self.times_s[frame]))
         self._camera.lookat[:] = self._target[frame]
-        return self._canvas.draw(self._posture, self._camera, self._option, f"{self.times_s[frame]:.2f} s")
+        caption = f"{self.times_s[frame]:.2f} s"
+        return self._canvas.draw(self._posture, self._camera, self._option, caption, upright=self._upright)
 
     def _color_rings(self, time_s: float) -> None:
         activation = self._run.data["activation"].sel(time=time_s, method="nearest").values
@@ -192,6 +197,13 @@ def render_still(
     camera.lookat[:] = target
     with Canvas(model, *size, backend) as canvas:
         return Still(canvas.draw(posture, camera, _options()), target, angles_deg, distance)
+
+
+def _upright(config: RunConfig) -> NDArray[np.float64]:
+    """Returns the rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``."""
+    slope = math.radians(config.arena.slope_deg) if isinstance(config.arena, Floor) else 0.0
+    c, s = math.cos(slope), math.sin(slope)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def _pose(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.float64]) -> None:

@@ -40,11 +40,12 @@ OBJECTIVES: Mapping[str, Objective] = {
     one.name: one
     for one in (
         Objective("speed", "speed (m/s)", "more", 0.0, lambda gait: gait.speed_m_per_s),
-        Objective("cost-of-transport", "cost of transport", "less", 100.0, lambda gait: gait.cost_of_transport),
+        Objective("cost-of-transport", "cost of transport", "less", 100.0, lambda gait: gait.cost_of_transport_cables),
         Objective("slip", "slip ratio", "less", 10.0, lambda gait: gait.slip_ratio),
     )
 }
-"""The objectives. The penalties are worse than any gait that advances: no speed, and a cost and a slip beyond reach."""
+"""The objectives. The cost of transport is that of the cables, as the authors state it. The penalties are worse than
+any gait that advances: no speed, and a cost and a slip beyond reach."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,19 +83,18 @@ def objectives_of(names: list[str]) -> list[Objective]:
 def judge(outcome: Outcome, gait: Gait | None) -> Judged:
     """Judges a run: it must have ended whole, in order, over at least two cycles, and advance.
 
-    In order are segments that contract 1-2-..-N again and again, or in a wave (of any number of fronts) that the score
-    of the rhythm calls ordered; the spacing of the onsets does not matter.
+    In order are neighbours that take turns with steady periods and lags; onsets need not be evenly spaced.
     """
     return Judged(gait, _problem(outcome, gait))
 
 
 def _problem(outcome: Outcome, gait: Gait | None) -> str:
-    rhythm, summary = outcome.rhythm, outcome.summary
+    rhythm = outcome.rhythm
     if outcome.message:
         return f"stopped: {outcome.message}"
     if rhythm.verdict == "silent":
         return f"silent: {rhythm.reason}"
-    if rhythm.verdict != "ordered" and not summary.wave:
+    if not rhythm.is_regular:
         return f"out of order: {rhythm.reason}"
     if gait is None or gait.cycles < LEAST_CYCLES:
         return f"fewer than {LEAST_CYCLES} whole cycles"

@@ -12,7 +12,7 @@ import numpy as np
 
 from annelid.config import toml_value
 from annelid.studies.tune.judge import OBJECTIVES, Objective
-from annelid.studies.tune.search import UNTUNED, Task, Trial, best, compromise, front
+from annelid.studies.tune.search import START, Task, Trial, best, compromise, front
 from annelid.studies.tune.space import value_at
 from annelid.view.figures.tuning import Mark, pareto_figure, progress_figure
 from annelid.view.output import whole_file
@@ -24,8 +24,8 @@ HISTORY, BEST, FRONT, FIGURE = "trials.csv", "best.toml", "front", "tuning"
 _ROWS = {
     "speed (m/s)": "speed_m_per_s",
     "body lengths/s": "speed_body_lengths_per_s",
-    "cost of transport": "cost_of_transport",
-    "the same, by cables": "cost_of_transport_cables",
+    "cost of transport": "cost_of_transport_cables",
+    "the same, net work": "cost_of_transport",
     "slip ratio": "slip_ratio",
     "period (s)": "period_s",
     "cycles": "cycles",
@@ -46,7 +46,7 @@ def write_results(task: Task, trials: Sequence[Trial], command: str, folder: Pat
 
     Args:
         task: What is tuned.
-        trials: All trials so far, the untuned gait first.
+        trials: All trials so far, the start first.
         command: The command line that makes them.
         folder: Where to.
 
@@ -99,7 +99,7 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> None:
     before = task.start.config
     is_file = task.source.endswith(".toml")
     source = str(Path(task.source).resolve()) if is_file else task.source
-    lines = [f"# Tuned by: {command}", f"# {'Trial ' if trial.number != UNTUNED else ''}{_name(trial)}:"]
+    lines = [f"# Tuned by: {command}", f"# {'Trial ' if trial.number != START else ''}{_name(trial)}:"]
     lines += [f"#   {label}: {number}" for label, number in gait_lines(trial)]
     lines += [f"extends = {json.dumps(source)}", f"name = {json.dumps(path.stem)}"]
     lines += [f"summary = {json.dumps(f'{before.name}, tuned for {_words(task.objectives)}')}"]
@@ -119,18 +119,18 @@ def gait_lines(trial: Trial) -> list[tuple[str, str]]:
         ("speed (m/s)", _short(gait.speed_m_per_s)),
         ("speed (body lengths/s)", _short(gait.speed_body_lengths_per_s)),
         ("period (s)", _short(gait.period_s)),
-        ("cost of transport", _short(gait.cost_of_transport)),
+        ("cost of transport", _short(gait.cost_of_transport_cables)),
         ("slip ratio", _short(gait.slip_ratio)),
     ]
     return [(label, number) for label, number in found if number]
 
 
 def results_table(task: Task, trials: Sequence[Trial]) -> Table:
-    """Returns the untuned gait and the best ones side by side."""
+    """Returns the gait that was started from and the best ones side by side."""
     from rich.table import Table
 
     leaders = _thinned(front(trials, task.objectives)) if len(task.objectives) == 2 else [chosen(task, trials)]
-    shown = [trials[0], *(one for one in leaders if one is not None and one.number != UNTUNED)]
+    shown = [trials[0], *(one for one in leaders if one is not None and one.number != START)]
     table = Table(title=f"{task.start.config.name}, tuned for {_words(task.objectives)}")
     table.add_column("trial")
     for trial in shown:
@@ -166,7 +166,7 @@ def _built(trial: Trial) -> bool:
 
 
 def _name(trial: Trial) -> str:
-    return "untuned" if trial.number == UNTUNED else str(trial.number)
+    return "start" if trial.number == START else str(trial.number)
 
 
 def _words(objectives: Sequence[Objective]) -> str:

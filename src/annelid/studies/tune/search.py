@@ -16,7 +16,7 @@ from annelid.studies.tune.judge import Judged, Objective, judge
 from annelid.studies.tune.optimiser import optimiser_of
 from annelid.studies.tune.space import Variable, own_values
 
-UNTUNED = -1
+START = -1
 """Number of the gait that the search starts from, which is no trial."""
 
 
@@ -42,7 +42,7 @@ class Task:
 
     @property
     def start(self) -> Case:
-        """The untuned run."""
+        """The run that the search starts from."""
         return Case(self.source, self.changes)
 
     @property
@@ -56,7 +56,7 @@ class Trial:
     """One run of a search.
 
     Attributes:
-        number: Its number, from 0; `UNTUNED` for the gait that the search starts from.
+        number: Its number, from 0; `START` for the gait that the search starts from.
         values: Values of the variables, by field.
         case: The run.
         judged: What was found.
@@ -73,7 +73,7 @@ class Trial:
 def search(
     task: Task, store: Store, *, jobs: int | None = None, progress: StudyProgress | None = None
 ) -> Iterator[list[Trial]]:
-    """Searches, and hands over the trials generation by generation; first the untuned gait alone.
+    """Searches, and hands over the trials generation by generation; first the start alone.
 
     One objective over numbers is searched by CMA-ES, which starts at the source's own values if they lie in the ranges;
     two objectives, or choices among the variables, by a tree-structured Parzen estimator. Generations are asked for
@@ -94,14 +94,14 @@ def search(
 
     Raises:
         MissingDependency: Optuna or cmaes is not installed.
-        AnnelidError: The untuned run cannot be built or written.
+        AnnelidError: The run that it starts from cannot be built or written.
         KeyboardInterrupt: Finished runs are kept.
     """
     optimiser = optimiser_of(task.variables, len(task.objectives), task.own, task.seed)
-    store.compute([task.start], jobs=jobs, progress=_report(progress, "untuned gait", 0, task.n_trials))
-    untuned = _trial(task.start, store, UNTUNED, {})
-    yield [untuned]
-    found = [untuned]
+    store.compute([task.start], jobs=jobs, progress=_report(progress, "the gait it starts from", 0, task.n_trials))
+    first = _trial(task.start, store, START, {})
+    yield [first]
+    found = [first]
     while (done := len(found) - 1) < task.n_trials:
         values = optimiser.ask()[: task.n_trials - done]
         cases = [task.start.but(of_trial) for of_trial in values]
@@ -123,8 +123,11 @@ def best(trials: Sequence[Trial], objective: Objective) -> Trial | None:
 
 
 def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Trial]:
-    """Returns the Pareto front: those that walk and that no other beats in both objectives, by the first of them."""
-    walking = [trial for trial in trials if not trial.judged.problem]
+    """Returns the Pareto front: those that walk and that no other beats in both objectives, by the first of them.
+
+    Of trials with the same run the first is taken: one of them may have the start's own values.
+    """
+    walking = list({trial.path: trial for trial in reversed(trials) if not trial.judged.problem}.values())
     marks = {trial.number: scores(trial, objectives) for trial in walking}
     kept = [
         trial for trial in walking if not any(_dominates(marks[other.number], marks[trial.number]) for other in walking)

@@ -77,6 +77,12 @@ _CONTROLLERS: Mapping[str, tuple[str, ...]] = {
         "sensor.tolerance_m=0.001:0.03:log",
         "sensor.hysteresis_m=0:0.02",
     ),
+    "sns-pressure": (
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "controller.hold=0:2",
+        "controller.release=0:6",
+        "sensor.tolerance_m=0.001:0.03:log",
+    ),
     "sns-robust": ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log"),
     "sine": ("controller.period_s=0.8:10:log", "controller.waves=1:3"),
     "timed": (

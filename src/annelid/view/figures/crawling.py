@@ -64,8 +64,8 @@ def crawling_figure(lines: Mapping[str, Sequence[Line]], stem: str | Path) -> Pa
             row[0].set_ylabel(label)
             for axes, of_quantity in zip(row, lines.values(), strict=True):
                 _draw(axes, of_quantity, name)
-                axes.set_ylim(bottom=0.0)
                 panel_title(axes, f"{next(letters)})")
+            row[0].set_ylim(bottom=0.0)
         for axes, label in zip(grid[-1], lines, strict=True):
             axes.set_xlabel(label)
         handles, labels = grid[0, 0].get_legend_handles_labels()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.track import Track, track_of
-from annelid.config import CourseTurning, RunConfig
+from annelid.config import CourseTurning, Floor, RunConfig
 from annelid.view.canvas import WIDTH_IN, canvas, save
 from annelid.view.plots import plot_path
 from annelid.view.style import panel_title
@@ -22,12 +22,13 @@ N_OUTLINES = 6
 """Outlines drawn, the first and the last posture among them."""
 FIRST, LAST = "#9bb0c9", "#1b2a6b"
 FRONT = "#c2410c"
-_EDGE_IN = 1.1
+WALL = "#bf784d"
+_EDGE_IN = 1.3
 """Room that labels take beside the plot, inches."""
 
 
 def track_figure(run: Run, path: str | Path) -> Path:
-    """Draws where a 3D worm crawled: middle, front, outlines from light to dark, and waypoints.
+    """Draws where a 3D worm crawled: middle, front, outlines from light to dark, walls and waypoints.
 
     Both axes have the same scale. The plot is turned so that the worm starts out to the left and its left is below, as
     it is seen from above.
@@ -50,7 +51,7 @@ def track_figure(run: Run, path: str | Path) -> Path:
         draw_marks(axes, run.config)
         reached = f"{track.time_s[-1]:g} s"
         panel_title(axes, f"{run.config.name}: track of {reached}, seen from above")
-        axes.legend(loc="upper right", bbox_to_anchor=(1.0, -0.12), ncols=4, borderaxespad=0.0)
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
         return save(figure, path)
 
 
@@ -74,9 +75,15 @@ def draw_track(axes: Axes, track: Track, label: str = "middle of the body", colo
 
 
 def draw_marks(axes: Axes, config: RunConfig) -> None:
-    """Draws waypoints, each with the circle within which it counts as reached."""
+    """Draws posts and guard rails, and waypoints with the circle within which each counts as reached."""
     from matplotlib.patches import Circle
 
+    if isinstance(config.arena, Floor):
+        for x, y, radius in config.arena.posts or ():
+            axes.add_patch(Circle((x, y), radius, facecolor=WALL, edgecolor="none"))
+        if config.arena.rail_gap_m is not None:
+            for side in (-0.5, 0.5):
+                axes.axhline(side * config.arena.rail_gap_m, color=WALL, linewidth=2.0)
     if isinstance(config.turning, CourseTurning):
         for number, point in enumerate(config.turning.waypoints, start=1):
             axes.add_patch(Circle(point, config.turning.reach_m, fill=False, color="0.6", linestyle=":"))
@@ -88,5 +95,7 @@ def _height_in(track: Track, config: RunConfig) -> float:
     points = track.crossing_m[..., :2].reshape(-1, 2)
     if isinstance(config.turning, CourseTurning):
         points = np.concatenate([points, config.turning.waypoints])
+    if isinstance(config.arena, Floor) and config.arena.posts:
+        points = np.concatenate([points, [post[:2] for post in config.arena.posts]])
     width, height = np.ptp(points, axis=0)
     return float(np.clip((WIDTH_IN - _EDGE_IN) * height / width + _EDGE_IN, 2.6, 8.5))

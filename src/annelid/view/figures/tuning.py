@@ -11,7 +11,7 @@ import numpy as np
 from annelid.view.canvas import canvas, save_both
 from annelid.view.style import segment_colors
 
-_DOT, _BEST, _UNTUNED, _ = segment_colors(4)
+_DOT, _BEST, _START, _ = segment_colors(4)
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Mark:
     """One trial.
 
     Attributes:
-        number: Its number, negative for the untuned gait.
+        number: Its number, negative for the gait that the search starts from.
         values: Its value of each objective.
         walks: Whether it walks.
     """
@@ -56,7 +56,7 @@ def progress_figure(marks: Sequence[Mark], label: str, more_is_better: bool, ste
             axes.step(numbers, best, where="post", color=_BEST, label="best so far")
         for mark in marks:
             if mark.number < 0 and mark.walks:
-                axes.axhline(mark.values[0], color=_UNTUNED, linestyle=(0, (4, 3)), label="untuned")
+                axes.axhline(mark.values[0], color=_START, linestyle=(0, (4, 3)), label="start")
         if failed:
             floor = axes.get_xaxis_transform()
             axes.plot(failed, np.zeros(len(failed)), "|", color="0.5", transform=floor, clip_on=False, label="no gait")
@@ -88,8 +88,8 @@ def pareto_figure(marks: Sequence[Mark], front: Collection[int], labels: tuple[s
         tuned = [mark.values for mark in walking if mark.number >= 0]
         axes.plot(*_columns(tuned), "o", color="0.65", markersize=3.5, label="a gait")
         axes.plot(*_columns([mark.values for mark in on_front]), "o-", color=_BEST, markersize=4.5, label="front")
-        untuned = [mark.values for mark in walking if mark.number < 0]
-        axes.plot(*_columns(untuned), "D", color=_UNTUNED, markersize=7, label="untuned")
+        begun = [mark.values for mark in walking if mark.number < 0]
+        axes.plot(*_columns(begun), "D", color=_START, markersize=7, label="start")
         axes.set_xlabel(labels[0])
         axes.set_ylabel(labels[1])
         figure.legend(loc="outside upper center", ncols=3)

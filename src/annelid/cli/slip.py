@@ -1,0 +1,133 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The commands `experiment slip` and `experiment slip-detector`."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.errors import RunFileError
+
+if TYPE_CHECKING:
+    from annelid.studies.progress import StudyProgress
+    from annelid.studies.store import Store
+
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")]
+FOLDER = Path("slip")
+
+
+@contextmanager
+def _study(command: str, output: Path, quick: bool, quiet: bool) -> Iterator[tuple[Store, StudyProgress | None]]:
+    """Opens the store with a progress display; on Ctrl-C tells how to go on."""
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            yield store, progress
+    except KeyboardInterrupt:
+        again = shlex.join(["annelid", "experiment", command, "-o", str(output), *(["--quick"] if quick else [])])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def slip_command(
+    output: Output = FOLDER,
+    quick: Annotated[bool, typer.Option("--quick", help="Two frictions only.")] = False,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure what pressure feedback saves of the work lost to friction.
+
+    The six-segment worm (preset riddle2025-muscles) crawls on several frictions with the paper's network, with our
+    extension neurons, and with pressure neurons too (controller sns-pressure). Speed and loss are those of whole
+    cycles. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Eighteen runs of about
+    ten seconds each; docs/slip.md explains the results.
+
+    \b
+    annelid experiment slip --quick
+    annelid experiment slip -o slip
+    """
+    import numpy as np
+    from rich.console import Console
+
+    from annelid.studies.slip.feedback import (
+        FEEDBACKS,
+        FRICTIONS,
+        QUICK,
+        TUNED_AT,
+        feedback_table,
+        slip_feedback,
+        write_readings,
+    )
+    from annelid.view.figures.slip import feedback_figure
+
+    with _study("slip", output, quick, quiet) as (store, progress):
+        readings = slip_feedback(store, QUICK if quick else FRICTIONS, jobs=jobs, progress=progress)
+    if not quiet:
+        Console().print(feedback_table(readings))
+    path = output / "slip.csv"
+    write_readings(readings, path)
+    lines = {}
+    for feedback in FEEDBACKS:
+        judged = [(one.friction, one.cost) for one in readings if one.feedback == feedback and one.cost is not None]
+        rows = np.array([(friction, cost.loss_J_per_m, cost.speed_m_per_s) for friction, cost in judged])
+        if len(rows):
+            lines[feedback] = (rows[:, 0], rows[:, 1], rows[:, 2])
+    for written in (path, feedback_figure(lines, TUNED_AT, path.with_suffix(""))):
+        typer.echo(written)
+
+
+def slip_detector_command(
+    output: Output = FOLDER,
+    quick: Annotated[bool, typer.Option("--quick", help="Two runs only.")] = False,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+) -> None:
+    """Judge the slip detector, which knows stretch and pressure only, by the slip that the simulator knows of.
+
+    The six-segment worm crawls by several controllers on several frictions. A segment truly slips while what touches
+    of it moves at more than 5 cm/s along the body. Tells precision, recall, delay and false alarms of the detector as
+    it is set, and precision against recall over all limits. Writes slip_detector.csv, .png and .svg, and keeps runs,
+    which it shares with `annelid experiment slip`; docs/slip.md explains the results.
+
+    \b
+    annelid experiment slip-detector --quick
+    annelid experiment slip-detector -o slip
+    """
+    from rich.console import Console
+
+    from annelid.analysis.detector import score
+    from annelid.studies.slip.detection import (
+        LIMIT_M_PER_S,
+        QUICK,
+        curves,
+        detection_table,
+        scores,
+        slip_detection,
+        write_scores,
+    )
+    from annelid.view.figures.slip import detector_figure
+
+    with _study("slip-detector", output, quick, quiet) as (store, progress):
+        detections = slip_detection(store, QUICK if quick else None, jobs=jobs, progress=progress)
+    told = scores(detections)
+    if not quiet:
+        Console().print(detection_table(told))
+    path = output / "slip_detector.csv"
+    write_scores(told, path)
+    together = score(list(detections.values()), LIMIT_M_PER_S)
+    chosen = together.recall, together.precision
+    for written in (path, detector_figure(curves(detections), chosen, path.with_suffix(""))):
+        typer.echo(written)

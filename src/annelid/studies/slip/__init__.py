@@ -1,0 +1,1 @@
+"""Slip: what pressure feedback saves, and how well a robot can tell that it slips."""

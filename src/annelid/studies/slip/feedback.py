@@ -1,0 +1,177 @@
+"""What pressure feedback saves: the same six-segment worm with and without it, over frictions.
+
+The body is that of preset ``riddle2025-muscles``, the network that of its controller. Feedback was tuned by hand at one
+friction, `TUNED_AT`; every other one is a test.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from annelid.analysis.slip import SlipCost, slip_cost
+from annelid.config import load_config
+from annelid.studies.case import Case
+from annelid.studies.store import Store
+from annelid.view.output import whole_file
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+PRESET = "riddle2025-muscles"
+TUNED_AT = 0.7
+"""Friction at which the feedback was tuned."""
+FRICTIONS = (0.3, 0.5, 0.7, 1.0, 1.2, 1.5)
+QUICK = (0.7, 1.0)
+DURATION_S = 14.0
+"""Long enough for four whole cycles behind the first two contractions of segment 1."""
+PLAIN, EXTENSION, PRESSURE = "none", "extension", "pressure and extension"
+FEEDBACKS = (PLAIN, EXTENSION, PRESSURE)
+"""What is fed back beside the paper's stretch sensors: nothing, the first half of our design, all of it."""
+COLUMNS = (
+    "feedback",
+    "friction",
+    "cycles",
+    "period_s",
+    "speed_m_per_s",
+    "loss_W",
+    "loss_J_per_m",
+    "faster_percent",
+    "saved_per_s_percent",
+    "saved_per_m_percent",
+    "one_wave",
+)
+
+Progress = Callable[[str, int, int, float], object]
+"""Called with the stage, the number of runs done, their total, and the share of the work that is done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One run.
+
+    Attributes:
+        feedback: One of `FEEDBACKS`.
+        friction: Of the floor.
+        cost: Speed and loss; None where there are no whole cycles to judge.
+        one_wave: Whether the segments contract in order, in one wave from front to rear.
+    """
+
+    feedback: str
+    friction: float
+    cost: SlipCost | None
+    one_wave: bool
+
+
+def case(feedback: str, friction: float) -> Case:
+    """Returns the run of one kind of feedback, one of `FEEDBACKS`, on one friction."""
+    changes: dict[str, Any] = {"arena.friction": friction, "duration_s": DURATION_S}
+    if feedback != PLAIN:
+        changes["controller"] = {"kind": "sns-pressure", "network": load_config(PRESET).controller.model_dump()}
+    if feedback == EXTENSION:
+        changes["controller"]["hold"] = 0.0
+    return Case(PRESET, changes)
+
+
+def slip_feedback(
+    store: Store, frictions: Sequence[float], *, jobs: int | None = None, progress: Progress | None = None
+) -> list[Reading]:
+    """Runs the worm with every feedback on every friction, as far as the store does not have it.
+
+    Args:
+        store: Where runs are kept.
+        frictions: Frictions of the floor.
+        jobs: Runs at a time, by default as many as there are cores.
+        progress: Called at the start and after every run.
+
+    Returns:
+        One reading a run, friction by friction.
+
+    Raises:
+        AnnelidError: A run cannot be made.
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    cases = {(friction, feedback): case(feedback, friction) for friction in frictions for feedback in FEEDBACKS}
+    tell = None if progress is None else lambda done, total, share: progress("feedback", done, total, share)
+    store.compute(cases.values(), jobs=jobs, progress=tell)
+    return [
+        Reading(feedback, friction, slip_cost(store.run(one)), store[one].rhythm.is_one_wave)
+        for (friction, feedback), one in cases.items()
+    ]
+
+
+def percent(value: float, of: float) -> float:
+    """By how much a value is above another one, in percent of that."""
+    return 100.0 * (value / of - 1.0)
+
+
+def compared(readings: Sequence[Reading], reading: Reading) -> tuple[float, float, float] | None:
+    """Compares a reading with that without feedback on the same friction.
+
+    Returns:
+        Speed gained, loss saved over time, and loss saved over way, in percent; None where either has no cycles.
+    """
+    [plain] = [one.cost for one in readings if (one.friction, one.feedback) == (reading.friction, PLAIN)]
+    own = reading.cost
+    if plain is None or own is None:
+        return None
+    return (
+        percent(own.speed_m_per_s, plain.speed_m_per_s),
+        -percent(own.loss_W, plain.loss_W),
+        -percent(own.loss_J_per_m, plain.loss_J_per_m),
+    )
+
+
+def write_readings(readings: Sequence[Reading], path: Path) -> None:
+    """Writes one row a run as CSV with a header.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for one in readings:
+            cost, gains = one.cost, compared(readings, one)
+            numbers = (
+                (cost.period_s, cost.speed_m_per_s, cost.loss_W, cost.loss_J_per_m) if cost else (float("nan"),) * 4
+            )
+            writer.writerow(
+                [
+                    one.feedback,
+                    f"{one.friction:g}",
+                    cost.cycles if cost else 0,
+                    *(f"{number:.5g}" for number in (*numbers, *(gains or (float("nan"),) * 3))),
+                    one.one_wave,
+                ]
+            )
+
+
+def feedback_table(readings: Sequence[Reading]) -> Table:
+    """Tabulates speed and loss, and what feedback gains and saves on the same friction."""
+    from rich.table import Table
+
+    table = Table("friction", "feedback", title="slip of the six-segment worm, over whole cycles")
+    for heading in ("cycles", "period (s)", "speed (cm/s)", "loss (W)", "loss (J/m)", "faster", "saved", "saved per m"):
+        table.add_column(heading, justify="right")
+    for one in readings:
+        mark = " (tuned here)" if one.friction == TUNED_AT else ""
+        words = (f"{one.friction:g}{mark}", one.feedback if one.one_wave else f"{one.feedback} (no wave)")
+        cost, gains = one.cost, compared(readings, one)
+        if cost is None:
+            table.add_row(*words, "0")
+            continue
+        told = [f"{gain:+.0f} %" for gain in gains] if gains and one.feedback != PLAIN else []
+        table.add_row(
+            *words,
+            f"{cost.cycles}",
+            f"{cost.period_s:.2f}",
+            f"{100 * cost.speed_m_per_s:.1f}",
+            f"{cost.loss_W:.3f}",
+            f"{cost.loss_J_per_m:.2f}",
+            *told,
+        )
+    return table

@@ -30,7 +30,8 @@ def laid(pipe: Pipe, time_s: np.ndarray, front_m: np.ndarray) -> Track:
         up = np.cross(side, foot.tangent)
         around = np.cos(angle)[:, np.newaxis] * side[:, np.newaxis] + np.sin(angle)[:, np.newaxis] * up[:, np.newaxis]
         crossing[:, ring] = foot.point_m[:, np.newaxis] + RADIUS_M * around
-    return Track(time_s, crossing, GEOMETRY)
+    planes = tuple(int(ring[0]) // GEOMETRY.n_per_plane for ring in GEOMETRY.rings)
+    return Track(time_s, crossing, GEOMETRY.n_per_plane, planes)
 
 
 PIPES = (

@@ -96,7 +96,8 @@ def passage_of(run: Run) -> Passage:
 
 def passage_through(pipe: Pipe, track: Track) -> Passage:
     """Reads a worm's way through a pipe from its track."""
-    centres = np.stack([track.crossing_m[:, ring].mean(axis=1) for ring in track.geometry.rings], axis=1)
+    planes = track.crossing_m.reshape(len(track.time_s), -1, track.n_per_plane, 3)
+    centres = planes[:, list(track.ring_planes)].mean(axis=2)
     arc = course_of(pipe).nearest(centres).arc_m
     return Passage(track.time_s, arc, bore_of(pipe).at(arc)[0], reach_of(pipe))
 

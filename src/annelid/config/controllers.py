@@ -210,6 +210,29 @@ class AdaptiveSns(Section):
     )
 
 
+class DescendingDrive(Section):
+    """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe."""
+
+    lift: Annotated[float, Field(ge=0, lt=0.5)] = Field(
+        default=0.0,
+        description="share of the range to which full drive lifts resting relays; 0: there is no such neuron; 0.45: "
+        "full drive makes six segments' wave 3.9 times as fast",
+    )
+    drive: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="manual drive, to which pressure adds")
+    per_segment: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.5, description="drive that one segment gives whose back is pressed fully"
+    )
+    full_pressure_N: Positive = Field(
+        default=3.0, description="force on a segment's back that presses it fully; about a segment's weight"
+    )
+    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.2, description="time constant of the pressure neurons"
+    )
+    time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.2, description="time constant of the descending neuron"
+    )
+
+
 class PressureSns(Section):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.pressure`.
 
@@ -242,29 +265,6 @@ class PressureSns(Section):
                     f"{getattr(self, high):g}"
                 )
         return self
-
-
-class DescendingDrive(Section):
-    """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe."""
-
-    lift: Annotated[float, Field(ge=0, lt=0.5)] = Field(
-        default=0.0,
-        description="share of the range to which full drive lifts resting relays; 0: there is no such neuron; 0.45: "
-        "full drive makes six segments' wave 3.9 times as fast",
-    )
-    drive: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="manual drive, to which pressure adds")
-    per_segment: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.5, description="drive that one segment gives whose back is pressed fully"
-    )
-    full_pressure_N: Positive = Field(
-        default=3.0, description="force on a segment's back that presses it fully; about a segment's weight"
-    )
-    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant of the pressure neurons"
-    )
-    time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant of the descending neuron"
-    )
 
 
 class RobustSns(Section):

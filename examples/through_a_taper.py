@@ -29,7 +29,13 @@ def main(folder: Path) -> None:
     for name, changes in GAITS.items():
         config = load_config(
             "riddle2025-muscles",
-            {"controller.kind": "sns-robust", **changes, "arena.narrowest": 0.13, "duration_s": 40.0},
+            {
+                "controller.kind": "sns-robust",
+                "controller.let_go": 0.35,
+                **changes,
+                "arena.narrowest": 0.13,
+                "duration_s": 40.0,
+            },
             arena="pipe.taper",
         )
         run = open_run(simulate(config, folder / name, overwrite=True).path)

@@ -165,7 +165,7 @@ def pass_pipes(
         run = store.run(trial.case)
         passage = passage_of(run)
         readings.append(_reading(trial, passage, gait(run), store[trial.case].summary.wave))
-        if trial.arena in NARROW_ARENAS:
+        if trial.gait in (FIXED, ADAPTIVE):
             ways[trial.arena, trial.gait] = Way.of(run, passage)
     return Passages(tuple(readings), ways)
 

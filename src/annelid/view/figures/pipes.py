@@ -98,7 +98,7 @@ def pipes_figure(ways: Mapping[tuple[str, str], Way], bends: Mapping[str, BendLi
             rows = [figure.add_subplot(grid[row, column]) for row in range(3)]
             panel_title(rows[0], f"{pipe}: speed of the middle (cm/s)")
             panel_title(rows[1], "drive of the descending neuron")
-            panel_title(rows[2], "foremost ring (cm), and one as wide as the bore")
+            panel_title(rows[2], "foremost ring (cm); dashed: the bore")
             for gait in gaits:
                 if (pipe, gait) in ways:
                     _draw(rows, ways[pipe, gait], colors[gait], gait)

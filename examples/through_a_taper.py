@@ -16,13 +16,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from annelid import load_config, open_run, simulate
+from annelid import load_config, simulate
 from annelid.analysis.passage import passage_of
 
 GAITS = {"fixed": {}, "adaptive": {"controller.descending.lift": 0.45}}
 
 
-def main(folder: Path) -> None:
+def main(folder: Path, duration_s: float = 40.0) -> None:
     """Runs both worms and lays their ways side by side."""
     table = Table("time (s)", *(f"{name}: front (m)" for name in GAITS), "bore at the front (m)", "drive")
     ways = []
@@ -34,14 +34,14 @@ def main(folder: Path) -> None:
                 "controller.let_go": 0.35,
                 **changes,
                 "arena.narrowest": 0.13,
-                "duration_s": 40.0,
+                "duration_s": duration_s,
             },
             arena="pipe.taper",
         )
-        run = open_run(simulate(config, folder / name, overwrite=True).path)
+        run = simulate(config, folder / name, overwrite=True)
         ways.append(passage_of(run))
     drive = np.interp(ways[-1].time_s, run.data["time"].values, run.data["drive"].values)
-    for k in range(0, len(ways[-1].time_s), len(ways[-1].time_s) // 8):
+    for k in np.linspace(0, len(ways[-1].time_s) - 1, 9).astype(int):
         fronts = (f"{way.front_m[k]:.2f}" for way in ways)
         table.add_row(f"{ways[-1].time_s[k]:.0f}", *fronts, f"{ways[-1].bore_m[k, 0]:.3f}", f"{drive[k]:.2f}")
     Console().print(table)

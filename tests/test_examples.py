@@ -51,3 +51,10 @@ def test_the_course_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     example("round_a_post").main(tmp_path, 1.0)
     assert (tmp_path / "track.png").stat().st_size > 10_000
     assert "after 1 s" in capsys.readouterr().out
+
+
+def test_the_way_through_a_taper_is_laid_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("through_a_taper").main(tmp_path, 1.0)
+    table = capsys.readouterr().out
+    assert "adaptive" in table
+    assert "0.183" in table, "the bore and the clearance where the worm starts"

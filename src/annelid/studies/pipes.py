@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PRESET = "riddle2025-muscles"
 STAGE = "pipes"
 BASE: dict[str, Any] = {"record.signals_interval_s": 0.02, "record.frames_interval_s": 0.1}
-RADII_M = (0.3, 0.6, 1.3)
+RADII_M = (0.3, 0.4, 0.5, 0.6, 0.9, 1.3)
 QUICK_RADII_M = (0.3,)
 
 TURN_S = 0.27

@@ -26,7 +26,7 @@ def pipes_command(
     centre line.
 
     Writes pipes.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes on.
-    22 runs of half a minute to three minutes each; docs/pipes.md explains the results.
+    34 runs of half a minute to three minutes each; docs/pipes.md explains the results.
 
     \b
     annelid experiment pipes --quick

@@ -16,8 +16,6 @@ from annelid import gait, load_config, simulate
 from annelid.view.figures.track import track_figure
 
 COURSE = {
-    "body.rings.layout": "halves",
-    "sensor.tolerance_m": 0.008,
     "arena.posts": [[-2.2, 0.0, 0.15]],
     "turning": {"kind": "course", "waypoints": [[-2.0, -0.7], [-4.4, 0.0]], "shares": [1, 1, -1, -1, 1, 1]},
 }
@@ -25,7 +23,7 @@ COURSE = {
 
 def main(folder: Path, duration_s: float = 42.0) -> None:
     """Simulates the course, draws the track and tells how fast it went."""
-    config = load_config("riddle2025-muscles", COURSE | {"duration_s": duration_s})
+    config = load_config("riddle2025-steered", COURSE | {"duration_s": duration_s})
     run = simulate(config, folder)
     print(track_figure(run, folder / "track.png"))
     speed = gait(run).speed_m_per_s

@@ -25,7 +25,7 @@ MAY_IMPORT = {
     "control": {"config", "nervous"} | BASE,
     "planar": {"config", "morphology"} | BASE,
     "simulation": {"config", "morphology", "arena", "body", "control", "planar", "nervous"} | BASE,
-    "analysis": {"config", "morphology", "body", "control", "simulation"} | BASE,
+    "analysis": {"config", "morphology", "arena", "control", "simulation"} | BASE,
     "view": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
     "studies": {"config", "morphology", "nervous", "body", "simulation", "analysis", "view"} | BASE,
     "cli": {"config", "body", "simulation", "analysis", "view", "studies"} | BASE,

@@ -12,7 +12,7 @@ from annelid.config.arena import SHARED
 from annelid.config.checking import whole_path
 from annelid.errors import ConfigError
 
-OPTIONAL = {"rail_gap_m"}
+OPTIONAL = {"rail_gap_m", "posts"}
 
 
 @pytest.mark.parametrize("name", arena_names())

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from annelid import load_config, open_run, simulate
 from annelid.analysis import rhythm_score
-from annelid.config import RobustSns, RunConfig
+from annelid.config import DescendingDrive, RobustSns, RunConfig
 from annelid.control.robust import RobustController
 from annelid.errors import ConfigError
 from annelid.nervous.robust import ROLES, neuron_names
-from annelid.protocols import Records, Sensation, Stateful, StridingController
+from annelid.protocols import SIDES, Records, Sensation, Stateful, StridingController
 from annelid.simulation.assemble import build_controller, build_plant
 
 N, TIMESTEP_S, REST_M = 4, 0.001, 0.1
@@ -134,3 +138,81 @@ def test_a_control_step_that_is_too_long_is_refused() -> None:
 def test_bad_fields_are_refused(field: str, value: float) -> None:
     with pytest.raises(ConfigError, match=field):
         planar(**{f"controller.{field}": value})
+
+
+def pressed(touch_N: np.ndarray) -> Sensation:
+    return replace(sensation(np.zeros(N)), touch_N=touch_N)
+
+
+def driven(**changes: float) -> RobustController:
+    section = RobustSns(turn_ms=300.0, descending=DescendingDrive(lift=0.45, **changes))
+    return RobustController(section, N, N, TIMESTEP_S)
+
+
+@given(arrays(float, (N, 3), elements=st.floats(0.0, 100.0)))
+@settings(max_examples=10, deadline=None)
+def test_on_open_ground_the_adaptive_wave_is_the_fixed_one(elsewhere: np.ndarray) -> None:
+    fixed = RobustController(RobustSns(turn_ms=300.0), N, N, TIMESTEP_S)
+    touch = np.zeros((N, len(SIDES)))
+    touch[:, [SIDES.index(side) for side in ("belly", "left", "right")]] = elsewhere
+    free, adaptive = sensation(np.zeros(N)), driven()
+    for _ in range(8):
+        assert adaptive.stride(pressed(touch), 100) == pytest.approx(fixed.stride(free, 100), abs=1e-9)
+    assert adaptive.read(frame=False)["drive"] == 0.0
+
+
+def test_pressed_backs_drive_as_the_design_says() -> None:
+    touch = np.zeros((N, len(SIDES)))
+    touch[:2, SIDES.index("back")] = [3.0, 1.5]
+    made = driven(per_segment=0.5, full_pressure_N=3.0)
+    made.stride(pressed(touch), 3000)
+    # Two excitatory synapses of 0.5 Gm R / E_ex each, the second half open, beside the leak.
+    open_uS = 0.5 * 20.0 / 194.0 * 1.5
+    assert made.read(frame=False)["drive"] == pytest.approx(open_uS * 194.0 / (1.0 + open_uS) / 20.0, abs=1e-4)
+    touch[:, SIDES.index("back")] = 100.0
+    made.stride(pressed(touch), 3000)
+    assert made.read(frame=False)["drive"] == 1.0
+
+
+def test_a_drive_is_recorded_and_a_stride_is_its_steps() -> None:
+    touch = np.full((N, len(SIDES)), 2.0)
+    single, striding = driven(), driven()
+    by_steps = [single.step(pressed(touch)) for _ in range(150)]
+    assert np.array_equal(by_steps[-1], striding.stride(pressed(touch), 150))
+    named, values = single.recordable(), single.read(frame=False)
+    assert {signal.name: signal.shape for signal in named.signals} == {name: np.shape(v) for name, v in values.items()}
+    assert "drive" not in controller().read(frame=False)
+
+
+def test_a_body_without_skin_feels_no_pressure() -> None:
+    made = driven()
+    made.stride(sensation(np.zeros(N)), 500)
+    assert made.read(frame=False)["drive"] == 0.0
+
+
+def test_motor_neurons_let_go_with_their_time_constant() -> None:
+    section = RobustSns(turn_ms=300.0, let_go_s=0.35)
+    made, plain = (RobustController(each, N, N, TIMESTEP_S) for each in (section, RobustSns(turn_ms=300.0)))
+    rest = sensation(np.zeros(N))
+    contracted, own = np.array([[plain.step(rest)[0], made.step(rest)[0]] for _ in range(900)]).T
+    assert own[290] == pytest.approx(1.0, abs=0.01)
+    # The contraction neuron falls within some milliseconds; from then on Euler's steps shrink the rest alike.
+    end = int(np.flatnonzero(contracted > 0.5)[-1]) + 30
+    later = own[end : end + 200]
+    assert later[1:] / later[:-1] == pytest.approx(np.full(199, 1.0 - 0.001 / 0.35), rel=1e-9)
+    assert later[0] > 0.8
+
+
+def test_motor_neurons_outlast_turns_but_do_not_change_them() -> None:
+    section = RobustSns(turn_ms=300.0, let_go_s=0.35, descending=DescendingDrive(lift=0.45))
+    made, plain = RobustController(section, N, 2 * N, TIMESTEP_S), driven()
+    touch = np.full((N, len(SIDES)), 1.0)
+    for _ in range(20):
+        activation = made.stride(pressed(touch), 50)
+        plain.stride(pressed(touch), 50)
+        assert np.array_equal(activation[::2], activation[1::2])
+        assert activation.min() >= 0.0
+        assert activation.max() <= 1.0
+    roles = slice(0, N * len(ROLES))
+    own, other = (np.asarray(one.read(frame=False)["potential"])[roles] for one in (made, plain))
+    assert own == pytest.approx(other, abs=1e-6)

@@ -9,7 +9,6 @@ from annelid.cli.paper import paper_command
 from annelid.cli.results import plot, render, show
 from annelid.cli.robustness import robustness_command
 from annelid.cli.run import run_command
-from annelid.cli.slip import slip_command, slip_detector_command
 from annelid.cli.tune import tune_command
 from annelid.cli.worm import arenas, build, doctor, presets
 
@@ -33,6 +32,4 @@ for _name, _command in (
     ("doctor", doctor),
 ):
     app.command(_name)(_command)
-experiment.command("slip")(slip_command)
-experiment.command("slip-detector")(slip_detector_command)
 app.add_typer(experiment, name="experiment")

@@ -11,6 +11,7 @@ from annelid.config.checking import check_config, field_paths, fields_of
 from annelid.config.controllers import (
     AdaptiveSns,
     Contraction,
+    DescendingDrive,
     HeteroclinicChannel,
     PhaseChain,
     PressureSns,
@@ -57,6 +58,7 @@ __all__ = [
     "Contraction",
     "CourseTurning",
     "Daltorio2013Body",
+    "DescendingDrive",
     "DynamicPlanarWorm",
     "Fidelity",
     "Floor",

@@ -210,6 +210,29 @@ class AdaptiveSns(Section):
     )
 
 
+class DescendingDrive(Section):
+    """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe."""
+
+    lift: Annotated[float, Field(ge=0, lt=0.5)] = Field(
+        default=0.0,
+        description="share of the range to which full drive lifts resting relays; 0: there is no such neuron; 0.45: "
+        "full drive makes six segments' wave 3.9 times as fast",
+    )
+    drive: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="manual drive, to which pressure adds")
+    per_segment: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.5, description="drive that one segment gives whose back is pressed fully"
+    )
+    full_pressure_N: Positive = Field(
+        default=3.0, description="force on a segment's back that presses it fully; about a segment's weight"
+    )
+    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.2, description="time constant of the pressure neurons"
+    )
+    time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.2, description="time constant of the descending neuron"
+    )
+
+
 class PressureSns(Section):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.pressure`.
 
@@ -248,7 +271,8 @@ class RobustSns(Section):
     """A peristalsis network whose rhythm goes on whatever its sensors say: `annelid.nervous.robust`.
 
     All contraction neurons suppress each other, a slow relay counts each turn, and the stretch sensors entrain it
-    within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used.
+    within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used. With
+    ``descending.lift`` the wave adapts to narrow pipes: `annelid.nervous.driven`.
     """
 
     kind: Literal["sns-robust"] = "sns-robust"
@@ -281,6 +305,12 @@ class RobustSns(Section):
         default="design",
         description="state of the network at the start: segment 1 contracted, all neurons at rest, or drawn by seed",
     )
+    let_go_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=0.0,
+        description="time constant with which motor neurons let go, so that several segments share the wave; 0: there "
+        "are none, and contraction and expansion neurons drive the muscles",
+    )
+    descending: DescendingDrive = DescendingDrive()
 
 
 ControllerSection = Annotated[

@@ -8,16 +8,21 @@ from annelid import config as settings
 from annelid.control.neural import NeuralController, design_of
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
+from annelid.nervous.adaptive import DRIVE_NEURON
+from annelid.nervous.driven import MOTOR, MOTOR_SHARE, DriveParameters, add_motor_neurons, driven_robust_network
 from annelid.nervous.robust import ROLES, RobustParameters, robust_network
-from annelid.protocols import Array, Recordable, Sensation, Signal, Values
+from annelid.protocols import SIDES, Array, Recordable, Sensation, Signal, Values
+
+BACK = SIDES.index("back")
 
 
 class RobustController(NeuralController):
-    """Drives a worm by `annelid.nervous.robust`.
+    """Drives a worm by `annelid.nervous.robust`, or with a drive by `annelid.nervous.driven`.
 
     One step, from t to t + dt: the segments' mean lengthening at t, graded and clipped, drives the stretch neurons
     during the whole step; activation is ``1 / (1 + exp(-slope (U1 - U2)))`` of the contraction and expansion neurons at
-    t + dt. Nothing but potentials and gates is remembered.
+    t + dt, or that of the motor neurons, if there are any. The forces of the ground on the segments' backs drive the
+    pressure neurons likewise, if there are any. Nothing but potentials and gates is remembered.
 
     Raises:
         ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, network parameters for
@@ -35,7 +40,14 @@ class RobustController(NeuralController):
         """
         self._config = config
         self._parameters = design_of(RobustParameters, config)
-        network = robust_network(n_segments, self._parameters)
+        drive = config.descending
+        network = (
+            driven_robust_network(n_segments, self._parameters, _pathway(drive))
+            if drive.lift
+            else robust_network(n_segments, self._parameters)
+        )
+        if config.let_go_s:
+            add_motor_neurons(network, n_segments, self._parameters, 1e3 * config.let_go_s)
         longest_s = network.stable_timestep_ms() / 1e3
         if control_timestep_s > longest_s:
             raise ConfigError(
@@ -51,6 +63,9 @@ class RobustController(NeuralController):
             scheme=config.scheme,
             slope_per_mV=config.activation_slope_per_mV,
         )
+        neurons = self._stepper.arrays.neurons
+        first = neurons.index(f"{MOTOR}_1") if config.let_go_s else len(neurons)
+        self._motor = slice(first, first + n_segments)
         self._full_nA = config.leak_conductance_uS * config.range_mV
         self.reset(0)
 
@@ -98,8 +113,24 @@ class RobustController(NeuralController):
         Returns:
             Activation after the last step, as `step` returns it.
         """
-        self._stepper.advance(self._state, self._full_nA * self._stretch(sensation), n_steps)
+        inputs = self._stretch(sensation)
+        if self._config.descending.lift:
+            inputs = np.concatenate([inputs, [self._config.descending.drive], self._pressure(sensation)])
+        self._stepper.advance(self._state, self._full_nA * inputs, n_steps)
         return self._activation(self._state.potential[0])
+
+    def _pressure(self, sensation: Sensation) -> Array:
+        """Force on every segment's back over its full scale, in [0, 1], ``(n_segments,)``; 0 for one without skin."""
+        if not len(sensation.touch_N):
+            return np.zeros(self._n_segments)
+        return np.clip(sensation.touch_N[:, BACK] / self._config.descending.full_pressure_N, 0.0, 1.0)
+
+    def _activation(self, potential: Array) -> Array:
+        """Activation of every muscle, ``(.., n_muscles)``: the motor neurons' activity, if there are any."""
+        if not self._config.let_go_s:
+            return super()._activation(potential)
+        full = MOTOR_SHARE * self._parameters.range_mV
+        return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_a_segment, axis=-1)
 
     def _stretch(self, sensation: Sensation) -> Array:
         """Mean lengthening of every segment over its full scale, in [0, 1], ``(n_segments,)``."""
@@ -109,10 +140,12 @@ class RobustController(NeuralController):
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and the stretch neurons' activity."""
         stretch = Signal("stretch_activity", ("segment",), (self._n_segments,), "1", "activity of the stretch neuron")
+        drive = Signal("drive", (), (), "1", "activity of the descending neuron")
         return self._named(
             self._potential_signal(),
             self._sodium_gate_signal(),
             stretch,
+            *([drive] if self._config.descending.lift else []),
             controller="robust synthetic nervous system",
             turn_ms=self._parameters.turn_ms,
         )
@@ -123,8 +156,18 @@ class RobustController(NeuralController):
             return {}
         potential = self._potential()
         stretch = potential[self._of_role["stretch"]]
-        return {
+        values: dict[str, Array | float] = {
             "potential": potential,
             "sodium_gate": self._sodium_gate(),
             "stretch_activity": np.clip(stretch / self._parameters.range_mV, 0.0, 1.0),
         }
+        if self._config.descending.lift:
+            descending = float(potential[self._stepper.arrays.neurons.index(DRIVE_NEURON)])
+            values["drive"] = min(max(descending / self._parameters.range_mV, 0.0), 1.0)
+        return values
+
+
+def _pathway(drive: settings.DescendingDrive) -> DriveParameters:
+    return DriveParameters(
+        drive.lift, drive.per_segment, 1e3 * drive.time_constant_s, 1e3 * drive.pressure_time_constant_s
+    )

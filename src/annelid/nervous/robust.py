@@ -44,11 +44,11 @@ ROLES = ("contraction", "expansion", "hold", "relay", "stretch", "habit")
 TONIC_NEURON = "tonic"
 """The neuron that excites the first contraction neuron."""
 
-_THRESHOLD = 0.5
+THRESHOLD = 0.5
 """The relay begins to end the next segment's hold at this share of R."""
 _WINDOW = 0.05
 """It ends it altogether this share of R above."""
-_DISCHARGE = 4.0
+DISCHARGE = 4.0
 """The next contraction multiplies the relay's conductance by one more than this."""
 
 
@@ -152,7 +152,7 @@ def yield_opening(p: RobustParameters) -> float:
 
 def yield_mV(p: RobustParameters) -> float:
     """Potential U* of the relay at which the next segment's hold yields, mV, from `yield_opening`."""
-    return p.range_mV * (_THRESHOLD + _WINDOW * yield_opening(p))
+    return p.range_mV * (THRESHOLD + _WINDOW * yield_opening(p))
 
 
 def tonic_nA(p: RobustParameters) -> float:
@@ -229,10 +229,10 @@ def _join_segment(network: Network, p: RobustParameters, segment: int, n_segment
     for other in range(1, n_segments + 1):
         if other != segment:
             network.add_synapse(contraction, f"hold_{other}", suppression)
-    opening = _THRESHOLD * p.range_mV, (_THRESHOLD + _WINDOW) * p.range_mV
+    opening = THRESHOLD * p.range_mV, (THRESHOLD + _WINDOW) * p.range_mV
     network.add_synapse(relay, f"hold_{following}", Synapse(p.release_uS, p.inhibitory_reversal_mV, *opening))
     if following != 1:
         push_uS = p.push_nA / p.excitatory_reversal_mV
         network.add_synapse(relay, f"contraction_{following}", Synapse(push_uS, p.excitatory_reversal_mV, *opening))
-    discharge = Synapse(_DISCHARGE * (p.leak_conductance_uS + p.charge_uS), 0.0, 0.0, p.range_mV)
+    discharge = Synapse(DISCHARGE * (p.leak_conductance_uS + p.charge_uS), 0.0, 0.0, p.range_mV)
     network.add_synapse(f"contraction_{following}", relay, discharge)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -18,7 +17,7 @@ from annelid.studies.store import Store
 from annelid.studies.tune.judge import Judged
 from annelid.studies.tune.search import judged_run
 from annelid.view.figures.crawling import Line, crawling_figure
-from annelid.view.output import whole_file
+from annelid.view.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -142,12 +141,12 @@ def write_readings(readings: Sequence[Reading], path: Path) -> None:
     Raises:
         RunFileError: The file cannot be written.
     """
-    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["gait", "quantity", "value", *COLUMNS, "problem"])
-        for reading in readings:
-            point, numbers = reading.point, [_short(reading.number(name)) for name in COLUMNS]
-            writer.writerow([point.gait, point.quantity, f"{point.value:g}", *numbers, reading.judged.problem])
+    write_csv(path, ["gait", "quantity", "value", *COLUMNS, "problem"], map(_cells, readings))
+
+
+def _cells(reading: Reading) -> list[str]:
+    point, numbers = reading.point, [_short(reading.number(name)) for name in COLUMNS]
+    return [point.gait, point.quantity, f"{point.value:g}", *numbers, reading.judged.problem]
 
 
 def crawling_table(readings: Sequence[Reading], quantity: Quantity) -> Table:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from annelid.studies.case import Case
 from annelid.studies.progress import StudyProgress
 from annelid.studies.store import Store
 from annelid.view.figures.turning import turning_figure
-from annelid.view.output import whole_file
+from annelid.view.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -203,8 +202,4 @@ def turning_picture(turned: Turned, stem: str | Path) -> Path:
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
     """Writes readings as CSV, one row each; returns the path."""
-    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, fieldnames=list(Reading.__slots__))
-        writer.writeheader()
-        writer.writerows(asdict(reading) for reading in readings)
-    return path
+    return write_csv(path, Reading.__slots__, map(astuple, readings))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -38,6 +39,27 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         if not direct:
             with suppress(OSError):
                 draft.unlink()
+
+
+def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Path:
+    """Writes a table as CSV with a header.
+
+    Args:
+        path: The file to write.
+        columns: Names of the columns.
+        rows: Values of each row; None leaves a cell empty.
+
+    Returns:
+        The path.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+    return path
 
 
 def with_suffix(path: str | Path, suffixes: tuple[str, ...], what: str, default: str | None = None) -> Path:

@@ -5,7 +5,6 @@ The detector's constants were chosen on one run, `CHOSEN_ON`; the others test it
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
@@ -18,7 +17,7 @@ from annelid.morphology import Array
 from annelid.studies.case import Case
 from annelid.studies.slip.feedback import DURATION_S, PLAIN, PRESET, PRESSURE, Progress, case
 from annelid.studies.store import Store
-from annelid.view.output import whole_file
+from annelid.view.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -82,10 +81,8 @@ def write_scores(told: Mapping[str, Score], path: Path) -> None:
     Raises:
         RunFileError: The file cannot be written.
     """
-    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["run", *(field.name for field in fields(Score))])
-        writer.writerows([name, *(f"{number:.5g}" for number in astuple(one))] for name, one in told.items())
+    rows = ([name, *(f"{number:.5g}" for number in astuple(one))] for name, one in told.items())
+    write_csv(path, ["run", *(field.name for field in fields(Score))], rows)
 
 
 def detection_table(told: Mapping[str, Score]) -> Table:

@@ -6,7 +6,6 @@ was tuned by hand on `PRESET` at one friction, `TUNED_AT`; every other friction 
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.studies.case import Case
 from annelid.studies.store import Store
-from annelid.view.output import whole_file
+from annelid.view.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -143,23 +142,14 @@ def write_readings(readings: Sequence[Reading], path: Path) -> None:
     Raises:
         RunFileError: The file cannot be written.
     """
-    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for one in readings:
-            cost, gains = one.cost, compared(readings, one)
-            numbers = (
-                (cost.period_s, cost.speed_m_per_s, cost.loss_W, cost.loss_J_per_m) if cost else (float("nan"),) * 4
-            )
-            writer.writerow(
-                [
-                    one.feedback,
-                    f"{one.friction:g}",
-                    cost.cycles if cost else 0,
-                    *(f"{number:.5g}" for number in (*numbers, *(gains or (float("nan"),) * 3))),
-                    one.one_wave,
-                ]
-            )
+    write_csv(path, COLUMNS, (_cells(one, readings) for one in readings))
+
+
+def _cells(one: Reading, readings: Sequence[Reading]) -> list[object]:
+    cost, gains = one.cost, compared(readings, one)
+    numbers = (cost.period_s, cost.speed_m_per_s, cost.loss_W, cost.loss_J_per_m) if cost else (float("nan"),) * 4
+    texts = [f"{number:.5g}" for number in (*numbers, *(gains or (float("nan"),) * 3))]
+    return [one.feedback, f"{one.friction:g}", cost.cycles if cost else 0, *texts, one.one_wave]
 
 
 def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> Table:

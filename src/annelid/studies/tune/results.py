@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +14,7 @@ from annelid.studies.tune.judge import OBJECTIVES, Objective
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front
 from annelid.studies.tune.space import value_at
 from annelid.view.figures.tuning import Mark, pareto_figure, progress_figure
-from annelid.view.output import whole_file
+from annelid.view.output import whole_file, write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -79,15 +78,16 @@ def write_trials(task: Task, trials: Sequence[Trial], path: Path) -> None:
         RunFileError: The file cannot be written.
     """
     fields = [variable.field for variable in task.variables]
-    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["trial", *fields, *_ROWS.values(), "problem", "run"])
-        for trial in trials:
-            gait = trial.judged.gait
-            numbers = ["" if gait is None else _short(getattr(gait, name)) for name in _ROWS.values()]
-            values = [_plain(value_at(trial.case.config, field)) for field in fields] if _built(trial) else []
-            row = [_name(trial), *(values or [_plain(trial.values[field]) for field in fields]), *numbers]
-            writer.writerow([*row, trial.judged.problem, trial.path.name])
+    columns = ["trial", *fields, *_ROWS.values(), "problem", "run"]
+    write_csv(path, columns, (_cells(trial, fields) for trial in trials))
+
+
+def _cells(trial: Trial, fields: Sequence[str]) -> list[object]:
+    gait = trial.judged.gait
+    numbers = ["" if gait is None else _short(getattr(gait, name)) for name in _ROWS.values()]
+    values = [_plain(value_at(trial.case.config, field)) for field in fields] if _built(trial) else []
+    row = [_name(trial), *(values or [_plain(trial.values[field]) for field in fields]), *numbers]
+    return [*row, trial.judged.problem, trial.path.name]
 
 
 def write_gait(task: Task, trial: Trial, command: str, path: Path) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +17,7 @@ from annelid.studies.weak_middle.pulls import ACTUATORS
 from annelid.studies.weak_middle.settings import Key, Setting
 from annelid.studies.weak_middle.sweeps import BASE, QUANTITIES, Quantity, Reading, deficits
 from annelid.view.figures.weak_middle import Panel
-from annelid.view.output import whole_file
+from annelid.view.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -46,29 +45,27 @@ def write_readings(readings: Sequence[Reading], path: Path) -> None:
     Raises:
         RunFileError: The file cannot be written.
     """
-    with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for reading in readings:
-            point = reading.point
-            for one in reading.pulled:
-                writer.writerow(
-                    [
-                        point.quantity,
-                        f"{point.value:g}",
-                        point.n_segments,
-                        point.actuator.kind,
-                        point.actuator.setting,
-                        point.resolution,
-                        one.segment,
-                        _number(100 * one.elongation_m, 3),
-                        _number(one.ring_length_m, 4),
-                        _number(one.force_N, 3),
-                        _number(1e3 * one.drift_m, 3),
-                        _number(100 * reading.deficit, 2),
-                        one.problem,
-                    ]
-                )
+    write_csv(path, COLUMNS, (row for reading in readings for row in _rows(reading)))
+
+
+def _rows(reading: Reading) -> Iterator[list[object]]:
+    point = reading.point
+    for one in reading.pulled:
+        yield [
+            point.quantity,
+            f"{point.value:g}",
+            point.n_segments,
+            point.actuator.kind,
+            point.actuator.setting,
+            point.resolution,
+            one.segment,
+            _number(100 * one.elongation_m, 3),
+            _number(one.ring_length_m, 4),
+            _number(one.force_N, 3),
+            _number(1e3 * one.drift_m, 3),
+            _number(100 * reading.deficit, 2),
+            one.problem,
+        ]
 
 
 def robot_deficit() -> float:

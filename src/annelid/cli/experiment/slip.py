@@ -3,46 +3,15 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
-from annelid.errors import RunFileError
+from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
 
-if TYPE_CHECKING:
-    from annelid.studies.progress import StudyProgress
-    from annelid.studies.store import Store
-
-Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")]
 FOLDER = Path("slip")
 GAIT = "riddle2025-muscles"
-
-
-@contextmanager
-def _study(
-    command: Sequence[str], output: Path, quick: bool, quiet: bool
-) -> Iterator[tuple[Store, StudyProgress | None]]:
-    """Opens the store with a progress display; on Ctrl-C tells how to go on."""
-    from annelid.studies.progress import study_progress
-    from annelid.studies.store import Store
-
-    if output.exists() and not output.is_dir():
-        raise RunFileError(f"{output} is a file: name a folder with -o")
-    store = Store(output / "runs")
-    try:
-        with study_progress(quiet=quiet) as progress:
-            yield store, progress
-    except KeyboardInterrupt:
-        again = shlex.join(["annelid", "experiment", *command, "-o", str(output), *(["--quick"] if quick else [])])
-        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
-        raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def slip_command(
@@ -78,7 +47,7 @@ def slip_command(
     )
     from annelid.view.figures.slip import feedback_figure
 
-    with _study(["slip", "--preset", preset], output, quick, quiet) as (store, progress):
+    with kept_runs(["slip", "--preset", preset], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
         readings = slip_feedback(store, QUICK if quick else FRICTIONS, preset=preset, jobs=jobs, progress=progress)
     if not quiet:
         Console().print(feedback_table(readings, preset))
@@ -126,7 +95,7 @@ def slip_detector_command(
     )
     from annelid.view.figures.slip import detector_figure
 
-    with _study(["slip-detector"], output, quick, quiet) as (store, progress):
+    with kept_runs(["slip-detector"], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
         detections = slip_detection(store, QUICK if quick else None, jobs=jobs, progress=progress)
     told = scores(detections)
     if not quiet:

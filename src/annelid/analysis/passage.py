@@ -1,0 +1,111 @@
+"""How a worm passes a pipe: where its rings are along the centre line, how fast, and how narrow it is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.analysis.track import Track, track_of
+from annelid.arena.course import bore_of, course_of
+from annelid.config import Pipe
+from annelid.errors import RunFileError
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A worm's way through a pipe, at the times of the recorded postures.
+
+    Attributes:
+        time_s: Shape ``(n,)``.
+        ring_arc_m: Arc length along the centre line at which every ring's centre is, from the place of the worm's front
+            at the start, m, ``(n, n_segments)``.
+        bore_m: Radius of the bore there, m, ``(n, n_segments)``.
+        reach_m: Arc lengths between which the pipe bends or changes its bore, m; both 0 for a plain straight one.
+    """
+
+    time_s: Array
+    ring_arc_m: Array
+    bore_m: Array
+    reach_m: tuple[float, float]
+
+    @cached_property
+    def front_m(self) -> Array:
+        """Arc length of the foremost ring, m, ``(n,)``."""
+        return self.ring_arc_m[:, 0]
+
+    @cached_property
+    def middle_m(self) -> Array:
+        """Mean arc length of the rings, m, ``(n,)``."""
+        return self.ring_arc_m.mean(axis=1)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the middle of the worm has come past all that bends or narrows."""
+        return bool(self.middle_m.max() >= self.reach_m[1])
+
+    def speed_m_per_s(self) -> float:
+        """Mean speed of the foremost ring along the centre line through all that bends or narrows, m/s.
+
+        It counts from the first posture in which the ring has come there to the first in which it is past it, so that
+        worms are compared over the same way; or to the end for one that does not get so far. NaN if it never came.
+        """
+        inside = np.flatnonzero(self.front_m >= self.reach_m[0])
+        if not inside.size:
+            return float("nan")
+        out = np.flatnonzero(self.front_m >= self.reach_m[1]) if self.reach_m[1] > self.reach_m[0] else np.empty(0)
+        first, last = int(inside[0]), int(out[0]) if out.size else len(self.time_s) - 1
+        if last <= first:
+            return float("nan")
+        return float((self.front_m[last] - self.front_m[first]) / (self.time_s[last] - self.time_s[first]))
+
+    def speed_over_m_per_s(self, window_s: float) -> Array:
+        """Speed of the middle at every posture, m/s, ``(n,)``: the slope of a line through the postures of a window.
+
+        Args:
+            window_s: Width of the window, s; a cycle or more, so that the swings within one do not count.
+        """
+        slope = np.empty(len(self.time_s))
+        for k, now in enumerate(self.time_s):
+            near = np.abs(self.time_s - now) <= window_s / 2 + 1e-9
+            time = self.time_s[near] - self.time_s[near].mean()
+            slope[k] = (time * self.middle_m[near]).sum() / (time * time).sum() if near.sum() > 1 else np.nan
+        return slope
+
+
+def passage_of(run: Run) -> Passage:
+    """Reads a worm's way through a pipe from its run.
+
+    Raises:
+        RunFileError: The worm was not in a pipe, or `annelid.analysis.track.track_of` refuses the run.
+    """
+    arena = run.config.arena
+    if not isinstance(arena, Pipe):
+        where = "a planar worm" if arena is None else f"a worm on a {arena.kind}"
+        raise RunFileError(f"{run.path} holds {where}, and so no passage of a pipe")
+    return passage_through(arena, track_of(run))
+
+
+def passage_through(pipe: Pipe, track: Track) -> Passage:
+    """Reads a worm's way through a pipe from its track."""
+    planes = track.crossing_m.reshape(len(track.time_s), -1, track.n_per_plane, 3)
+    centres = planes[:, list(track.ring_planes)].mean(axis=2)
+    arc = course_of(pipe).nearest(centres).arc_m
+    return Passage(track.time_s, arc, bore_of(pipe).at(arc)[0], reach_of(pipe))
+
+
+def reach_of(pipe: Pipe) -> tuple[float, float]:
+    """Arc lengths between which a pipe bends or changes its bore, m; both 0 for a plain straight one."""
+    joints = course_of(pipe).joints_m
+    parts = [(joints[0], joints[-1])] if joints else []
+    if pipe.profile != "even":
+        parts.append((pipe.profile_start_m, pipe.profile_start_m + pipe.profile_length_m))
+    return (min(first for first, _ in parts), max(last for _, last in parts)) if parts else (0.0, 0.0)

@@ -1,0 +1,27 @@
+"""The commands `experiment ..`: what is done to a worm to learn about it, one module each."""
+
+from __future__ import annotations
+
+import typer
+
+from annelid.cli.experiment.load_frame import load_frame_command
+from annelid.cli.experiment.pipes import pipes_command
+from annelid.cli.experiment.slip import slip_command, slip_detector_command
+from annelid.cli.experiment.speed import speed_command
+from annelid.cli.experiment.turning import turning_command
+from annelid.cli.experiment.weak_middle import weak_middle_command
+
+__all__ = ["experiment"]
+
+experiment = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm.")
+
+for _name, _command in {
+    "load-frame": load_frame_command,
+    "weak-middle": weak_middle_command,
+    "speed": speed_command,
+    "slip": slip_command,
+    "slip-detector": slip_detector_command,
+    "turning": turning_command,
+    "pipes": pipes_command,
+}.items():
+    experiment.command(_name)(_command)

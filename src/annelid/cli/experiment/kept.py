@@ -1,0 +1,55 @@
+"""What experiments of many runs share: their options, a store of the runs, and how an interrupted one goes on."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.errors import RunFileError
+
+if TYPE_CHECKING:
+    from annelid.studies.progress import StudyProgress
+    from annelid.studies.store import Store
+
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
+
+
+@contextmanager
+def kept_runs(
+    words: Sequence[str], output: Path, *, quick: bool, jobs: int | None, quiet: bool
+) -> Iterator[tuple[Store, StudyProgress | None]]:
+    """Opens a folder's store of runs with a progress display; on Ctrl-C tells how to go on.
+
+    Args:
+        words: The experiment's name and its arguments, without the options that all experiments have.
+        output: The folder; runs are kept in ``runs`` below it.
+        quick: As the command was given.
+        jobs: As the command was given.
+        quiet: No progress.
+
+    Raises:
+        RunFileError: The folder is a file.
+        typer.Exit: The user has interrupted it.
+    """
+    from annelid.studies.progress import study_progress
+    from annelid.studies.store import Store
+
+    if output.exists() and not output.is_dir():
+        raise RunFileError(f"{output} is a file: name a folder with -o")
+    store = Store(output / "runs")
+    try:
+        with study_progress(quiet=quiet) as progress:
+            yield store, progress
+    except KeyboardInterrupt:
+        options = [*(["--quick"] if quick else []), *(["--jobs", str(jobs)] if jobs else [])]
+        again = shlex.join(["annelid", "experiment", *words, "-o", str(output), *options])
+        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None

@@ -1,0 +1,75 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `experiment load-frame`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import (
+    Assignments,
+    FidelityLevel,
+    Force,
+    Preset,
+    config_of,
+    or_default,
+    overrides_of,
+    refuse_existing,
+)
+
+
+def load_frame_command(
+    preset: Preset = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("load-frame"),
+    assignments: Assignments = None,
+    fidelity: FidelityLevel = None,
+    displacement: Annotated[float, typer.Option(help="How far the cable is wound, mm.")] = 330.0,
+    speed: Annotated[float, typer.Option(help="Speed of the cable, mm/s.")] = 10.0,
+    cable_friction: Annotated[
+        float, typer.Option(help="Friction of the cable: coefficient times the angle it is wrapped round, rad.")
+    ] = 0.0,
+    data: Annotated[
+        Path | None, typer.Option("--data", help="Measured loop to compare with.  [default: the one of annelid]")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+    force: Force = False,
+) -> None:
+    """Close one ring by its cable and open it again.
+
+    The middle ring of a weightless worm is wound in slowly and let out; the cable's force is compared with what
+    the authors measured on one segment of the robot. A few seconds. Writes load_frame.csv, .png and .svg.
+
+    \b
+    annelid experiment load-frame
+    annelid experiment load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
+    """
+    from rich.console import Console
+
+    from annelid.studies.calibration.frame import load_frame
+    from annelid.studies.calibration.loop import MM, cable_force, read_loop
+    from annelid.studies.calibration.report import frame_table, write_loop
+    from annelid.studies.progress import study_progress
+    from annelid.view.figures.load_frame import load_frame_figure
+
+    table = output / "load_frame.csv"
+    if output.is_dir():
+        refuse_existing(table, force)
+    measured = read_loop(data)
+    config = config_of(or_default(preset, fidelity), overrides_of(assignments), None, fidelity)
+    with study_progress(quiet=quiet) as progress:
+        tension = load_frame(
+            config,
+            displacement_m=displacement * MM,
+            speed_m_per_s=speed * MM,
+            progress=None if progress is None else lambda share: progress("load frame", 0, 0, share),
+        )
+    loop = cable_force(tension, cable_friction)
+    output.mkdir(parents=True, exist_ok=True)
+    if not quiet:
+        Console().print(frame_table({config.name: loop, "measured": measured}))
+    write_loop(loop, tension, table)
+    loops = {config.name: (loop.displacement_m, loop.force_N), "measured": (measured.displacement_m, measured.force_N)}
+    for path in (table, load_frame_figure(loops, table.with_suffix(""))):
+        typer.echo(path)

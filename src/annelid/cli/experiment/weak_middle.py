@@ -1,0 +1,66 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `experiment weak-middle`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
+
+
+def weak_middle_command(
+    output: Output = Path("weak-middle"),
+    quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find out why the middle of the worm elongates less than its ends.
+
+    Every segment of a resting worm (preset wang with the authors' rods and springs) is pulled alone, wound in and held
+    until it stands still; the deficit is how far the interior segments stay below the two ends, on average. Swept one
+    at a time: number of segments, Young's modulus, weight, friction; each with four kinds of actuators. Force-limited:
+    a servo that stalls at a tension. Servo: one that stalls, or ends at its shortest cable. Muscle: the paper's, whose
+    force falls with its length. Length-limited: wound to a length, whatever that takes. Then: which differences
+    between two interior segments would make them elongate as the robot's, 3.82 and 4.78 cm.
+
+    Writes weak_middle.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one
+    goes on. About 250 runs of some seconds each; docs/weak_middle.md explains the results.
+
+    \b
+    annelid experiment weak-middle --quick
+    annelid experiment weak-middle -o weak-middle
+    """
+    from rich.console import Console
+
+    from annelid.studies.weak_middle.asymmetry import asymmetry
+    from annelid.studies.weak_middle.results import (
+        asymmetry_table,
+        checks_table,
+        panels,
+        papers_deficit,
+        robot_deficit,
+        settings_table,
+        sweep_table,
+        write_readings,
+    )
+    from annelid.studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
+    from annelid.view.figures.weak_middle import weak_middle_figure
+
+    found = None
+    with kept_runs(["weak-middle"], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+        set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
+        if not quick:
+            found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)
+    if not quiet:
+        tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
+        tables += [checks_table(readings), asymmetry_table(found)] if found else []
+        for table in tables:
+            Console().print(table)
+    path = output / "weak_middle.csv"
+    write_readings([*readings, *(found.readings if found else ())], path)
+    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
+    for written in (path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))):
+        typer.echo(written)

@@ -1,0 +1,113 @@
+"""The robust network under a descending drive: its turns in closed form, and order whatever presses on the worm."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from annelid.errors import ConfigError
+from annelid.nervous.driven import DriveParameters, driven_robust_network, driven_turn_ms
+from annelid.nervous.robust import ROLES, RobustParameters, robust_network
+
+FULL_nA = 20.0
+SAMPLE_MS = 5
+FLIP_MS = 25.0
+"""The half-centre flips within this time once its hold yields."""
+
+
+def contractions(n_segments: int, blocks: np.ndarray, block_ms: int, parameters: RobustParameters) -> np.ndarray:
+    """Contraction neurons' potentials, mV, every `SAMPLE_MS`, under a drive and pressures that change now and then.
+
+    Args:
+        n_segments: Segments.
+        blocks: Activities of the drive and of every segment's pressure, ``(n_blocks, 1 + n_segments)``.
+        block_ms: Duration of each, a multiple of `SAMPLE_MS`.
+        parameters: Of the network.
+    """
+    stepper = driven_robust_network(n_segments, parameters).compile(1.0, "euler")
+    state, trace = stepper.initial_state(), []
+    for block in blocks:
+        inputs = FULL_nA * np.concatenate([np.zeros(n_segments), block])
+        for _ in range(block_ms // SAMPLE_MS):
+            stepper.advance(state, inputs, SAMPLE_MS)
+            trace.append(state.potential[0, : n_segments * len(ROLES) : len(ROLES)].copy())
+    return np.array(trace)
+
+
+def onsets(trace: np.ndarray) -> list[tuple[int, int]]:
+    return [(SAMPLE_MS * int(k), int(segment)) for k, segment in np.argwhere((trace[:-1] < 10.0) & (trace[1:] >= 10.0))]
+
+
+@pytest.mark.parametrize("n_segments", [3, 6])
+@pytest.mark.parametrize("turn_ms", [875.0, 400.0])
+@pytest.mark.parametrize("drive", [0.0, 0.5, 1.0])
+def test_turns_are_the_closed_form_s_plus_the_flip(n_segments: int, turn_ms: float, drive: float) -> None:
+    parameters = RobustParameters(turn_ms=turn_ms)
+    expected = driven_turn_ms(drive, n_segments, parameters)
+    block = np.array([[drive, *np.zeros(n_segments)]])
+    events = onsets(contractions(n_segments, block, round(2.5 * n_segments * turn_ms), parameters))
+    assert all(after == (before + 1) % n_segments for (_, before), (_, after) in pairwise(events))
+    # The drive has come on, and relays have forgotten how they started.
+    late = [time for time, _ in events][n_segments:]
+    assert len(late) > n_segments // 2
+    assert 0.0 <= np.diff(late).mean() - expected <= FLIP_MS
+
+
+@settings(max_examples=15, deadline=None)
+@given(arrays(float, (8, 5), elements=st.floats(0.0, 1.0)))
+def test_whatever_presses_one_segment_at_a_time_contracts_in_order_and_no_slower(blocks: np.ndarray) -> None:
+    n, parameters = 4, RobustParameters(turn_ms=300.0)
+    trace = contractions(n, blocks, 400, parameters)
+    events = onsets(trace)
+    assert all(after == (before + 1) % n for (_, before), (_, after) in pairwise(events))
+    contracted = (trace > 10.0).sum(axis=1)
+    assert contracted.max() <= 2
+    assert SAMPLE_MS * (contracted == 2).sum() <= FLIP_MS * len(events)
+    intervals = np.diff([time for time, _ in events])
+    assert intervals.max() <= driven_turn_ms(0.0, n, parameters) + FLIP_MS
+    assert intervals.min() >= 0.8 * driven_turn_ms(1.0, n, parameters)
+
+
+def test_without_pressure_it_is_the_robust_network() -> None:
+    n, parameters = 3, RobustParameters(turn_ms=300.0)
+    driven = contractions(n, np.zeros((1, 1 + n)), 2000, parameters)
+    plain = robust_network(n, parameters).compile(1.0, "euler")
+    state = plain.initial_state()
+    for expected in driven:
+        plain.advance(state, np.zeros(n), SAMPLE_MS)
+        assert state.potential[0, : n * len(ROLES) : len(ROLES)] == pytest.approx(expected, abs=1e-9)
+
+
+@given(st.integers(3, 12), st.floats(0.05, 0.48))
+def test_more_drive_and_more_lift_make_turns_shorter(n_segments: int, lift: float) -> None:
+    turns = [driven_turn_ms(drive, n_segments, pathway=DriveParameters(lift=lift)) for drive in np.linspace(0, 1, 9)]
+    assert (np.diff(turns) < 0).all()
+    assert driven_turn_ms(1.0, n_segments, pathway=DriveParameters(lift=0.9 * lift)) > turns[-1]
+
+
+def test_full_drive_makes_six_segments_four_times_as_fast_at_most() -> None:
+    assert driven_turn_ms(0.0, 6) / driven_turn_ms(1.0, 6) == pytest.approx(4.1, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"lift": 0.5}, "lift must be between 0 and 0.5"),
+        ({"lift": 0.0}, "lift must be between 0 and 0.5"),
+        ({"per_segment": -0.1}, "per_segment must not be negative"),
+        ({"drive_time_constant_ms": 0.0}, "drive_time_constant_ms"),
+    ],
+)
+def test_bad_pathways_are_refused(changes: dict[str, float], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        DriveParameters(**changes)
+
+
+def test_a_drive_outside_its_range_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"drive must be in 0 \.\. 1, not 1\.1"):
+        driven_turn_ms(1.1, 6)

@@ -1,0 +1,143 @@
+"""The study of pipes: what is compared with what, what it leaves behind, and a worm in a short pipe."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from annelid import load_config, open_run, simulate
+from annelid.analysis.passage import Passage, passage_of
+from annelid.config import Pipe, RobustSns
+from annelid.errors import RunFileError
+from annelid.studies.pipes import (
+    ADAPTIVE,
+    BEND_GAITS,
+    FIXED,
+    NARROW_ARENAS,
+    PRESET,
+    RADII_M,
+    Passages,
+    Reading,
+    pipes_picture,
+    pipes_table,
+    trials,
+    write_readings,
+)
+from annelid.view.figures.pipes import Way
+
+
+def reading(**changes: object) -> Reading:
+    values = {
+        "arena": "bend",
+        "gait": "reactive",
+        "radius_m": 0.6,
+        "passed": True,
+        "speed_m_per_s": 0.04,
+        "front_m": 1.2,
+        "in_order": True,
+        "work_J_per_m": 100.0,
+        "slip_ratio": None,
+        "command": "annelid run x",
+    }
+    return Reading(**{**values, **changes})  # type: ignore[arg-type]
+
+
+def test_adaptation_is_all_that_the_adaptive_and_the_fixed_wave_differ_in() -> None:
+    for arena in NARROW_ARENAS:
+        fixed, adaptive = (
+            next(one.case.config for one in trials() if (one.arena, one.gait) == (arena, gait))
+            for gait in (FIXED, ADAPTIVE)
+        )
+        assert isinstance(fixed.controller, RobustSns)
+        assert isinstance(adaptive.controller, RobustSns)
+        assert fixed.controller.descending.lift == 0.0
+        descending = adaptive.controller.descending.model_copy(update={"lift": 0.0})
+        plain = adaptive.controller.model_copy(update={"descending": descending})
+        assert adaptive.model_copy(update={"controller": plain}) == fixed
+
+
+def test_bends_differ_in_radius_and_gaits_in_nothing_of_body_and_pipe() -> None:
+    bends = [one for one in trials() if one.arena == "bend"]
+    assert {(one.gait, one.radius_m) for one in bends} == {(gait, radius) for gait in BEND_GAITS for radius in RADII_M}
+    for one in bends:
+        config = one.case.config
+        assert isinstance(config.arena, Pipe)
+        assert config.arena.radius_m == one.radius_m
+        assert config.body == bends[0].case.config.body
+        assert config.arena.model_copy(update={"radius_m": 0.5}) == bends[0].case.config.arena.model_copy(  # type: ignore[union-attr]
+            update={"radius_m": 0.5}
+        )
+
+
+def test_quick_trials_are_some_of_all() -> None:
+    every = [one.case for one in trials()]
+    assert all(one.case in every for one in trials(quick=True))
+
+
+def test_readings_are_written_and_told(tmp_path: Path) -> None:
+    readings = [reading(), reading(arena="taper", radius_m=0.0, passed=False, in_order=None, work_J_per_m=None)]
+    with write_readings(readings, tmp_path / "pipes.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["passed"] for row in rows] == ["True", "False"]
+    assert rows[0]["command"] == "annelid run x"
+    columns = [list(column.cells) for column in pipes_table(readings).columns]
+    assert columns[0] == ["bend of 0.6 m", "taper"]
+    assert columns[3] == ["4.00", "4.00"]
+
+
+def test_the_picture_shows_whatever_there_is(tmp_path: Path) -> None:
+    front = np.linspace(0.0, 1.0, 20)
+    way = Way(front, np.full(20, 0.15), 0.01 + 0.0 * front, front, 0.9 - 0.2 * front)
+    some = Passages((reading(), reading(radius_m=0.3, passed=False)), {("taper", FIXED): way})
+    for found in (some, Passages((), {})):
+        path = pipes_picture(found, tmp_path / "pipes")
+        assert path.stat().st_size > 1000
+        assert path.with_suffix(".svg").exists()
+
+
+def test_a_worm_in_a_pipe_has_a_passage_and_one_on_the_floor_has_none(tmp_path: Path) -> None:
+    short = {
+        "duration_s": 0.3,
+        "record.frames_interval_s": 0.1,
+        "controller": {"kind": "sns-robust", "descending": {"lift": 0.45}},
+    }
+    pipe = {"arena.profile": "taper", "arena.narrowest": 0.13, "arena.profile_start": 0.05}
+    config = load_config(PRESET, {**short, **pipe}, arena="pipe")
+    passage = passage_of(open_run(simulate(config, tmp_path / "pipe", progress=False).path))
+    assert passage.ring_arc_m.shape == (4, 6)
+    assert passage.reach_m == pytest.approx((0.05, 0.55))
+    # Rings start 0.112 m apart, three planes, the foremost behind the worm's front.
+    assert -np.diff(passage.ring_arc_m[0]) == pytest.approx(np.full(5, 3 * 0.0374), abs=1e-3)
+    assert -0.12 < passage.front_m[0] < 0.0
+    on_the_floor = simulate(load_config(PRESET, {"duration_s": 0.1}), tmp_path / "floor", progress=False)
+    with pytest.raises(RunFileError, match="holds a worm on a floor, and so no passage"):
+        passage_of(open_run(on_the_floor.path))
+
+
+def passage(config_changes: dict[str, object], arena: str, folder: Path) -> Passage:
+    config = load_config(PRESET, {"record.frames_interval_s": 0.1, **config_changes}, arena=arena)
+    return passage_of(open_run(simulate(config, folder, progress=False).path))
+
+
+@pytest.mark.slow
+def test_the_worm_passes_a_straight_pipe_as_wide_as_itself(tmp_path: Path) -> None:
+    found = passage({"duration_s": 6.0, "controller": {"kind": "sns-robust", "turn_ms": 270.0}}, "pipe", tmp_path)
+    assert found.middle_m[-1] - found.middle_m[0] > 0.25
+
+
+@pytest.mark.slow
+def test_pressed_backs_raise_the_drive_where_the_taper_narrows(tmp_path: Path) -> None:
+    changes = {
+        "duration_s": 30.0,
+        "arena.narrowest": 0.13,
+        "controller": {"kind": "sns-robust", "descending": {"lift": 0.45}},
+    }
+    config = load_config(PRESET, {"record.frames_interval_s": 0.1, **changes}, arena="pipe.taper")
+    run = open_run(simulate(config, tmp_path, progress=False).path)
+    found, drive = passage_of(run), run.data["drive"].values
+    front = np.interp(run.data["time"].values, found.time_s, found.front_m)
+    assert drive[front < 0.1].max() < 0.05
+    assert drive[front > 0.5].mean() > 0.4

@@ -75,10 +75,9 @@ class AdaptiveController(PeristalsisController):
         return min(max(manual + sensory, 0.0), 1.0)
 
     def recordable(self) -> Recordable:
-        """Names potentials, sensors and the drive."""
+        """Names potentials, sodium gates, sensors and the drive."""
         return self._named(
-            self._potential_signal(),
-            self._sensor_signal(),
+            *self._signals(),
             Signal("drive", (), (), "1", "activity of the descending neuron"),
             controller="synthetic nervous system with a descending drive",
             conductance_drive_uS=drive_conductance_uS(self._parameters),
@@ -88,6 +87,5 @@ class AdaptiveController(PeristalsisController):
         """Reads the signals that `recordable` names; there are none at frame rate."""
         if frame:
             return {}
-        potential = self._potential()
-        drive = min(max(float(potential[-1]) / self._parameters.range_mV, 0.0), 1.0)
-        return {"potential": potential, "sensor_on": self._sensor_on(), "drive": drive}
+        drive = min(max(float(self._state.potential[0, -1]) / self._parameters.range_mV, 0.0), 1.0)
+        return {**super().read(frame), "drive": drive}

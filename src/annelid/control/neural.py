@@ -17,7 +17,7 @@ from annelid.nervous import Network
 from annelid.nervous.half_centre import HalfCentre
 from annelid.nervous.peristalsis import ROLES
 from annelid.nervous.stepper import Scheme
-from annelid.protocols import Array, Recordable, Signal, State
+from annelid.protocols import Array, Recordable, Signal, State, Values
 
 Design = TypeVar("Design", bound=HalfCentre)
 
@@ -196,8 +196,18 @@ class PeristalsisController(NeuralController):
             "stretch sensor during the last control step: 1 while the segment is at rest length",
         )
 
-    def _sensor_on(self) -> Array:
-        return self._sensor.on.astype(np.float64)
+    def _signals(self) -> tuple[Signal, ...]:
+        return self._potential_signal(), self._sodium_gate_signal(), self._sensor_signal()
+
+    def read(self, frame: bool) -> Values:
+        """Reads potentials (mV), sodium gates and sensors; there is nothing at frame rate."""
+        if frame:
+            return {}
+        return {
+            "potential": self._potential(),
+            "sodium_gate": self._sodium_gate(),
+            "sensor_on": self._sensor.on.astype(np.float64),
+        }
 
     def get_state(self) -> State:
         """Returns copies of potentials (mV), gates, sensors and the number of steps taken."""

@@ -10,7 +10,7 @@ from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import PeristalsisParameters
 from annelid.nervous.pressure import PressureParameters, pressure_network
-from annelid.protocols import Array, Recordable, Sensation, Values
+from annelid.protocols import Array, Recordable, Sensation
 
 
 class PressureController(PeristalsisController):
@@ -94,22 +94,7 @@ class PressureController(PeristalsisController):
 
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and sensors."""
-        return self._named(
-            self._potential_signal(),
-            self._sodium_gate_signal(),
-            self._sensor_signal(),
-            controller="synthetic nervous system with pressure feedback",
-        )
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
-        return {
-            "potential": self._potential(),
-            "sodium_gate": self._sodium_gate(),
-            "sensor_on": self._sensor_on(),
-        }
+        return self._named(*self._signals(), controller="synthetic nervous system with pressure feedback")
 
 
 def _rise(values: Array, low: float, high: float) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from annelid import config as settings
 from annelid.control.neural import PeristalsisController, design_of
 from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, peristalsis_network
-from annelid.protocols import Array, Recordable, Sensation, State, Values
+from annelid.protocols import Array, Recordable, Sensation, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,22 +159,10 @@ class SnsController(PeristalsisController):
     def recordable(self) -> Recordable:
         """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""
         return self._named(
-            self._potential_signal(),
-            self._sodium_gate_signal(),
-            self._sensor_signal(),
+            *self._signals(),
             controller="synthetic nervous system",
             **{f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()},
         )
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
-        return {
-            "potential": self._potential(),
-            "sodium_gate": self._sodium_gate(),
-            "sensor_on": self._sensor_on(),
-        }
 
     def alarm(self) -> str | None:
         """Returns a sentence if a potential has left the range that currents and reversals can explain."""

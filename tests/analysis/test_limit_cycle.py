@@ -165,7 +165,7 @@ def test_the_worms_period_is_the_published_one(n_segments, n_states, published_m
     assert 1e3 * cycle.period_s == pytest.approx(published_ms, abs=3.0)
 
 
-@pytest.mark.parametrize("n_segments", [3, 6])
+@pytest.mark.parametrize("n_segments", [3, pytest.param(6, marks=pytest.mark.slow)])
 def test_the_worms_rhythm_is_stable(n_segments):
     cycle = cycle_of(n_segments, "continuous")
     assert cycle.multipliers[0] == pytest.approx(1.0, abs=0.01)

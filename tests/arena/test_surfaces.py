@@ -14,6 +14,8 @@ from annelid.arena.surface import PipeWall, surface_of
 from annelid.config import ArenaSection, Floor, Pipe, Rough, Steps
 from annelid.protocols import Array
 
+CREASED = {"rails", "steps", "tapering bend"}
+"""Some points are as near to the floor as to a rail, or to two steps; a taper has a crease where it begins to curve."""
 REACH_M = 0.02
 """How near to the ground the skin is where it matters."""
 ARENAS: dict[str, ArenaSection] = {
@@ -31,6 +33,11 @@ ARENAS: dict[str, ArenaSection] = {
     "helix": Pipe(course="helix", radius_m=0.6, turn_deg=-700.0),
     "waisted helix": Pipe(bore_m=0.18, course="helix", profile="hourglass", turn_deg=540.0, profile_length_m=2.0),
 }
+
+
+def most_kinked(arena: ArenaSection) -> float:
+    """Share of points that may lie on a crease: none but for arenas that have one."""
+    return 0.01 if arena in [ARENAS[name] for name in CREASED] else 0.0
 
 
 def places(arena: ArenaSection, seed: int = 0, n: int = 400) -> Array:
@@ -60,9 +67,8 @@ def test_the_normal_is_the_gradient_of_the_distance_and_has_unit_length(arena: A
     points = places(arena)
     normal, numerical = surface_of(arena).normal(points), gradient(arena, points)
     assert np.linalg.norm(normal, axis=-1) == pytest.approx(1.0, abs=1e-12)
-    # Some points are as near to the floor as to a rail, or to two steps; a taper has a crease where it begins to curve.
     kinked = np.abs(np.linalg.norm(numerical, axis=-1) - 1.0) > 1e-6
-    assert kinked.mean() < 0.02
+    assert kinked.mean() <= most_kinked(arena)
     assert np.abs(normal - numerical)[~kinked].max() < 1e-6
 
 
@@ -71,7 +77,7 @@ def test_a_point_of_the_surface_has_no_distance_and_its_normal_leads_away(arena:
     surface, points = surface_of(arena), places(arena, seed=1)
     feet = points - surface.distance_m(points)[:, None] * surface.normal(points)
     on_it = np.abs(surface.distance_m(feet)) < 1e-9
-    assert on_it.mean() > 0.98
+    assert on_it.mean() >= 1.0 - most_kinked(arena)
     lifted = surface.distance_m(feet[on_it] + 1e-3 * surface.normal(feet[on_it]))
     assert np.abs(lifted - 1e-3).max() < 1e-8
 

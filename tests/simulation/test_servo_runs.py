@@ -7,36 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_robot import assert_equal, small_config
 
-from annelid import RunConfig, load_config, open_run, simulate, simulate_batch
+from annelid import open_run, simulate, simulate_batch
 from annelid.analysis import summary
 from annelid.analysis.robot import ROBOT_ELONGATION_M
-from annelid.simulation import Run
-
-SMALL = {
-    "duration_s": 0.4,
-    "body.mesh.n_segments": 3,
-    "body.mesh.elements_per_side": 1,
-    "clock.physics_timestep_s": 0.02,
-    "record.signals_interval_s": 0.02,
-    "record.frames_interval_s": 0.1,
-}
-
-
-def config(**changes: Any) -> RunConfig:
-    return load_config("wang", SMALL | changes)
-
-
-def assert_equal(ours: Run, expected: Run, start: int = 0) -> None:
-    for name, variable in expected.data.data_vars.items():
-        if "time" in variable.dims and name != "wall_time":
-            assert np.array_equal(ours.data[name], variable[start:], equal_nan=True), name
 
 
 def test_a_continued_run_is_the_whole_run_bit_for_bit(tmp_path: Path) -> None:
-    whole = simulate(config(), tmp_path / "whole", progress=False)
-    simulate(config(duration_s=0.2), tmp_path / "first", progress=False)
-    rest = simulate(config(), tmp_path / "rest", resume=tmp_path / "first", progress=False)
+    whole = simulate(small_config(), tmp_path / "whole", progress=False)
+    simulate(small_config(duration_s=0.2), tmp_path / "first", progress=False)
+    rest = simulate(small_config(), tmp_path / "rest", resume=tmp_path / "first", progress=False)
     n_first = len(open_run(tmp_path / "first").data["time"])
     assert float(whole.data["muscle_force"].max()) > 1.0, "the cables must be at work"
     assert_equal(rest, whole, n_first)
@@ -48,7 +29,7 @@ def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
         {"body.rings.force_limit_N": 6.0, "body.rings.speed_limit_m_per_s": 0.05},
         {"body.rings.length_range_m": [0.7, 0.98], "sensor.noise_m": 0.002, "body.rings.stiffness_N_per_m": 700.0},
     )
-    configs = [config(**changes) for changes in own]
+    configs = [small_config(**changes) for changes in own]
     result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)
     for number, one in enumerate(configs):
         assert_equal(result[number], simulate(one, tmp_path / f"alone-{number}", progress=False))

@@ -7,64 +7,47 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_robot import assert_equal, small_config
 
-from annelid import RunConfig, load_config, open_run, simulate, simulate_batch
+from annelid import load_config, open_run, simulate, simulate_batch
 from annelid.analysis import summary
 from annelid.analysis.track import track_of, turn_of
 from annelid.protocols import SIDES
-from annelid.simulation import Run
 from annelid.studies.turning import COUNTER
 
-SMALL = {
-    "duration_s": 0.4,
-    "body.rings.layout": "halves",
-    "body.mesh.n_segments": 3,
-    "body.mesh.elements_per_side": 1,
-    "clock.physics_timestep_s": 0.02,
-    "record.signals_interval_s": 0.02,
-    "record.frames_interval_s": 0.1,
-}
 LEFT = {"turning": {"kind": "constant", "modulation": 0.8, "descending_time_constant_s": 0.05}}
 RIGHT_POST = {"arena.posts": [[0.1, 0.185, 0.03]]}
 TOUCH = {"turning": {"kind": "touch", "arm_N": 0.5, "least_N": 0.1, "full_N": 2.0}} | RIGHT_POST
 HEADING = {"turning": {"kind": "heading", "heading_deg": 40.0}}
 
 
-def config(**changes: Any) -> RunConfig:
-    return load_config("wang", SMALL | changes)
-
-
-def assert_equal(ours: Run, expected: Run, start: int = 0) -> None:
-    for name, variable in expected.data.data_vars.items():
-        if "time" in variable.dims and name != "wall_time":
-            assert np.array_equal(ours.data[name], variable[start:], equal_nan=True), name
-
-
 def test_no_modulation_is_the_plain_run_bit_for_bit(tmp_path: Path) -> None:
-    plain = simulate(config(), tmp_path / "plain", progress=False)
-    turning = simulate(config(turning={"kind": "constant", "modulation": 0.0}), tmp_path / "turning", progress=False)
+    plain = simulate(small_config(), tmp_path / "plain", progress=False)
+    turning = simulate(
+        small_config(turning={"kind": "constant", "modulation": 0.0}), tmp_path / "turning", progress=False
+    )
     assert_equal(turning, plain)
     assert np.all(turning.data["half_scale"] == 1.0)
 
 
 @pytest.mark.parametrize("turning", [LEFT, TOUCH, HEADING], ids=["constant", "touch", "heading"])
 def test_a_continued_run_is_the_whole_run_bit_for_bit(turning: dict[str, Any], tmp_path: Path) -> None:
-    whole = simulate(config(**turning), tmp_path / "whole", progress=False)
-    simulate(config(**turning, duration_s=0.2), tmp_path / "first", progress=False)
-    rest = simulate(config(**turning), tmp_path / "rest", resume=tmp_path / "first", progress=False)
+    whole = simulate(small_config(**turning), tmp_path / "whole", progress=False)
+    simulate(small_config(**turning, duration_s=0.2), tmp_path / "first", progress=False)
+    rest = simulate(small_config(**turning), tmp_path / "rest", resume=tmp_path / "first", progress=False)
     assert float(whole.data["half_scale"].min()) < 1.0, "it must turn"
     assert_equal(rest, whole, len(open_run(tmp_path / "first").data["time"]))
 
 
 def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
-    configs = [config(**turning) for turning in ({}, LEFT, HEADING)]
+    configs = [small_config(**turning) for turning in ({}, LEFT, HEADING)]
     result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)
     for number, one in enumerate(configs):
         assert_equal(result[number], simulate(one, tmp_path / f"alone-{number}", progress=False))
 
 
 def test_a_left_turn_takes_from_the_left_muscles(tmp_path: Path) -> None:
-    run = simulate(config(**LEFT, duration_s=1.0), tmp_path / "run", progress=False)
+    run = simulate(small_config(**LEFT, duration_s=1.0), tmp_path / "run", progress=False)
     last = run.data.isel(time=-1)
     assert last["half_scale"].values[0] == pytest.approx([0.2, 1.0], abs=1e-3)
     activation = last["activation"].values.reshape(-1, 2)
@@ -98,14 +81,14 @@ def test_the_nervous_system_steers_the_worm_to_a_heading(tmp_path: Path) -> None
 
 
 def test_the_touch_of_the_floor_alone_turns_nobody(tmp_path: Path) -> None:
-    run = simulate(config(turning={"kind": "touch"}), tmp_path / "run", progress=False)
+    run = simulate(small_config(turning={"kind": "touch"}), tmp_path / "run", progress=False)
     sides = run.data["touch"].values[..., [SIDES.index("left"), SIDES.index("right")]]
     assert np.abs(np.diff(sides[:, 0], axis=-1)).max() < 2.0
     assert np.all(run.data["half_scale"] == 1.0)
 
 
 def test_a_post_on_the_right_is_felt_there_and_turns_the_worm_away_from_it(tmp_path: Path) -> None:
-    run = simulate(config(**TOUCH), tmp_path / "run", progress=False)
+    run = simulate(small_config(**TOUCH), tmp_path / "run", progress=False)
     front = run.data["touch"].values[:, 0]
     assert front[:, SIDES.index("right")].max() > 0.5
     assert front[:, SIDES.index("left")].max() == 0.0

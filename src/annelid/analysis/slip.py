@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.analysis.rhythm import rhythm, segment_activation
+from annelid.analysis.gait import cycle_marks
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -41,19 +41,17 @@ def slip_cost(run: Run) -> SlipCost | None:
     Returns:
         The record; None where segment 1 contracts fewer than three times.
     """
-    data = run.data
-    time = data["time"].values
-    beat = rhythm(time, segment_activation(data["activation"].values, run.config.body.n_segments))
-    onsets = [onset for segment, onset in zip(beat.order, beat.onsets_s, strict=True) if segment == 1][1:]
-    if len(onsets) < 2:
+    data, marks = run.data, cycle_marks(run)
+    if len(marks) < 2:
         return None
-    first, last = np.searchsorted(time, [onsets[0], onsets[-1]])
+    time = data["time"].values
+    first, last = np.searchsorted(time, marks[[0, -1]])
     duration = float(time[last] - time[first])
     front = data["center_of_mass"].sel(axis="x").values
     way = float(front[first] - front[last])
     loss = data["slip_loss"].values.sum(axis=1)
     lost = float(loss[last] - loss[first])
-    cycles = len(onsets) - 1
+    cycles = len(marks) - 1
     return SlipCost(
         cycles=cycles,
         period_s=duration / cycles,

@@ -19,10 +19,11 @@ from annelid.clock import StepRatio
 from annelid.config import Pipe, RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, MeshGeometry
-from annelid.protocols import SIDES, Recordable, Sensation, Signal, State
+from annelid.protocols import SIDES, Recordable, Sensation, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
 from annelid.simulation.books import Books, Engine
 from annelid.simulation.ground import MovingGround
+from annelid.simulation.signals import worm_signals
 from annelid.simulation.skin import Touch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -317,45 +318,12 @@ class Worm(ABC):
         return None
 
     def recordable(self) -> Recordable:
-        """Names the signals of the body."""
-        n, m, geometry = self.n_segments, self.n_muscles, self.geometry
-        stretch = ("segment", "sensor")
-        shape = self.anatomy.rest_stretch_m.shape
-        extremes: list[Signal] = []
-        if self.anatomy.has_edges:
-            extremes.append(Signal("edge_strain", (), (), "1", "largest strain of a rod's edge"))
-        if self.anatomy.pins_can_part:
-            extremes.append(Signal("pin_gap", (), (), "m", "largest gap between two pinned strands"))
+        """Names the signals of the body, and gives its mass and length as attributes."""
+        anatomy = self.anatomy
         return Recordable(
-            signals=(
-                Signal("stretch_length", stretch, shape, "m", "length of the springs that span a ring"),
-                Signal("spring_length", ("spring",), (len(geometry.springs),), "m", "length of an axial spring"),
-                Signal("ring_length", ("muscle",), (m,), "m", "length of a ring muscle"),
-                Signal("muscle_force", ("muscle",), (m,), "N", "contractile force of a ring muscle"),
-                Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the arena on a segment"),
-                Signal("touch", ("segment", "side"), (n, len(SIDES)), "N", "normal force of the ground on a side"),
-                Signal("contact_count", ("segment",), (n,), "1", "number of vertices that touch the ground"),
-                Signal("slip_speed", ("segment",), (n,), "m/s", "forward speed along the ground of what touches it"),
-                Signal("slip_distance", ("segment",), (n,), "m", "way that what touches the ground has slid so far"),
-                Signal("slip_loss", ("segment",), (n,), "J", "work of a segment lost to friction so far"),
-                Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass"),
-                *_energies(m),
-                *extremes,
-                Signal(
-                    "crossing_position",
-                    ("crossing", "axis"),
-                    (geometry.n_crossings, 3),
-                    "m",
-                    "position of a crossing",
-                    every_frame=True,
-                ),
-                Signal("qpos", ("coordinate",), (self.model.nq,), "1", "generalised position", every_frame=True),
-            ),
-            coords={"muscle": self.anatomy.muscle_names, "axis": AXES, "side": SIDES},
-            attrs={
-                "total_mass_kg": self.total_mass_kg,
-                "body_length_m": geometry.length_m,
-            },
+            signals=worm_signals(anatomy),
+            coords={"muscle": anatomy.muscle_names, "axis": AXES, "side": SIDES},
+            attrs={"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m},
         )
 
     def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
@@ -409,18 +377,6 @@ class Worm(ABC):
         self._books = Books(*(np.array(state[field.name], dtype=float) for field in fields(Books)))
         self._touch = Touch.of_state(state)
         self._posture = self.locate()
-
-
-def _energies(n_muscles: int) -> tuple[Signal, ...]:
-    """Energies that the worm holds, and the books of what its muscles have done and where it went."""
-    return (
-        Signal("kinetic_energy", (), (), "J", "kinetic energy"),
-        Signal("elastic_energy", (), (), "J", "energy of strands and springs"),
-        Signal("potential_energy", (), (), "J", "energy of the weight"),
-        Signal("muscle_work", ("muscle",), (n_muscles,), "J", "work done by a ring muscle so far"),
-        Signal("damping_loss", (), (), "J", "energy lost to dampers so far"),
-        Signal("constraint_loss", (), (), "J", "energy lost to contacts, friction and inextensible edges so far"),
-    )
 
 
 class WormPlant(Worm):

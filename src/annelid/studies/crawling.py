@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,7 +11,7 @@ from annelid.config import ServoRings, WormBody, load_config
 from annelid.errors import ConfigError
 from annelid.studies.case import Case
 from annelid.studies.examination import Effort
-from annelid.studies.progress import StudyProgress
+from annelid.studies.progress import StudyProgress, in_stage
 from annelid.studies.store import Store
 from annelid.studies.tune.judge import Judged
 from annelid.studies.tune.search import judged_run
@@ -130,8 +129,7 @@ def crawl(
         AnnelidError: A run cannot be built or written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    report = None if progress is None else partial(progress, "crawling")
-    store.compute([point.case for point in chosen], jobs=jobs, progress=report)
+    store.compute([point.case for point in chosen], jobs=jobs, progress=in_stage(progress, "crawling"))
     return [Reading(point, judged_run(store, point.case)) for point in chosen]
 
 

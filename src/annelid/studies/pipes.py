@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from annelid.analysis.gait import Gait, gait
 from annelid.analysis.passage import Passage, passage_of
 from annelid.studies.case import Case
-from annelid.studies.progress import StudyProgress
+from annelid.studies.progress import StudyProgress, in_stage
 from annelid.studies.store import Store
 from annelid.view.figures.pipes import BendLine, Way, pipes_figure
 from annelid.view.output import write_csv
@@ -157,7 +157,7 @@ def pass_pipes(
     store.compute(
         [trial.case for trial in wanted],
         jobs=jobs,
-        progress=None if progress is None else lambda done, total, share: progress(STAGE, done, total, share),
+        progress=in_stage(progress, STAGE),
     )
     readings, ways = [], {}
     for trial in wanted:

@@ -12,7 +12,7 @@ import numpy as np
 
 from annelid.analysis.track import Track, Turn, track_of, turn_of
 from annelid.studies.case import Case
-from annelid.studies.progress import StudyProgress
+from annelid.studies.progress import StudyProgress, in_stage
 from annelid.studies.store import Store
 from annelid.view.figures.turning import turning_figure
 from annelid.view.output import write_csv
@@ -125,7 +125,7 @@ def turning(
     store.compute(
         [case for _, _, case in work],
         jobs=jobs,
-        progress=None if progress is None else lambda done, total, share: progress(STAGE, done, total, share),
+        progress=in_stage(progress, STAGE),
     )
     readings, tracks = [], []
     for gait, modulation, case in work:

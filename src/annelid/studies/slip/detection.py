@@ -15,7 +15,8 @@ import numpy as np
 from annelid.analysis.detector import Detection, Score, detect, precision_recall, score
 from annelid.morphology import Array
 from annelid.studies.case import Case
-from annelid.studies.slip.feedback import DURATION_S, PLAIN, PRESET, PRESSURE, Progress, case
+from annelid.studies.progress import StudyProgress, in_stage
+from annelid.studies.slip.feedback import DURATION_S, PLAIN, PRESET, PRESSURE, case
 from annelid.studies.store import Store
 from annelid.view.output import write_csv
 
@@ -43,7 +44,7 @@ QUICK = (CHOSEN_ON, "sns-pressure, friction 1")
 
 
 def slip_detection(
-    store: Store, names: Sequence[str] | None = None, *, jobs: int | None = None, progress: Progress | None = None
+    store: Store, names: Sequence[str] | None = None, *, jobs: int | None = None, progress: StudyProgress | None = None
 ) -> dict[str, Detection]:
     """Runs the worms, as far as the store does not have them, and lets the detector read each.
 
@@ -58,8 +59,7 @@ def slip_detection(
         KeyboardInterrupt: Finished runs are kept.
     """
     cases = {name: CASES[name] for name in names or CASES}
-    tell = None if progress is None else lambda done, total, share: progress("detector", done, total, share)
-    store.compute(cases.values(), jobs=jobs, progress=tell)
+    store.compute(cases.values(), jobs=jobs, progress=in_stage(progress, "detector"))
     return {name: detect(store.run(one)) for name, one in cases.items()}
 
 

@@ -6,7 +6,7 @@ was tuned by hand on `PRESET` at one friction, `TUNED_AT`; every other friction 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from annelid.analysis.slip import SlipCost, slip_cost
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.studies.case import Case
+from annelid.studies.progress import StudyProgress, in_stage
 from annelid.studies.store import Store
 from annelid.view.output import write_csv
 
@@ -47,7 +48,6 @@ COLUMNS = (
     "one_wave",
 )
 
-Progress = Callable[[str, int, int, float], object]
 """Called with the stage, the number of runs done, their total, and the share of the work that is done."""
 
 
@@ -84,7 +84,7 @@ def slip_feedback(
     *,
     preset: str = PRESET,
     jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: StudyProgress | None = None,
 ) -> list[Reading]:
     """Runs the worm with every feedback on every friction, as far as the store does not have it.
 
@@ -106,8 +106,7 @@ def slip_feedback(
     if preset not in GAITS:
         raise ConfigError(f"preset is {preset!r}: must be one of {', '.join(GAITS)}")
     cases = {(friction, feedback): case(feedback, friction, preset) for friction in frictions for feedback in FEEDBACKS}
-    tell = None if progress is None else lambda done, total, share: progress("feedback", done, total, share)
-    store.compute(cases.values(), jobs=jobs, progress=tell)
+    store.compute(cases.values(), jobs=jobs, progress=in_stage(progress, "feedback"))
     return [
         Reading(feedback, friction, slip_cost(store.run(one)), store[one].rhythm.is_one_wave)
         for (friction, feedback), one in cases.items()

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import isfinite
 from typing import Any
 
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.errors import ConfigError
-from annelid.studies.progress import StudyProgress
+from annelid.studies.progress import StudyProgress, in_stage
 from annelid.studies.store import Store, case_key
 from annelid.studies.weak_middle.pulls import (
     ACTUATORS,
@@ -93,7 +92,7 @@ def settings(
     """
     tried: dict[Key, dict[float, Pulled]] = {key: {} for key in worms}
     wanted = {key: list(guesses_m[key]) for key in worms}
-    report = None if progress is None else partial(progress, STAGE)
+    report = in_stage(progress, STAGE)
     for _ in range(ROUNDS):
         cases = {
             (key, length): pull(1, length_limited(length), worms[key])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from math import nan
 from typing import Any, NamedTuple
 
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from annelid.analysis.elongation import interior_deficit
 from annelid.studies.case import Case
 from annelid.studies.examination import Effort
-from annelid.studies.progress import StudyProgress
+from annelid.studies.progress import StudyProgress, in_stage
 from annelid.studies.store import Store, case_key
 from annelid.studies.weak_middle.pulls import Actuator, Pulled, base_body, pull, read_pull
 from annelid.studies.weak_middle.settings import GUESSES_M, Key, Setting, settings
@@ -158,8 +157,7 @@ def compute(
         KeyboardInterrupt: Finished runs are kept.
     """
     cases = [case for point in points for case in point.cases]
-    report = None if progress is None else partial(progress, stage)
-    found = store.compute(cases, jobs=jobs, progress=report)
+    found = store.compute(cases, jobs=jobs, progress=in_stage(progress, stage))
     return [
         Reading(
             point,

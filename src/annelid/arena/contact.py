@@ -75,3 +75,14 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: Arena) -> None:
             **options,
         )
         geom.conaffinity = 1 if walls else 0
+
+
+def set_friction(model: mujoco.MjModel, friction: float) -> None:
+    """Gives skin and ground of a compiled worm another coefficient of sliding friction, from the next step on.
+
+    Args:
+        model: The worm; one with setae sets its own before every step.
+        friction: The coefficient.
+    """
+    model.geom_friction[(model.geom_contype != 0) | (model.geom_conaffinity != 0), 0] = friction
+    model.pair_friction[:, :2] = friction

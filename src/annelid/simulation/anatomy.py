@@ -127,6 +127,8 @@ class Anatomy:
         model: The compiled body.
         geometry: The mesh.
         muscle_names: Names of the ring muscles.
+        ring_path: Crossings that each of them runs through, in order, ``(n_muscles, n_corners)``.
+        crossing_body: The engine's body at every crossing, ``(n_crossings,)``.
         n_segments: Number of actuated segments.
         n_muscles: Number of ring muscles.
         rest_stretch_m: Lengths of the stretch sensors at rest, m, ``(n_segments, n_sensors)``.
@@ -155,7 +157,8 @@ class Anatomy:
         self.first_act = np.zeros(model.na) if self._servos is None else model.actuator_actrange[:, 1].copy()
         self.has_edges = bool(model.nflexedge)
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
-        self._ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
+        self.crossing_body: NDArray[np.int32] = model.site_bodyid[self._crossing_site]
+        self.ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
         self._mass_share = model.body_mass / model.body_mass.sum()
         self._edges_per_m = 1.0 / model.flexedge_length0
         self._contact_slice, self._skin_geom, self._segment_rows, self.skin = self._contacts_of_segments(surface)
@@ -214,7 +217,7 @@ class Anatomy:
         """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
         ends = crossing.take(self.geometry.springs, axis=-2)
         spring = _norm(ends[..., 1, :] - ends[..., 0, :])
-        corners = crossing.take(self._ring_path, axis=-2)
+        corners = crossing.take(self.ring_path, axis=-2)
         ring = _norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
         center = crossing.take(self.geometry.rings, axis=-2).mean(axis=-2)
         front = center[..., 0, :]

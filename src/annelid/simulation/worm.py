@@ -425,6 +425,14 @@ class WormPlant(Worm):
         forces, ground = self.anatomy.forces(self._outputs), self.anatomy.ground(self._outputs)
         return Movement(self.locate(), forces, ground)
 
+    def push(self, force_N: Array) -> None:
+        """Lets outside forces act on the crossings from the next step on; the books know nothing of their work.
+
+        Args:
+            force_N: In the model's axes, N, ``(n_crossings, 3)``; zeros end it.
+        """
+        self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
+
     def actuator_state(self) -> Array:
         """Returns the engine's actuator states, ``(n_states,)``."""
         return self.data.act

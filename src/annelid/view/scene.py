@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import Floor, RunConfig, WormBody
-from annelid.errors import RunFileError
 from annelid.view.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.view.gl import Canvas, find_backend
+from annelid.view.postures import postures_of
 from annelid.view.style import CONTRACTED, activation_color
 
 if TYPE_CHECKING:
@@ -56,20 +56,14 @@ class WormScene:
 
         self._angles = view_angles(camera)
         data = run.data
-        if "qpos" not in data or data.sizes.get("frame", 0) == 0:
-            raise RunFileError(f"{run.path} holds no recorded postures to draw")
         backend = find_backend()
         self._run = run
         self.times_s: NDArray[np.float64] = data["frame_time"].values
         self._model, self._rings = _model_to_draw(run.config)
+        self._qpos = postures_of(run, self._model.nq)
         # The floor takes the more of the headlight the steeper it is seen; seen from the top it would be white.
         steepness = abs(math.sin(math.radians(self._angles[1])))
         self._model.vis.headlight.ambient[:] = min(AMBIENT, AMBIENT + 0.1 - HEADLIGHT * steepness)
-        if data.sizes["coordinate"] != self._model.nq:
-            raise RunFileError(
-                f"{run.path} holds postures of {data.sizes['coordinate']} coordinates, but the body built "
-                f"from its configuration has {self._model.nq}: it was written by another version"
-            )
         self._posture = mujoco.MjData(self._model)
         self._ring_width = self._model.tendon_width[self._rings].copy()
         self._aspect = width / height
@@ -102,7 +96,7 @@ class WormScene:
         Returns:
             Pixels, shape ``(height, width, 3)``.
         """
-        _pose(self._model, self._posture, self._run.data["qpos"].values[frame])
+        _pose(self._model, self._posture, self._qpos[frame])
         self._color_rings(float(self.times_s[frame]))
         self._camera.lookat[:] = self._target[frame]
         caption = f"{self.times_s[frame]:.2f} s"
@@ -114,7 +108,7 @@ class WormScene:
 
     def _points_drawn(self) -> NDArray[np.float64]:
         """Both ends of every part of the worm in every recorded posture, m, shape ``(frame, point, 3)``."""
-        return np.stack([_part_ends(self._model, self._posture, qpos) for qpos in self._run.data["qpos"].values])
+        return np.stack([_part_ends(self._model, self._posture, qpos) for qpos in self._qpos])
 
     def _camera_and_option(self) -> tuple[mujoco.MjvCamera, mujoco.MjvOption]:
         return _free_camera(self._angles, fitting_distance(self._offsets, *self._angles, self._aspect)), _options()

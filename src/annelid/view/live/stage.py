@@ -1,0 +1,195 @@
+"""The 3D scene of a view: a few nodes that are made once and then only told where their points are."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from annelid.arena.scenery import (
+    FLOOR_HALF_SIZE_M,
+    PIPE_ABOVE_FLOOR_M,
+    PIPE_RGBA,
+    POST_HALF_HEIGHT_M,
+    POST_RGBA,
+    RAIL_HALF_HEIGHT_M,
+    RAIL_RGBA,
+)
+from annelid.arena.shapes import shape_of
+from annelid.config import Floor, Pipe, RunConfig
+from annelid.morphology import Array
+from annelid.view.camera import VIEWS_DEG, fitting_distance, picture_axes
+from annelid.view.live.picture import CONTACT_COLOR, Colors, Picture, uprighting
+
+if TYPE_CHECKING:
+    import viser
+
+FIELD_OF_VIEW_DEG = 30.0
+ASPECT = 1.3
+"""Of the canvas beside the panel, for which the camera is placed."""
+ROOM = 1.15
+"""Share that the worm is seen from farther than it would just fit: it grows longer and moves."""
+STRAND_WIDTH_M, RING_WIDTH_M, SPRING_WIDTH_M = 0.0045, 0.0085, 0.005
+LAYERS = ("strands", "rings", "springs", "contacts", "ground")
+"""What can be shown or hidden, by the names of the nodes."""
+_GROUND_COLOR = (0.90, 0.92, 0.94)
+_ROOT = "/worm"
+
+
+class Stage:
+    """Worm and arena in a viewer.
+
+    Attributes:
+        turn: Rotation from the model's axes to the page's, ``(3, 3)``.
+        shift_m: Where the model's origin is in the page, m, ``(3,)``.
+    """
+
+    def __init__(self, server: viser.ViserServer, config: RunConfig, strand_colors: Colors, first: Picture) -> None:
+        """Makes all nodes and places the camera so that the whole worm is seen.
+
+        Args:
+            server: Where they are seen.
+            config: The worm's arena.
+            strand_colors: Of all elements of the strands.
+            first: What is shown first.
+        """
+        self._scene = scene = server.scene
+        scene.configure_default_lights(enabled=True, cast_shadow=False)
+        scene.configure_environment_map(hdri=None)
+        scene.add_light_ambient("/light", intensity=2.0)
+        wxyz = uprighting(config)
+        self.turn = _rotation(wxyz)
+        self.shift_m = np.zeros(3)
+        self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=wxyz)
+        self._strands = scene.add_line_segments(
+            f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_WIDTH_M
+        )
+        self._rings = scene.add_line_segments(
+            f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_WIDTH_M
+        )
+        self._springs = scene.add_line_segments(
+            f"{_ROOT}/springs", first.springs, first.spring_colors, thickness=SPRING_WIDTH_M
+        )
+        self._contacts = scene.add_arrows(
+            f"{_ROOT}/contacts",
+            first.contacts,
+            CONTACT_COLOR,
+            shaft_radius=0.0035,
+            head_radius=0.009,
+            head_length=0.022,
+        )
+        length = float(np.ptp(first.strands[..., 0]))
+        _add_ground(server, config, length)
+        self._first_middle = first.middle
+        self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
+        self._place_camera(server, first)
+
+    def show(self, picture: Picture, *, follow: bool) -> None:
+        """Shows another instant.
+
+        Args:
+            picture: What is to be seen.
+            follow: Moves worm and ground so that the worm's middle stays where it is on the screen.
+        """
+        self._strands.points = picture.strands
+        self._rings.points = picture.rings
+        self._rings.colors = picture.ring_colors
+        self._springs.points = picture.springs
+        self._springs.colors = picture.spring_colors
+        self._contacts.points = picture.contacts
+        shift = self.turn @ (self._first_middle - picture.middle) if follow else np.zeros(3)
+        if self._level:
+            # A worm that breathes is not to make the ground bob.
+            shift[2] = 0.0
+        if np.abs(shift - self.shift_m).max() > 1e-4:
+            self.shift_m = shift
+            self._root.position = shift
+
+    def set_visible(self, layer: str, visible: bool) -> None:
+        """Shows or hides one of `LAYERS`."""
+        handle = self._scene.get_handle_by_name(f"{_ROOT}/{layer}")
+        assert handle is not None
+        handle.visible = visible
+
+    def to_model(self, origin: Array, direction: Array) -> tuple[Array, Array]:
+        """Turns a ray of the page into the model's axes."""
+        return (origin - self.shift_m) @ self.turn, direction @ self.turn
+
+    def _place_camera(self, server: viser.ViserServer, first: Picture) -> None:
+        points = first.strands.reshape(-1, 3) @ self.turn.T
+        target = (points.min(axis=0) + points.max(axis=0)) / 2
+        angles = VIEWS_DEG["isometric"]
+        _, _, sight = picture_axes(*angles)
+        distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
+        camera = server.initial_camera
+        camera.fov = math.radians(FIELD_OF_VIEW_DEG)
+        camera.look_at = target
+        camera.position = target - distance * sight
+
+
+def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -> None:
+    """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
+    scene, arena = server.scene, config.arena
+    assert arena is not None
+    scene.add_frame(f"{_ROOT}/ground", show_axes=False)
+    shape = shape_of(arena, length_m)
+    pipe = isinstance(arena, Pipe)
+    if shape is not None:
+        scene.add_mesh_simple(
+            f"{_ROOT}/ground/shape",
+            shape.vertices_m,
+            shape.faces,
+            color=PIPE_RGBA[:3] if pipe else _GROUND_COLOR,
+            opacity=PIPE_RGBA[3] if pipe else None,
+            side="double",
+        )
+    if shape is None or pipe:
+        depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
+        scene.add_grid(
+            f"{_ROOT}/ground/floor",
+            infinite_grid=True,
+            cell_size=0.1,
+            section_size=0.5,
+            cell_color=(214, 219, 224),
+            section_color=(178, 186, 194),
+            fade_distance=8.0,
+            plane_color=_GROUND_COLOR,
+            plane_opacity=0.0,
+            position=(0.0, 0.0, -depth),
+        )
+    if isinstance(arena, Floor):
+        _add_walls(scene, arena)
+
+
+def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:
+    for number, (x, y, radius) in enumerate(arena.posts or ()):
+        scene.add_cylinder(
+            f"{_ROOT}/ground/post_{number}",
+            radius=radius,
+            height=2 * POST_HALF_HEIGHT_M,
+            color=POST_RGBA[:3],
+            position=(x, y, POST_HALF_HEIGHT_M - arena.floor_gap_m),
+        )
+    if arena.rail_gap_m is None:
+        return
+    for side in (-1.0, 1.0):
+        scene.add_box(
+            f"{_ROOT}/ground/rail_{'left' if side < 0 else 'right'}",
+            dimensions=(FLOOR_HALF_SIZE_M, 0.004, 2 * RAIL_HALF_HEIGHT_M),
+            color=RAIL_RGBA[:3],
+            opacity=RAIL_RGBA[3],
+            position=(0.0, side * (arena.rail_gap_m / 2 + 0.002), RAIL_HALF_HEIGHT_M - arena.floor_gap_m),
+        )
+
+
+def _rotation(wxyz: tuple[float, float, float, float]) -> Array:
+    """Matrix of a unit quaternion."""
+    w, x, y, z = wxyz
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -1,0 +1,87 @@
+"""Which signals are plotted together: half-centres of all segments, the neurons of one, or activation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+MOST_SEGMENTS = 6
+"""With more than these the expansion neurons are left out of the first plot."""
+SECONDS = 5.0
+"""How far back the plots go, in simulated time."""
+_OF_SEGMENT = re.compile(r"(?P<role>\w+?)_(?P<segment>\d+)")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One signal of a plot.
+
+    Attributes:
+        signal: Its name in the reel.
+        label: Its name in the plot.
+        number: Its place among the plot's colours.
+        dashed: How it is drawn.
+    """
+
+    signal: str
+    label: str
+    number: int
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves that are drawn together.
+
+    Attributes:
+        title: What they are, with the unit.
+        curves: The curves.
+        n_colors: Among how many colours they choose.
+        limits: Lower and upper end of the axis, or None for those of the curves.
+    """
+
+    title: str
+    curves: tuple[Curve, ...]
+    n_colors: int
+    limits: tuple[float, float] | None = None
+
+
+def plots_of(names: Sequence[str]) -> dict[str, Plot]:
+    """Returns the plots that a worm's signals make, by the names that a user chooses from; the first is the default.
+
+    Args:
+        names: Signals of a reel: neurons as ``role_segment`` or plain names, then ``activation_1`` and so on.
+    """
+    by_segment: dict[int, list[str]] = {}
+    others: list[str] = []
+    for name in names:
+        match = _OF_SEGMENT.fullmatch(name)
+        if match is None:
+            others.append(name)
+        elif match["role"] != "activation":
+            by_segment.setdefault(int(match["segment"]), []).append(name)
+    plots: dict[str, Plot] = {}
+    if by_segment:
+        plots["half-centres"] = _half_centres(by_segment)
+        for segment, neurons in by_segment.items():
+            curves = tuple(Curve(n, n.rsplit("_", 1)[0], i) for i, n in enumerate(neurons))
+            plots[f"neurons of segment {segment}"] = Plot(f"segment {segment}: potentials (mV)", curves, len(curves))
+    if others:
+        curves = tuple(Curve(name, name, i) for i, name in enumerate(others))
+        plots["other neurons"] = Plot("potentials (mV)", curves, len(curves))
+    muscles = [name for name in names if name.startswith("activation_")]
+    curves = tuple(Curve(name, name.removeprefix("activation_"), i) for i, name in enumerate(muscles))
+    plots["activation"] = Plot("activation of the muscles", curves, len(curves), (-0.05, 1.05))
+    return plots
+
+
+def _half_centres(by_segment: dict[int, list[str]]) -> Plot:
+    curves: list[Curve] = []
+    for number, (segment, neurons) in enumerate(by_segment.items()):
+        if f"contraction_{segment}" in neurons:
+            curves.append(Curve(f"contraction_{segment}", str(segment), number))
+        if f"expansion_{segment}" in neurons and len(by_segment) <= MOST_SEGMENTS:
+            curves.append(Curve(f"expansion_{segment}", f"{segment} exp.", number, dashed=True))
+    words = ", expansion dashed" if any(curve.dashed for curve in curves) else ""
+    return Plot(f"contraction{words} (mV)", tuple(curves), len(by_segment))

@@ -10,6 +10,7 @@ from annelid.cli.results import plot, render, show
 from annelid.cli.robustness import robustness_command
 from annelid.cli.run import run_command
 from annelid.cli.tune import tune_command
+from annelid.cli.view import view_command
 from annelid.cli.worm import arenas, build, doctor, presets
 
 __all__ = ["app", "main"]
@@ -21,6 +22,7 @@ for _name, _command in (
     ("show", show),
     ("plot", plot),
     ("render", render),
+    ("view", view_command),
     ("limit-cycle", limit_cycle_command),
     ("paper", paper_command),
     ("bench", bench_command),

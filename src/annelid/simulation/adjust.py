@@ -16,11 +16,11 @@ Part = TypeVar("Part")
 
 
 def adjusted(running: Coupling, before: RunConfig, after: RunConfig) -> Coupling:
-    """Returns a coupling under another configuration, in the state of a running one, which is not to be used any more.
+    """Returns a coupling under another configuration, in the state of a running one that is not to be used any more.
 
-    Friction is changed in the compiled model, within microseconds. For anything else in the body, its ground or the clock
-    the body is built anew and takes over the old one's state; so does the controller. Either way the worm moves from here
-    on as one does that was built with the new values and brought into this state.
+    Friction is changed in the compiled model, which takes microseconds. For anything else in the body, its ground or
+    the clock the body is built anew and takes over the old one's state; so does the controller. Either way the worm
+    moves on as one does that was built with the new values and brought into this state.
 
     Args:
         running: Plant, controller and noise, whose plant and controller can be saved.

@@ -66,7 +66,7 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
 
 
 @contextmanager
-def video_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
+def video_bar(words: str = "drawing the video", *, quiet: bool = False) -> Iterator[Progress | None]:
     """Gives a progress callback whose bar shows up on a terminal once drawing takes more than two seconds."""
     if quiet or not sys.stderr.isatty():
         yield None
@@ -76,7 +76,7 @@ def video_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
 
     began = time.monotonic()
     bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
-    task = bar.add_task("drawing the video")
+    task = bar.add_task(words)
 
     def update(done: int, total: int) -> None:
         if time.monotonic() - began > BAR_AFTER_S:

@@ -59,7 +59,7 @@ class WormScene:
         backend = find_backend()
         self._run = run
         self.times_s: NDArray[np.float64] = data["frame_time"].values
-        self._model, self._rings = _model_to_draw(run.config)
+        self._model, self._rings = model_to_draw(run.config)
         self._qpos = postures_of(run, self._model.nq)
         # The floor takes the more of the headlight the steeper it is seen; seen from the top it would be white.
         steepness = abs(math.sin(math.radians(self._angles[1])))
@@ -96,7 +96,7 @@ class WormScene:
         Returns:
             Pixels, shape ``(height, width, 3)``.
         """
-        _pose(self._model, self._posture, self._qpos[frame])
+        pose(self._model, self._posture, self._qpos[frame])
         self._color_rings(float(self.times_s[frame]))
         self._camera.lookat[:] = self._target[frame]
         caption = f"{self.times_s[frame]:.2f} s"
@@ -104,7 +104,7 @@ class WormScene:
 
     def _color_rings(self, time_s: float) -> None:
         activation = self._run.data["activation"].sel(time=time_s, method="nearest").values
-        _color_rings(self._model, self._rings, self._ring_width, activation)
+        color_rings(self._model, self._rings, self._ring_width, activation)
 
     def _points_drawn(self) -> NDArray[np.float64]:
         """Both ends of every part of the worm in every recorded posture, m, shape ``(frame, point, 3)``."""
@@ -171,11 +171,11 @@ def render_still(
     import mujoco
 
     backend = find_backend()
-    model, rings = _model_to_draw(config)
+    model, rings = model_to_draw(config)
     if activation is None:
         model.tendon_rgba[:] = (*CONTRACTED, 1.0)
     else:
-        _color_rings(model, rings, model.tendon_width[rings].copy(), activation)
+        color_rings(model, rings, model.tendon_width[rings].copy(), activation)
     model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
     model.vis.headlight.ambient[:] = STILL_AMBIENT
     posture = mujoco.MjData(model)
@@ -186,7 +186,7 @@ def render_still(
     model.vis.rgba.fog[:] = 1.0
     model.vis.map.fogstart = distance / model.stat.extent - reach
     model.vis.map.fogend = distance / model.stat.extent + PALE * reach
-    _pose(model, posture, model.qpos0 if qpos is None else qpos)
+    pose(model, posture, model.qpos0 if qpos is None else qpos)
     camera = _free_camera(angles_deg, distance)
     camera.lookat[:] = target
     with Canvas(model, *size, backend) as canvas:
@@ -200,7 +200,7 @@ def _upright(config: RunConfig) -> NDArray[np.float64]:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-def _pose(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.float64]) -> None:
+def pose(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.floating]) -> None:
     """Brings all that is drawn into a posture."""
     import mujoco
 
@@ -209,9 +209,17 @@ def _pose(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.float6
         stage(model, posture)
 
 
-def _color_rings(
-    model: mujoco.MjModel, rings: NDArray[np.int64], widths: NDArray[np.float64], activation: NDArray[np.float64]
+def color_rings(
+    model: mujoco.MjModel, rings: NDArray[np.int64], widths: NDArray[np.float64], activation: NDArray[np.floating]
 ) -> None:
+    """Gives the ring muscles colours and widths by their activation.
+
+    Args:
+        model: The model to draw.
+        rings: Their tendons, ``(n_muscles,)``.
+        widths: Widths of relaxed ones, m, same shape.
+        activation: In [0, 1], same shape.
+    """
     for ring, width, value in zip(rings, widths, activation, strict=True):
         model.tendon_rgba[ring] = (*activation_color(float(value)), 1.0)
         model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * float(value))
@@ -253,7 +261,7 @@ def _options() -> mujoco.MjvOption:
     return option
 
 
-def _model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]]:
+def model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]]:
     """Compiles the run's model with a picture's lens and light; returns it with its ring tendons' ids."""
     import mujoco
 

@@ -26,7 +26,7 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
         ),
     )
     cells = "".join(
-        f'<tr><td style="padding:2px 8px 2px 0;text-align:center">{mark}</td><td style="padding:2px 0">{words}</td></tr>'
+        f'<tr><td style="padding:2px 8px 2px 0;text-align:center">{mark}</td><td>{words}</td></tr>'
         for mark, words in rows
     )
     return f'<table style="font-size:0.8em;line-height:1.25;border-collapse:collapse">{cells}</table>'

@@ -112,7 +112,7 @@ class LivingWorm:
             place_m: In the model's axes, m, ``(3,)``.
             force_N: The whole force, N, ``(3,)``; neighbouring crossings share it.
         """
-        away = np.linalg.norm(self.plant.read(True)["crossing_position"] - place_m, axis=-1)
+        away = np.linalg.norm(np.asarray(self.plant.read(True)["crossing_position"]) - place_m, axis=-1)
         share = np.exp(-0.5 * ((away - away.min()) / POKE_RADIUS_M) ** 2)
         self.plant.push((share / share.sum())[:, np.newaxis] * force_N)
         self._poke_ends_s = self.time_s + POKE_S

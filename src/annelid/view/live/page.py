@@ -14,11 +14,9 @@ from annelid.config import RunConfig
 from annelid.errors import RunFileError
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
-from annelid.simulation.worm import compile_worm
 from annelid.view.live.legend import legend_html
-from annelid.view.live.living import LivingWorm, require_worm
-from annelid.view.live.moments import Reel, reel_of
 from annelid.view.live.picture import Lines, Painter, Picture
+from annelid.view.live.player import Player, config_of, player_of
 from annelid.view.live.server import Server
 from annelid.view.live.skeleton import Skeleton
 from annelid.view.live.stage import Stage
@@ -55,22 +53,25 @@ def export_page(
         RunFileError: The run holds no postures, or the file has another suffix or cannot be written.
         SimulationStopped: A guard stopped the worm.
     """
-    path = with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
+    path = page_path(path)
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
-    config = source.config if isinstance(source, Run) else source
-    require_worm(config)
-    if isinstance(source, Run):
-        anatomy = compile_worm(config)
-        reel = reel_of(source, anatomy.model.nq)
-        page = _page(config, anatomy, reel, _times(*reel.span_s), speed, None, progress)
-    else:
-        worm = LivingWorm(config)
-        times = _times(0.0, config.duration_s)
-        page = _page(config, worm.plant.anatomy, worm.reel, times, speed, worm, progress)
+    config = config_of(source)
+    player, anatomy = player_of(source)
+    span = (0.0, config.duration_s) if player.worm is not None else player.reel.span_s
+    page = _page(config, anatomy, player, _times(*span), speed, progress)
     with whole_file(path) as draft:
         draft.write_text(page, encoding="utf-8")
     return path
+
+
+def page_path(path: str | Path) -> Path:
+    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``.
+
+    Raises:
+        RunFileError: Another suffix, or a folder.
+    """
+    return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
 
 
 def _times(first_s: float, last_s: float) -> list[float]:
@@ -81,14 +82,14 @@ def _times(first_s: float, last_s: float) -> list[float]:
 def _page(
     config: RunConfig,
     anatomy: Anatomy,
-    reel: Reel,
+    player: Player,
     times_s: list[float],
     speed: float,
-    worm: LivingWorm | None,
     progress: Progress | None,
 ) -> str:
     """Lets a server that nobody visits record what it would send."""
     painter = Painter(Skeleton(anatomy), config)
+    reel, worm = player.reel, player.worm
     server = Server()
     try:
         stage = Stage(server, config, painter.strand_colors(), _rounded(painter.paint(reel.at(times_s[0]))))
@@ -115,9 +116,7 @@ def _rounded(picture: Picture) -> Picture:
     lines: dict[str, Any] = {
         name: _grained(getattr(picture, name)) for name in ("strands", "rings", "springs", "contacts")
     }
-    return Picture(
-        **lines, ring_colors=picture.ring_colors, spring_colors=picture.spring_colors, middle=picture.middle
-    )
+    return Picture(**lines, ring_colors=picture.ring_colors, spring_colors=picture.spring_colors, middle=picture.middle)
 
 
 def _grained(lines: Lines) -> Lines:
@@ -129,7 +128,7 @@ def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> st
     name, summary = html.escape(config.name), html.escape(config.summary)
     pace = "" if speed == 1.0 else f", {speed:g} &times; real time"
     style = (
-        "position:fixed;left:12px;top:10px;z-index:5;max-width:26em;padding:8px 12px;border-radius:4px;"
+        "position:fixed;right:12px;top:10px;z-index:5;max-width:26em;padding:8px 12px;border-radius:4px;"
         "background:rgba(255,255,255,0.85);font-family:sans-serif;color:#222;pointer-events:none"
     )
     caption = (

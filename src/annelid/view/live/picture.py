@@ -142,6 +142,6 @@ def _segments(vertices: Array) -> Lines:
     return np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3).astype(np.float32)
 
 
-def _bytes(colors: Array) -> Colors:
+def _bytes(colors: NDArray[np.floating]) -> Colors:
     """Colours as the viewer takes those of lines: it adds the gamma of the screen, which ours have already."""
     return np.rint(255.0 * colors**SCREEN_GAMMA).astype(np.uint8)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 
+from annelid.config import RunConfig
 from annelid.errors import SimulationStopped
-from annelid.view.live.living import LivingWorm
-from annelid.view.live.moments import Moment, Reel
+from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.runfile import Run
+from annelid.simulation.worm import compile_worm
+from annelid.view.live.living import LivingWorm, require_worm
+from annelid.view.live.moments import Moment, Reel, reel_of
 
 SLOWEST, FASTEST = 0.05, 10.0
 """Simulated seconds a second."""
@@ -104,3 +108,29 @@ class Player:
         self._clock_s = first
         self.at_end = first >= last
         self.playing = True
+
+
+def config_of(source: RunConfig | Run) -> RunConfig:
+    """Returns the configuration that a worm is run under, or was.
+
+    Raises:
+        ConfigError: It is a planar worm.
+    """
+    config = source.config if isinstance(source, Run) else source
+    require_worm(config)
+    return config
+
+
+def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy]:
+    """Returns the player of a configuration, which is run, or of a run, and the body that is seen.
+
+    Raises:
+        ConfigError: The body is planar, or cannot be built.
+        RunFileError: The run holds no postures.
+    """
+    config = config_of(source)
+    if isinstance(source, Run):
+        anatomy = compile_worm(config)
+        return Player(reel_of(source, anatomy.model.nq), speed), anatomy
+    worm = LivingWorm(config)
+    return Player(worm, speed), worm.plant.anatomy

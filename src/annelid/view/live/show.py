@@ -13,14 +13,11 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.errors import AnnelidError
 from annelid.simulation.runfile import Run
-from annelid.simulation.worm import compile_worm
 from annelid.view.live.knobs import knobs_of
 from annelid.view.live.legend import legend_html
-from annelid.view.live.living import LivingWorm, require_worm
-from annelid.view.live.moments import reel_of
 from annelid.view.live.panel import Panel
 from annelid.view.live.picture import Painter
-from annelid.view.live.player import Player
+from annelid.view.live.player import config_of, player_of
 from annelid.view.live.poke import struck
 from annelid.view.live.server import LOOPBACK, Server
 from annelid.view.live.skeleton import Skeleton
@@ -61,15 +58,8 @@ class Show:
             ConfigError: The body is planar, or cannot be built.
             RunFileError: The run holds no postures.
         """
-        self._config = source.config if isinstance(source, Run) else source
-        require_worm(self._config)
-        if isinstance(source, Run):
-            anatomy = compile_worm(self._config)
-            self.player = Player(reel_of(source, anatomy.model.nq), speed)
-        else:
-            worm = LivingWorm(source)
-            anatomy = worm.plant.anatomy
-            self.player = Player(worm, speed)
+        self._config = config_of(source)
+        self.player, anatomy = player_of(source, speed)
         living = self.player.worm is not None
         self._painter = Painter(Skeleton(anatomy), self._config)
         self._picture = self._painter.paint(self.player.moment)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 FIELD_OF_VIEW_DEG = 30.0
 ASPECT = 1.3
 """Of the canvas beside the panel, for which the camera is placed."""
-ROOM = 1.15
+ROOM = 1.3
 """Share that the worm is seen from farther than it would just fit: it grows longer and moves."""
 STRAND_WIDTH_M, RING_WIDTH_M, SPRING_WIDTH_M = 0.0045, 0.0085, 0.005
 LAYERS = ("strands", "rings", "springs", "contacts", "ground")
@@ -65,9 +65,7 @@ class Stage:
         self._strands = scene.add_line_segments(
             f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_WIDTH_M
         )
-        self._rings = scene.add_line_segments(
-            f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_WIDTH_M
-        )
+        self._rings = scene.add_line_segments(f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_WIDTH_M)
         self._springs = scene.add_line_segments(
             f"{_ROOT}/springs", first.springs, first.spring_colors, thickness=SPRING_WIDTH_M
         )

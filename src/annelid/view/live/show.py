@@ -26,7 +26,7 @@ from annelid.view.live.traces import SECONDS, plots_of
 
 FRAMES_A_SECOND = 30.0
 """At most; fewer where a step of the body takes longer."""
-PANEL_INTERVAL_S = 0.2
+PANEL_INTERVAL_S = 0.25
 """Between two updates of plots, time and status."""
 PACE_OVER_S = 2.0
 """Over which the speed that is reached is measured."""

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from annelid.arena.scenery import (
     FLOOR_HALF_SIZE_M,
@@ -33,6 +34,11 @@ ROOM = 1.3
 STRAND_WIDTH_M, RING_WIDTH_M, SPRING_WIDTH_M = 0.0045, 0.0085, 0.005
 LAYERS = ("strands", "rings", "springs", "contacts", "ground")
 """What can be shown or hidden, by the names of the nodes."""
+FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
+"""What is drawn of the floor: the worm leads towards -x."""
+SQUARE_M = 0.2
+SQUARE_COLOR = (0.80, 0.83, 0.86)
+STRIP_M = 0.003
 _GROUND_COLOR = (0.90, 0.92, 0.94)
 _ROOT = "/worm"
 
@@ -144,20 +150,35 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -
         )
     if shape is None or pipe:
         depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
-        scene.add_grid(
-            f"{_ROOT}/ground/floor",
-            infinite_grid=True,
-            cell_size=0.1,
-            section_size=0.5,
-            cell_color=(214, 219, 224),
-            section_color=(178, 186, 194),
-            fade_distance=8.0,
-            plane_color=_GROUND_COLOR,
-            plane_opacity=0.0,
-            position=(0.0, 0.0, -depth),
+        vertices, faces = _squares(-depth)
+        scene.add_mesh_simple(
+            f"{_ROOT}/ground/floor", vertices, faces, color=SQUARE_COLOR, side="double", cast_shadow=False
         )
     if isinstance(arena, Floor):
         _add_walls(scene, arena)
+
+
+def _squares(height_m: float) -> tuple[Array, NDArray[np.int32]]:
+    """Strips that make squares to see the worm move against: vertices and faces of a mesh.
+
+    An endless grid, or lines, would take longer to draw than the worm.
+    """
+    (ahead, behind), side = FLOOR_X_M, FLOOR_HALF_WIDTH_M
+    strips = [(x - _half_width(x), x + _half_width(x), -side, side) for x in _marks(ahead, behind)]
+    strips += [(ahead, behind, y - _half_width(y), y + _half_width(y)) for y in _marks(-side, side)]
+    corners = [[(a, c, height_m), (b, c, height_m), (b, d, height_m), (a, d, height_m)] for a, b, c, d in strips]
+    first = 4 * np.arange(len(strips))[:, np.newaxis, np.newaxis]
+    faces = first + np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array(corners).reshape(-1, 3), faces.reshape(-1, 3).astype(np.int32)
+
+
+def _marks(first: float, last: float) -> Array:
+    return np.linspace(first, last, round((last - first) / SQUARE_M) + 1)
+
+
+def _half_width(place_m: float) -> float:
+    """Of a strip, which is wider at every whole metre."""
+    return STRIP_M / 2 * (2.5 if abs(place_m - round(place_m)) < 1e-6 else 1.0)
 
 
 def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:

@@ -24,8 +24,8 @@ SAMPLE_S = 0.01
 """Signals for the plots are kept at most this often, in simulated time."""
 POKE_S = 0.15
 """How long a poke lasts, in simulated time."""
-POKE_RADIUS_M = 0.04
-"""Distance from the middle of a poke at which its force has fallen to 0.6, as on a finger's width of skin."""
+POKE_RADIUS_M = 0.06
+"""Distance from the middle of a poke at which its force has fallen to 0.6, as under the flat of a hand."""
 
 
 class LivingWorm:

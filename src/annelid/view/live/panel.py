@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from annelid.view.live.show import Show
 
 PLAY, NOW, AGAIN = "play / pause", "now", "restart"
-STRONGEST_POKE_N = 20.0
-USUAL_POKE_N = 6.0
+STRONGEST_POKE = 3.0
+"""In weights of the worm; more would tear the thinnest."""
 PLOT_HEIGHT = 190
 """Of the plots, pixels."""
 
@@ -40,6 +40,7 @@ class Panel:
         *,
         living: bool,
         speed: float,
+        weight_N: float,
         knobs: Mapping[Knob, float],
         plots: Mapping[str, Plot],
         legend: str,
@@ -51,6 +52,7 @@ class Panel:
             show: Whom they ask.
             living: Whether the worm runs, else it was recorded.
             speed: Simulated seconds a second at the start.
+            weight_N: Of the worm on Earth, which pokes are measured by.
             knobs: What can be turned, with the values that are shown first.
             plots: What can be plotted, by name; the first is.
             legend: What colours mean, as HTML.
@@ -70,10 +72,11 @@ class Panel:
                 self._poke = gui.add_slider(
                     "poke (N)",
                     0.0,
-                    STRONGEST_POKE_N,
-                    0.5,
-                    USUAL_POKE_N,
-                    hint="Force of a poke: click on the worm, which is pushed away from you for 0.15 s.",
+                    STRONGEST_POKE * weight_N,
+                    0.1,
+                    weight_N,
+                    hint="Force of a poke, the worm's weight at first: click on the worm, which is pushed away from "
+                    "you for 0.15 s.",
                 )
                 gui.add_button("as at first", hint="Gives every slider above its first value.").on_click(
                     lambda _: show.ask(show.reset_knobs)

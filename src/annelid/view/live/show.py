@@ -6,12 +6,13 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from time import perf_counter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from annelid.config import RunConfig
 from annelid.errors import AnnelidError
+from annelid.morphology import Array
 from annelid.simulation.runfile import Run
 from annelid.view.live.knobs import knobs_of
 from annelid.view.live.legend import legend_html
@@ -24,12 +25,16 @@ from annelid.view.live.skeleton import Skeleton
 from annelid.view.live.stage import Stage
 from annelid.view.live.traces import SECONDS, plots_of
 
+if TYPE_CHECKING:
+    import viser
+
 FRAMES_A_SECOND = 30.0
 """At most; fewer where a step of the body takes longer."""
 PANEL_INTERVAL_S = 0.25
 """Between two updates of plots, time and status."""
 PACE_OVER_S = 2.0
 """Over which the speed that is reached is measured."""
+EARTH_M_PER_S2 = 9.81
 MOST_SAMPLES = 250
 """Of one curve of a plot."""
 
@@ -41,6 +46,7 @@ class Show:
 
     Attributes:
         player: What is shown when.
+        picture: What is seen, in the model's axes.
         address: Of the page.
         frames_drawn: Number of pictures sent so far.
     """
@@ -62,7 +68,7 @@ class Show:
         self.player, anatomy = player_of(source, speed)
         living = self.player.worm is not None
         self._painter = Painter(Skeleton(anatomy), self._config)
-        self._picture = self._painter.paint(self.player.moment)
+        self.picture = self._painter.paint(self.player.moment)
         self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
         self._wishing = threading.Lock()
         self._ending = threading.Event()
@@ -74,12 +80,13 @@ class Show:
         self._plots = plots_of(self.player.reel.names)
         self._server = Server(host, port)
         self.address = f"http://{'localhost' if host == LOOPBACK else host}:{self._server.get_port()}"
-        self._stage = Stage(self._server, self._config, self._painter.strand_colors(), self._picture)
+        self._stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
         self._panel = Panel(
             self._server,
             self,
             living=living,
             speed=speed,
+            weight_N=round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1),
             knobs={knob: knob.shown(self._config) for knob in self._knobs},
             plots=self._plots,
             legend=legend_html(self._painter.arrow_N, anatomy.geometry.radius_m),
@@ -107,6 +114,15 @@ class Show:
                 self._update_panel(begun)
                 panel_due = begun + PANEL_INTERVAL_S
             self._ending.wait(max(0.0, begun + 1.0 / FRAMES_A_SECOND - perf_counter()))
+
+    @property
+    def shift_m(self) -> Array:
+        """Where the model's origin is in the page, m, ``(3,)``."""
+        return self._stage.shift_m
+
+    def clients(self) -> list[viser.ClientHandle]:
+        """Returns the browsers that look on, each with its camera."""
+        return list(self._server.get_clients().values())
 
     def end(self) -> None:
         """Lets `run` return; may be called from any thread."""
@@ -166,7 +182,7 @@ class Show:
             self._notice = "This is the past: press *now* and poke the worm again."
             return
         origin, sight = self._stage.to_model(np.asarray(origin_m), np.asarray(direction))
-        place = struck(self._picture.strands.reshape(-1, 3).astype(float), origin, sight)
+        place = struck(self.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
             worm.poke(place, self._panel.poke_N * sight)
 
@@ -194,9 +210,9 @@ class Show:
                 self._notice = str(error)
 
     def _draw(self) -> None:
-        self._picture = self._painter.paint(self.player.moment)
+        self.picture = self._painter.paint(self.player.moment)
         with self._server.atomic():
-            self._stage.show(self._picture, follow=self._follow)
+            self._stage.show(self.picture, follow=self._follow)
         self._server.flush()
         self.frames_drawn += 1
 

@@ -1,0 +1,126 @@
+"""A running worm under changed values moves as one that was built with them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.config import RunConfig, load_config
+from annelid.errors import ConfigError
+from annelid.simulation.adjust import adjusted
+from annelid.simulation.assemble import build_controller, build_plant
+from annelid.simulation.coupling import Coupling, start
+from annelid.simulation.worm import WormPlant
+
+BEFORE_S, AFTER_STEPS = 0.5, 5
+
+
+def running(config: RunConfig) -> Coupling:
+    """A worm that has gone for half a second."""
+    plant = build_plant(config)
+    coupling = start(config, plant, build_controller(config, plant), None)
+    while coupling.step * config.clock.control_timestep_s < BEFORE_S:
+        coupling.advance()
+    return coupling
+
+
+def built_with(config: RunConfig, state_of: Coupling) -> Coupling:
+    """A worm built with a configuration and brought into the state of another."""
+    checkpoint = state_of.checkpoint()
+    assert checkpoint is not None
+    plant = build_plant(config)
+    controller = build_controller(config, plant)
+    plant.set_state(checkpoint.plant)
+    controller.set_state(checkpoint.controller)
+    return Coupling(config, plant, controller, state_of.sensation, np.random.default_rng(0), state_of.step)
+
+
+def posture_after(coupling: Coupling) -> np.ndarray:
+    for _ in range(AFTER_STEPS):
+        coupling.advance()
+    assert isinstance(coupling.plant, WormPlant)
+    return coupling.plant.qpos().copy()
+
+
+@settings(max_examples=3, deadline=None)
+@given(friction=st.floats(0.05, 2.0))
+def test_friction_changed_live_is_friction_built_in(friction: float) -> None:
+    before = load_config("riddle2023-rods")
+    after = load_config("riddle2023-rods", {"arena.friction": friction})
+    coupling = running(before)
+    twin = built_with(after, coupling)
+    live = adjusted(coupling, before, after)
+    assert live.plant is coupling.plant
+    np.testing.assert_array_equal(posture_after(live), posture_after(twin))
+
+
+@pytest.mark.parametrize(
+    ("arena", "overrides"),
+    [("pipe", {"arena.friction": 0.2}), ("setae", {"arena.friction": 0.2})],
+)
+def test_friction_changes_on_every_ground(arena: str, overrides: dict[str, Any]) -> None:
+    before = load_config("riddle2023-rods", arena=arena)
+    after = load_config("riddle2023-rods", overrides, arena=arena)
+    coupling = running(before)
+    twin, unchanged = built_with(after, coupling), built_with(before, coupling)
+    moved = posture_after(adjusted(coupling, before, after))
+    np.testing.assert_array_equal(moved, posture_after(twin))
+    assert np.abs(moved - posture_after(unchanged)).max() > 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"body.strands.young_modulus_Pa": 0.5e9},
+        {"body.springs.stiffness_N_per_m": 40.0},
+        {"sensor.tolerance_m": 0.03},
+        {"controller.gate_time_constant_ms": 100.0},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_other_values_changed_live_are_values_built_in(change: dict[str, Any]) -> None:
+    before = load_config("riddle2023-rods")
+    after = load_config("riddle2023-rods", change)
+    coupling = running(before)
+    time_before, twin = coupling.step, built_with(after, coupling)
+    live = adjusted(coupling, before, after)
+    assert live.step == time_before
+    np.testing.assert_array_equal(posture_after(live), posture_after(twin))
+
+
+def test_noise_changed_live_reaches_the_controller() -> None:
+    before = load_config("riddle2023-rods")
+    after = load_config("riddle2023-rods", {"sensor.noise_m": 0.005})
+    live = adjusted(running(before), before, after)
+    noise = live.felt().stretch_m - live.sensation.stretch_m
+    assert 0.001 < noise.std() < 0.02
+
+
+def test_another_body_is_refused_and_nothing_changes() -> None:
+    before = load_config("riddle2023-rods")
+    coupling = running(before)
+    state = coupling.plant.get_state()
+    with pytest.raises(ConfigError, match="other states"):
+        adjusted(coupling, before, load_config("riddle2023-rods", {"body.mesh.n_segments": 4}))
+    np.testing.assert_array_equal(coupling.plant.get_state()["engine"], state["engine"])
+
+
+def test_outside_forces_push_the_worm_and_end() -> None:
+    config = load_config("riddle2023-rods")
+    pushed, left_alone = running(config), running(config)
+    plant = pushed.plant
+    assert isinstance(plant, WormPlant)
+    force = np.zeros((plant.geometry.n_crossings, 3))
+    force[:, 1] = 10.0 / len(force)
+    plant.push(force)
+    for _ in range(3):
+        pushed.advance()
+        left_alone.advance()
+    shift = pushed.sensation.center_of_mass_m - left_alone.sensation.center_of_mass_m
+    assert shift[1] > 0.005
+    plant.push(np.zeros_like(force))
+    assert not plant.data.xfrc_applied.any()

@@ -1,0 +1,267 @@
+"""The live view without a browser: what is drawn, what is remembered, what is shown when, what can be turned."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.config import load_config, preset_names
+from annelid.errors import ConfigError, RunFileError
+from annelid.simulation.runfile import Run
+from annelid.simulation.worm import compile_worm
+from annelid.view.live.knobs import knobs_of
+from annelid.view.live.living import LivingWorm
+from annelid.view.live.moments import Moment, Reel, reel_of
+from annelid.view.live.picture import Painter, ring_colors, spring_colors, uprighting
+from annelid.view.live.player import Player, player_of
+from annelid.view.live.poke import REACH_M, struck
+from annelid.view.live.skeleton import Skeleton
+from annelid.view.live.traces import plots_of
+
+FRAME_S = 0.04
+
+
+def reel(n: int) -> Reel:
+    """Moments every 40 ms whose posture is their number."""
+    made = Reel(["contraction_1", "activation_1"])
+    for i in range(n):
+        made.add(Moment(i * FRAME_S, np.full(3, i), np.zeros(1), np.zeros((1, 3))))
+        made.add_sample(i * FRAME_S, np.array([i, -i], dtype=float))
+    return made
+
+
+def moment(qpos: np.ndarray, n_segments: int, force: np.ndarray | None = None) -> Moment:
+    still = np.zeros((n_segments, 3)) if force is None else force
+    return Moment(0.0, qpos, np.linspace(0, 1, n_segments), still)
+
+
+@pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])
+def test_strands_at_rest_lie_where_the_mesh_is(preset: str) -> None:
+    anatomy = compile_worm(load_config(preset))
+    vertices, crossing = Skeleton(anatomy).locate(anatomy.model.qpos0)
+    np.testing.assert_allclose(vertices, anatomy.geometry.vertices_m, atol=1e-12)
+    np.testing.assert_allclose(crossing, anatomy.geometry.crossings_m, atol=1e-12)
+
+
+def test_strands_follow_the_worm() -> None:
+    worm = LivingWorm(load_config("riddle2023-rods"))
+    worm.advance(0.3, math.inf)
+    vertices, crossing = Skeleton(worm.plant.anatomy).locate(worm.plant.qpos())
+    np.testing.assert_array_equal(crossing, worm.plant.read(True)["crossing_position"])
+    edges = np.linalg.norm(np.diff(vertices, axis=1), axis=-1)
+    rest = np.linalg.norm(np.diff(worm.plant.geometry.vertices_m, axis=1), axis=-1)
+    np.testing.assert_allclose(edges, rest, rtol=0.03)
+
+
+def test_a_picture_has_every_part() -> None:
+    config = load_config("riddle2023-rods")
+    anatomy = compile_worm(config)
+    painter = Painter(Skeleton(anatomy), config)
+    lift = np.zeros((3, 3))
+    lift[1, 2] = painter.arrow_N
+    picture = painter.paint(moment(anatomy.model.qpos0, 3, lift))
+    strands, vertices, _ = anatomy.geometry.vertices_m.shape
+    assert picture.strands.shape == (strands * (vertices - 1), 2, 3) == painter.strand_colors().shape
+    assert picture.springs.shape == (len(anatomy.geometry.springs), 2, 3) == picture.spring_colors.shape
+    assert picture.rings.shape == picture.ring_colors.shape
+    arrows = picture.contacts[:, 1] - picture.contacts[:, 0]
+    np.testing.assert_allclose(arrows, [[0, 0, 0], [0, 0, anatomy.geometry.radius_m], [0, 0, 0]], atol=1e-6)
+    ring = anatomy.geometry.crossings_m[anatomy.geometry.rings[1]]
+    assert picture.contacts[1, 0, 2] == pytest.approx(ring[:, 2].min())
+
+
+def test_rings_redden_and_springs_tell_their_strain() -> None:
+    relaxed, contracted = ring_colors(np.array([0.0, 1.0]), 4).reshape(2, 4, 2, 3)[:, 0, 0].astype(int)
+    assert contracted[0] > relaxed[0]
+    assert contracted[2] < relaxed[2]
+    short, rest, long = spring_colors(np.array([-1.0, 0.0, 1.0]))[:, 0].astype(int)
+    assert short[2] > short[1]
+    assert long[0] > long[2]
+    np.testing.assert_array_equal(spring_colors(np.array([0.0]))[0, 0], rest)
+
+
+def test_a_slope_is_seen_as_a_slope() -> None:
+    w, x, y, z = uprighting(load_config("riddle2023-rods", {"arena.slope_deg": 20.0}))
+    assert (x, z) == (0.0, 0.0)
+    assert math.degrees(2 * math.atan2(y, w)) == pytest.approx(20.0)
+
+
+@given(time=st.floats(-1.0, 5.0))
+def test_the_moment_shown_is_the_last_one_before(time: float) -> None:
+    shown = reel(50).at(time).time_s
+    assert shown == 0.0 if time < 0 else shown <= time + 1e-9 < shown + FRAME_S + 1e-8 or shown == 49 * FRAME_S
+
+
+@given(first=st.floats(0, 2), length=st.floats(0, 2), most=st.integers(2, 60))
+def test_a_window_of_signals_is_thinned_evenly(first: float, length: float, most: int) -> None:
+    times, values = reel(50).window(first, first + length, most)
+    assert len(times) <= most + 1
+    assert ((times >= first) & (times <= first + length + 1e-6)).all()
+    np.testing.assert_allclose(values[:, 0] * FRAME_S, times)
+    assert len(set(np.diff(times).round(9))) <= 1
+
+
+def test_the_oldest_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.view.live.moments.KEEP_S", 1.0)
+    grown = reel(0)
+    for i in range(500):
+        grown.add(Moment(i * FRAME_S, np.zeros(3), np.zeros(1), np.zeros((1, 3))))
+        grown.add_sample(i * FRAME_S, np.zeros(2))
+        grown.forget()
+    first, last = grown.span_s
+    assert last == pytest.approx(499 * FRAME_S)
+    assert 1.0 <= last - first < 1.0 + 80 * FRAME_S
+    assert grown.window(0.0, last, 10_000)[0][0] >= first
+
+
+@given(ticks=st.lists(st.floats(0.0, 0.2), max_size=30), speed=st.floats(0.1, 10))
+def test_a_run_plays_at_its_speed_and_stops_at_its_end(ticks: list[float], speed: float) -> None:
+    player = Player(reel(50), speed)
+    for elapsed in ticks:
+        player.tick(elapsed)
+    passed = speed * sum(ticks)
+    end = 49 * FRAME_S
+    frame = FRAME_S * math.floor(passed / FRAME_S + 1e-6)
+    assert player.moment.time_s == pytest.approx(min(frame, end), abs=1.01 * FRAME_S)
+    if passed > end + 1e-6:
+        assert player.at_end
+        assert player.moment.time_s == end
+
+
+def test_pause_seek_play_and_restart() -> None:
+    player = Player(reel(50))
+    player.tick(0.5)
+    player.pause()
+    player.tick(5.0)
+    assert player.moment.time_s == pytest.approx(0.48)
+    player.seek(1.0)
+    assert (player.moment.time_s, player.playing) == (pytest.approx(1.0), False)
+    player.play()
+    player.tick(100.0)
+    assert (player.at_end, player.playing) == (True, False)
+    player.play()
+    assert player.moment.time_s == 0.0
+    player.seek(99.0)
+    player.restart()
+    assert (player.moment.time_s, player.playing) == (0.0, True)
+
+
+def test_a_living_worm_keeps_pace_and_can_be_looked_back_on() -> None:
+    player, _ = player_of(load_config("riddle2023-rods"), speed=2.0)
+    for _ in range(15):
+        player.tick(1 / 30)
+    # Steps of 20 ms: never behind the clock by more than rounding, never ahead by more than a step.
+    assert 1.0 - 1e-9 <= player.moment.time_s <= 1.02 + 1e-9
+    present = player.moment
+    player.seek(0.4)
+    assert not player.at_end
+    assert player.moment.time_s == pytest.approx(0.4, abs=0.08)
+    player.play()
+    player.tick(0.1)
+    assert player.moment.time_s < present.time_s
+    player.go_live()
+    assert player.moment is present
+    player.tick(0.05)
+    assert player.moment.time_s > present.time_s
+    player.restart()
+    assert (player.moment.time_s, player.reel.span_s) == (0.0, (0.0, 0.0))
+
+
+def test_a_worm_that_blows_up_says_so_and_can_start_anew() -> None:
+    player, _ = player_of(load_config("riddle2023-rods", {"guard.kinetic_energy_J": 1e-9}))
+    player.tick(5.0)
+    assert "kinetic energy" in player.stopped
+    assert not player.playing
+    seen = player.moment.time_s
+    player.play()
+    player.tick(1.0)
+    assert player.moment.time_s == seen
+    player.restart()
+    assert (player.stopped, player.moment.time_s) == ("", 0.0)
+
+
+def test_a_turned_knob_changes_the_model_and_a_bad_value_changes_nothing() -> None:
+    worm = LivingWorm(load_config("riddle2023-rods"))
+    worm.advance(0.1, math.inf)
+    worm.adjust({"arena.friction": 0.25})
+    model = worm.plant.model
+    touching = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    assert set(model.geom_friction[touching, 0]) == {0.25}
+    with pytest.raises(ConfigError, match="friction"):
+        worm.adjust({"arena.friction": -1.0})
+    assert worm.config.arena is not None
+    assert worm.config.arena.friction == 0.25
+    worm.as_at_first()
+    assert set(model.geom_friction[touching, 0]) == {1.0}
+    assert worm.time_s == pytest.approx(0.1)
+
+
+def test_a_poke_pushes_and_ends() -> None:
+    worm, left_alone = (LivingWorm(load_config("riddle2023-rods")) for _ in range(2))
+    place = worm.plant.geometry.crossings_m[20]
+    worm.poke(place, np.array([0.0, 4.0, 0.0]))
+    for each in (worm, left_alone):
+        each.advance(0.1, math.inf)
+    shift = worm.coupling.sensation.center_of_mass_m - left_alone.coupling.sensation.center_of_mass_m
+    assert shift[1] > 0.002
+    worm.advance(0.5, math.inf)
+    assert not worm.plant.data.xfrc_applied.any()
+
+
+def test_what_a_click_hits() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0]])
+    sight = np.array([1.0, 0.0, 0.0])
+    near = struck(points, np.array([-1.0, 0.5 * REACH_M, 0.0]), sight)
+    assert near is not None
+    np.testing.assert_array_equal(near, points[0])
+    assert struck(points, np.array([-1.0, 0.25, 0.0]), sight) is None
+    assert struck(points, np.array([2.0, 0.0, 0.0]), sight) is None
+
+
+@pytest.mark.parametrize("preset", [name for name in preset_names() if load_config(name).body.kind == "worm"])
+def test_every_knob_begins_inside_its_range_and_its_ends_are_allowed(preset: str) -> None:
+    config = load_config(preset)
+    knobs = knobs_of(config)
+    assert {"arena.friction", "body.strands.young_modulus_Pa"} <= {knob.field for knob in knobs}
+    for knob in knobs:
+        shown = knob.shown(config)
+        assert knob.low < knob.high
+        kept = load_config(config.model_dump(), {knob.field: knob.value(shown)})
+        assert knob.shown(kept) == shown
+        for end in (knob.low, knob.high):
+            load_config(config.model_dump(), {knob.field: knob.value(end)})
+
+
+def test_plots_name_what_the_controller_has() -> None:
+    names = [f"{role}_{i}" for i in (1, 2) for role in ("contraction", "expansion", "relay")]
+    plots = plots_of([*names, "tonic", "activation_1", "activation_2"])
+    assert list(plots) == [
+        "half-centres",
+        "neurons of segment 1",
+        "neurons of segment 2",
+        "other neurons",
+        "activation",
+    ]
+    assert {curve.signal for curve in plots["neurons of segment 2"].curves} == set(names[3:])
+    assert list(plots_of(["activation_1"])) == ["activation"]
+
+
+def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
+    n = rods_run.data.sizes["coordinate"]
+    recorded = reel_of(rods_run, n)
+    np.testing.assert_allclose(recorded.times_s, rods_run.data["frame_time"].values)
+    np.testing.assert_array_equal(recorded.at(0.12).qpos, rods_run.data["qpos"].sel(frame=3).values)
+    _, values = recorded.window(0.0, 1.0, 1000)
+    np.testing.assert_array_equal(values[:, :12], rods_run.data["potential"].values)
+    with pytest.raises(RunFileError, match="another version"):
+        reel_of(rods_run, n + 1)
+
+
+def test_planar_worms_are_refused(planar_run: Run) -> None:
+    for source in (planar_run, planar_run.config):
+        with pytest.raises(ConfigError, match="nothing to view in 3D"):
+            player_of(source)

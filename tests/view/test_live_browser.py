@@ -167,7 +167,14 @@ def test_an_exported_page_opens_from_disk_without_a_network(browser: Browser, sh
     page.on("request", lambda request: asked.append(request.url))
     page.goto(path.as_uri())
     page.wait_for_selector("canvas", timeout=60_000)
+    clock = page.locator("input").first
+    begun = clock.input_value()
+    wait_for(lambda: clock.input_value() != begun, page)
+    page.keyboard.press("Space")
+    clock.fill("0.0")
+    page.wait_for_timeout(500)
     first = pixels(page)
+    clock.fill("0.5")
     wait_for(lambda: np.abs(pixels(page) - first).mean() > MOVED, page)
     assert page.get_by_text("activation 0 to 1").count() == 1
     assert "riddle2023-rods" in page.title()

@@ -51,8 +51,9 @@ def examine() -> Iterator[Finding]:
         yield _package(package)
     yield from _back_ends()
     yield _ffmpeg()
-    for package in _extra("sns"):
-        yield _package(package, optional=True, remedy="pip install 'annelid[sns]'")
+    for extra in ("sns", "view"):
+        for package in _extra(extra):
+            yield _package(package, optional=True, remedy=f"pip install 'annelid[{extra}]'")
 
 
 def _engine() -> Finding:

@@ -31,7 +31,8 @@ ASPECT = 1.3
 """Of the canvas beside the panel, for which the camera is placed."""
 ROOM = 1.3
 """Share that the worm is seen from farther than it would just fit: it grows longer and moves."""
-STRAND_WIDTH_M, RING_WIDTH_M, SPRING_WIDTH_M = 0.0045, 0.0085, 0.005
+STRAND_PIXELS, RING_PIXELS, SPRING_PIXELS = 3.0, 6.0, 3.5
+"""Widths of lines; lines that grow thinner with distance take twice as long to draw without a graphics card."""
 LAYERS = ("strands", "rings", "springs", "contacts", "ground")
 """What can be shown or hidden, by the names of the nodes."""
 FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
@@ -69,11 +70,13 @@ class Stage:
         self.shift_m = np.zeros(3)
         self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=wxyz)
         self._strands = scene.add_line_segments(
-            f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_WIDTH_M
+            f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_PIXELS, thickness_units="screen"
         )
-        self._rings = scene.add_line_segments(f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_WIDTH_M)
+        self._rings = scene.add_line_segments(
+            f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_PIXELS, thickness_units="screen"
+        )
         self._springs = scene.add_line_segments(
-            f"{_ROOT}/springs", first.springs, first.spring_colors, thickness=SPRING_WIDTH_M
+            f"{_ROOT}/springs", first.springs, first.spring_colors, thickness=SPRING_PIXELS, thickness_units="screen"
         )
         self._contacts = scene.add_arrows(
             f"{_ROOT}/contacts",

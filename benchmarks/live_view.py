@@ -1,0 +1,75 @@
+"""Pictures a second that reach a headless Chromium from a worm that runs live, and how fast the worm runs meanwhile.
+
+    python benchmarks/live_view.py [PRESET] [SECONDS]
+
+A picture has reached the browser when it hands the strands to WebGL, which it does anew for each: uploads of just their
+size are counted, two a picture, since the colours are as large as the places. Chromium draws in software here, on the
+same cores as the worm; a browser with a graphics card leaves these to the worm.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import threading
+from time import perf_counter, process_time, sleep
+
+from playwright.sync_api import sync_playwright
+
+from annelid.config import load_config
+from annelid.view.live.show import Show
+
+COUNT_UPLOADS = """
+window.uploads = {};
+const upload = WebGL2RenderingContext.prototype.bufferData;
+WebGL2RenderingContext.prototype.bufferData = function (...given) {
+  const size = given[1].byteLength;
+  window.uploads[size] = (window.uploads[size] || 0) + 1;
+  return upload.apply(this, given);
+};
+"""
+ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+# Else the page around the scene is put together by the same software renderer, which takes as long as the scene.
+ARGUMENTS += ["--disable-gpu-compositing"]
+VIEWPORT = {"width": 1000, "height": 560}
+WARM_UP_S = 5.0
+
+
+def main(preset: str = "riddle2023-rods", seconds: float = 15.0) -> None:
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        sys.exit("there is no Chromium here")
+    with Show(load_config(preset)) as show, sync_playwright() as playwright:
+        loop = threading.Thread(target=show.run)
+        loop.start()
+        try:
+            browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+            page = browser.new_page(viewport=VIEWPORT)
+            page.add_init_script(COUNT_UPLOADS)
+            page.goto(show.address)
+            page.wait_for_selector("text=Nervous system", timeout=60_000)
+            sleep(WARM_UP_S)
+            size = show.picture.strands.nbytes
+
+            def reading() -> tuple[float, float, int, float, float]:
+                uploads = page.evaluate(f"window.uploads[{size}] || 0")
+                own = process_time()
+                return perf_counter(), show.player.moment.time_s, show.frames_drawn, uploads / 2, own
+
+            before = reading()
+            sleep(seconds)
+            passed, simulated, sent, drawn, own = (after - b for after, b in zip(reading(), before, strict=True))
+            browser.close()
+        finally:
+            show.end()
+            loop.join()
+    print(f"{preset}: {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
+    print(f"simulated over real time  {simulated / passed:6.2f}")
+    print(f"pictures sent a second    {sent / passed:6.1f}")
+    print(f"pictures drawn a second   {drawn / passed:6.1f}")
+    print(f"cores used by the worm and its server  {own / passed:6.2f}")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2], *map(float, sys.argv[2:3]))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
+from annelid.protocols import Stateful
 from annelid.simulation.adjust import adjusted
 from annelid.simulation.assemble import build_controller, build_plant
 from annelid.simulation.coupling import Coupling, start
@@ -34,6 +35,8 @@ def built_with(config: RunConfig, state_of: Coupling) -> Coupling:
     assert checkpoint is not None
     plant = build_plant(config)
     controller = build_controller(config, plant)
+    assert isinstance(plant, Stateful)
+    assert isinstance(controller, Stateful)
     plant.set_state(checkpoint.plant)
     controller.set_state(checkpoint.controller)
     return Coupling(config, plant, controller, state_of.sensation, np.random.default_rng(0), state_of.step)
@@ -103,10 +106,12 @@ def test_noise_changed_live_reaches_the_controller() -> None:
 def test_another_body_is_refused_and_nothing_changes() -> None:
     before = load_config("riddle2023-rods")
     coupling = running(before)
-    state = coupling.plant.get_state()
+    plant = coupling.plant
+    assert isinstance(plant, WormPlant)
+    state = plant.get_state()
     with pytest.raises(ConfigError, match="other states"):
         adjusted(coupling, before, load_config("riddle2023-rods", {"body.mesh.n_segments": 4}))
-    np.testing.assert_array_equal(coupling.plant.get_state()["engine"], state["engine"])
+    np.testing.assert_array_equal(plant.get_state()["engine"], state["engine"])
 
 
 def test_outside_forces_push_the_worm_and_end() -> None:

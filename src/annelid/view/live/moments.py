@@ -19,7 +19,7 @@ KEEP_S = 600.0
 _TRIM_EVERY = 64
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Moment:
     """A worm at one instant.
 

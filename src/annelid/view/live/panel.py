@@ -81,12 +81,12 @@ class Panel:
                 gui.add_button("as at first", hint="Gives every slider above its first value.").on_click(
                     lambda _: show.ask(show.reset_knobs)
                 )
-        with gui.add_folder("Nervous system"):
+        self._plot_folder = gui.add_folder("Nervous system, last 5 s")
+        self._chart: Any = None
+        with self._plot_folder:
             names = list(plots)
             choice = gui.add_dropdown("plot", names, initial_value=names[0])
             choice.on_update(lambda event: show.ask(show.choose_plot, str(event.target.value)))
-            self._plot_folder = gui.add_folder("last 5 s")
-            self._chart: Any = None
         self.show_plot(plots[names[0]])
         with gui.add_folder("Colours"):
             gui.add_html(legend)

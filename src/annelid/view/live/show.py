@@ -16,6 +16,7 @@ from annelid.morphology import Array
 from annelid.simulation.runfile import Run
 from annelid.view.live.knobs import knobs_of
 from annelid.view.live.legend import legend_html
+from annelid.view.live.moments import Moment
 from annelid.view.live.panel import Panel
 from annelid.view.live.picture import Painter
 from annelid.view.live.player import config_of, player_of
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 FRAMES_A_SECOND = 30.0
 """At most; fewer where a step of the body takes longer."""
+LONGEST_TICK_S = 0.25
+"""A computer that was asleep does not make the view leap."""
 PANEL_INTERVAL_S = 0.25
 """Between two updates of plots, time and status."""
 PACE_OVER_S = 2.0
@@ -75,6 +78,7 @@ class Show:
         self._follow = True
         self._notice = ""
         self._pace: deque[tuple[float, float]] = deque()
+        self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
         self._knobs = knobs_of(self._config) if living else ()
         self._plots = plots_of(self.player.reel.names)
@@ -107,7 +111,7 @@ class Show:
         while not self._ending.is_set():
             begun = perf_counter()
             self._meet_wishes()
-            self.player.tick(begun - last, deadline=begun + 1.0 / FRAMES_A_SECOND)
+            self.player.tick(min(begun - last, LONGEST_TICK_S), deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             self._draw()
             if begun >= panel_due:
@@ -210,6 +214,10 @@ class Show:
                 self._notice = str(error)
 
     def _draw(self) -> None:
+        wanted = self.player.moment, self._follow
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
         self.picture = self._painter.paint(self.player.moment)
         with self._server.atomic():
             self._stage.show(self.picture, follow=self._follow)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import viser
 
 FIELD_OF_VIEW_DEG = 30.0
-ASPECT = 1.3
+ASPECT = 1.0
 """Of the canvas beside the panel, for which the camera is placed."""
 ROOM = 1.3
 """Share that the worm is seen from farther than it would just fit: it grows longer and moves."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-MOST_SEGMENTS = 6
+MOST_SEGMENTS = 4
 """With more than these the expansion neurons are left out of the first plot."""
 SECONDS = 5.0
 """How far back the plots go, in simulated time."""

@@ -29,7 +29,7 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
         f'<tr><td style="padding:2px 8px 2px 0;text-align:center">{mark}</td><td>{words}</td></tr>'
         for mark, words in rows
     )
-    return f'<table style="font-size:0.8em;line-height:1.25;border-collapse:collapse">{cells}</table>'
+    return f'<table style="font-size:0.8em;line-height:1.25;border-collapse:collapse;margin-left:0.6em">{cells}</table>'
 
 
 def _bar(colors: Sequence[Sequence[float]], *, smooth: bool = True) -> str:

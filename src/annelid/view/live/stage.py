@@ -62,9 +62,10 @@ class Stage:
             first: What is shown first.
         """
         self._scene = scene = server.scene
-        scene.configure_default_lights(enabled=True, cast_shadow=False)
+        scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(hdri=None)
-        scene.add_light_ambient("/light", intensity=2.0)
+        scene.add_light_ambient("/sky", intensity=1.6)
+        scene.add_light_directional("/lamp", intensity=1.6, position=(1.0, -2.0, 4.0))
         wxyz = uprighting(config)
         self.turn = _rotation(wxyz)
         self.shift_m = np.zeros(3)
@@ -154,8 +155,15 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -
     if shape is None or pipe:
         depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
         vertices, faces = _squares(-depth)
+        # The plainest of the viewer's materials.
         scene.add_mesh_simple(
-            f"{_ROOT}/ground/floor", vertices, faces, color=SQUARE_COLOR, side="double", cast_shadow=False
+            f"{_ROOT}/ground/floor",
+            vertices,
+            faces,
+            color=SQUARE_COLOR,
+            material="toon3",
+            cast_shadow=False,
+            receive_shadow=False,
         )
     if isinstance(arena, Floor):
         _add_walls(scene, arena)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -269,6 +270,57 @@ def test_the_server_opens_no_tunnel_to_the_internet() -> None:
     assert server.get_host() == "127.0.0.1"
     assert server.request_share_url() is None
     server.stop()
+
+
+@pytest.mark.parametrize(
+    ("arena", "overrides", "nodes"),
+    [
+        ("rails", {"arena.posts": [[-0.4, 0.1, 0.1]]}, {"floor", "rail_left", "rail_right", "post_0"}),
+        ("steps", {}, {"relief"}),
+        ("pipe.bend", {}, {"pipe", "floor"}),
+    ],
+)
+def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[str]) -> None:
+    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
+    from annelid.view.live.server import Server
+    from annelid.view.live.stage import LAYERS, Stage
+
+    config = load_config("riddle2023-rods", overrides, arena=arena)
+    player, anatomy = player_of(config)
+    painter = Painter(Skeleton(anatomy), config)
+    server = Server()
+    try:
+        stage = Stage(server, config, painter.strand_colors(), painter.paint(player.moment))
+        names = {"floor", "rail_left", "rail_right", "post_0", "relief", "pipe"}
+        assert {name for name in names if server.scene.get_handle_by_name(f"/worm/ground/{name}")} == nodes
+        for layer in LAYERS:
+            stage.set_visible(layer, False)
+    finally:
+        server.stop()
+
+
+def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
+    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
+    from annelid.view.live.server import Server
+    from annelid.view.live.stage import Stage
+
+    config = load_config("riddle2023-rods", {"arena.slope_deg": 30.0})
+    player, anatomy = player_of(config)
+    painter = Painter(Skeleton(anatomy), config)
+    server = Server()
+    try:
+        stage = Stage(server, config, painter.strand_colors(), painter.paint(player.moment))
+        player.tick(0.5)
+        stage.show(painter.paint(player.moment), follow=True)
+        place, along = np.array([0.3, -0.1, 0.2]), np.array([0.0, 0.6, 0.8])
+        seen = stage.turn @ place + stage.shift_m
+        origin, sight = stage.to_model(seen, stage.turn @ along)
+        np.testing.assert_allclose(origin, place, atol=1e-12)
+        np.testing.assert_allclose(sight, along, atol=1e-12)
+        # The worm leads towards -x, which is uphill.
+        assert (stage.turn @ np.array([-1.0, 0.0, 0.0]))[2] == pytest.approx(0.5)
+    finally:
+        server.stop()
 
 
 def test_planar_worms_are_refused(planar_run: Run) -> None:

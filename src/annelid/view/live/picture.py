@@ -25,7 +25,7 @@ SPRING_COLORS = ((0.45, 0.20, 0.70), (0.80, 0.74, 0.60), (0.95, 0.50, 0.05))
 """Of an axial spring at most shortened, at rest, and at most stretched."""
 SPRING_RANGE = 0.3
 """Strain at which these colours are full."""
-CONTACT_COLOR = (0.10, 0.60, 0.25)
+CONTACT_COLOR = (0.04, 0.45, 0.14)
 SCREEN_GAMMA = 2.2
 LONGEST_ARROW = 4.0
 """Of the arrows of contact forces, in radii of the worm at rest."""

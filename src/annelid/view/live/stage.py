@@ -40,7 +40,9 @@ FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
 SQUARE_M = 0.2
 SQUARE_COLOR = (0.80, 0.83, 0.86)
 STRIP_M = 0.003
-_GROUND_COLOR = (0.90, 0.92, 0.94)
+RELIEF_LIGHT, RELIEF_CONTRAST = (-0.5, -0.3, 0.8), 1.5
+"""Where the light on relief comes from: against it, the risers of steps are dark."""
+_GROUND_COLOR = (0.97, 0.98, 1.0)
 _ROOT = "/worm"
 
 
@@ -64,8 +66,8 @@ class Stage:
         self._scene = scene = server.scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(hdri=None)
-        scene.add_light_ambient("/sky", intensity=1.6)
-        scene.add_light_directional("/lamp", intensity=1.6, position=(1.0, -2.0, 4.0))
+        scene.add_light_ambient("/sky", intensity=2.0)
+        scene.add_light_directional("/lamp", intensity=2.0, position=(-3.0, -2.0, 3.0))
         wxyz = uprighting(config)
         self.turn = _rotation(wxyz)
         self.shift_m = np.zeros(3)
@@ -143,15 +145,22 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -
     scene.add_frame(f"{_ROOT}/ground", show_axes=False)
     shape = shape_of(arena, length_m)
     pipe = isinstance(arena, Pipe)
-    if shape is not None:
+    if shape is not None and pipe:
         scene.add_mesh_simple(
-            f"{_ROOT}/ground/shape",
+            f"{_ROOT}/ground/pipe",
             shape.vertices_m,
             shape.faces,
-            color=PIPE_RGBA[:3] if pipe else _GROUND_COLOR,
-            opacity=PIPE_RGBA[3] if pipe else None,
+            color=PIPE_RGBA[:3],
+            opacity=PIPE_RGBA[3],
             side="double",
         )
+    elif shape is not None:
+        import trimesh
+        from trimesh.visual import ColorVisuals
+
+        relief = trimesh.Trimesh(shape.vertices_m, shape.faces, process=False)
+        relief.visual = ColorVisuals(relief, vertex_colors=_shaded(relief.vertex_normals))
+        scene.add_mesh_trimesh(f"{_ROOT}/ground/relief", relief, cast_shadow=False, receive_shadow=False)
     if shape is None or pipe:
         depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
         vertices, faces = _squares(-depth)
@@ -167,6 +176,13 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -
         )
     if isinstance(arena, Floor):
         _add_walls(scene, arena)
+
+
+def _shaded(normals: Array) -> NDArray[np.uint8]:
+    """Colours of a relief by its slopes, which are too gentle for the viewer's own light, ``(n, 4)``."""
+    shade = np.clip(1.0 + RELIEF_CONTRAST * (normals - [0.0, 0.0, 1.0]) @ RELIEF_LIGHT, 0.4, 1.1)
+    colors = np.minimum(shade[:, np.newaxis] * np.asarray(_GROUND_COLOR), 1.0)
+    return np.rint(255.0 * np.column_stack([colors, np.ones(len(colors))])).astype(np.uint8)
 
 
 def _squares(height_m: float) -> tuple[Array, NDArray[np.int32]]:

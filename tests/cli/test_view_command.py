@@ -49,7 +49,7 @@ def test_a_run_takes_no_changes(tmp_path: Path) -> None:
 def test_a_page_is_not_overwritten_and_goes_without_a_window(tmp_path: Path) -> None:
     page = tmp_path / "walk.html"
     page.write_text("mine")
-    assert "--force" in refusal("--export", str(page))
+    assert "name another file with --export, or replace it with --force" in refusal("--export", str(page))
     assert page.read_text() == "mine"
     assert "its name must end in .html" in refusal("--export", str(tmp_path / "walk.pdf"))
     assert "does not go with --native" in refusal("--export", str(tmp_path / "other.html"), "--native")

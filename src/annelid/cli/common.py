@@ -93,8 +93,8 @@ def config_of(
     return load_config(source, overrides, fidelity=fidelity, arena=arena)
 
 
-def refuse_existing(path: Path, force: bool) -> None:
-    """Keeps what stands in the way of an output file.
+def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
+    """Keeps what stands in the way of an output file that an option names.
 
     Raises:
         RunFileError: The path is a folder, or a file that exists and ``force`` is false.
@@ -102,7 +102,7 @@ def refuse_existing(path: Path, force: bool) -> None:
     if path.is_dir():
         raise RunFileError(f"{path} is a folder: name a file")
     if path.exists() and not force:
-        raise RunFileError(f"{path} exists: name another file with -o, or replace it with --force")
+        raise RunFileError(f"{path} exists: name another file with {option}, or replace it with --force")
 
 
 def print_table(run: Run) -> None:

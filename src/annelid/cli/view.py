@@ -115,6 +115,6 @@ def _export(worm: RunConfig | Run, path: Path, speed: float, force: bool) -> Non
     from annelid.view.live.page import export_page, page_path
 
     path = page_path(path)
-    refuse_existing(path, force)
+    refuse_existing(path, force, "--export")
     with video_bar("writing the page") as progress:
         typer.echo(export_page(worm, path, speed=speed, progress=progress))

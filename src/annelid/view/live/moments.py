@@ -56,11 +56,6 @@ class Reel:
         """Times of the first and the last moment kept, s."""
         return self._times[0], self._times[-1]
 
-    @property
-    def times_s(self) -> Sequence[float]:
-        """Times of all moments kept, s."""
-        return tuple(self._times)
-
     def add(self, moment: Moment) -> None:
         """Adds a moment later than all others."""
         self._moments.append(moment)

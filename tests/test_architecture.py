@@ -27,6 +27,7 @@ MAY_IMPORT = {
     "simulation": {"config", "morphology", "arena", "body", "control", "planar", "nervous"} | BASE,
     "analysis": {"config", "morphology", "arena", "control", "simulation"} | BASE,
     "view": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
+    "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "view"} | BASE,
     "studies": {"config", "morphology", "nervous", "body", "simulation", "analysis", "view"} | BASE,
     "cli": {"config", "body", "simulation", "analysis", "view", "studies"} | BASE,
 }

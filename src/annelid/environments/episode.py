@@ -1,4 +1,4 @@
-"""One worm's episode: from an action to the activations of every physics step, and from these to what the agent gets."""
+"""One worm's episode: from an action to activations of every physics step, and from these to what the agent gets."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from math import prod
 
 import numpy as np
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from annelid.environments.way import Place
 from annelid.morphology import Array, MeshGeometry
@@ -60,9 +60,9 @@ class Layout:
         self._high = np.concatenate([np.full(entry.size, entry.high) for entry in entries])
         self._least = np.concatenate([np.full(entry.size, entry.low / entry.high) for entry in entries])
 
-    def space(self) -> Box:
+    def space(self) -> Box[np.float32]:
         """Returns the space of observations, ``(size,)``."""
-        return Box(self._least.astype(np.float32), np.ones(self.size, dtype=np.float32), dtype=np.float32)
+        return Box(self._least.astype(np.float32), np.ones(self.size, dtype=np.float32), (self.size,), np.float32)
 
     def packed(self, values: Mapping[str, Array]) -> Observation:
         """Scales and clips numbers in their units, by name, and lays them out.
@@ -73,7 +73,7 @@ class Layout:
         flat = np.concatenate([np.ravel(values[entry.name]) for entry in self.entries])
         return np.clip(flat / self._high, self._least, 1.0).astype(np.float32)
 
-    def named(self, observations: NDArray[np.floating]) -> dict[str, Array]:
+    def named(self, observations: ArrayLike) -> dict[str, Array]:
         """Takes observations apart: numbers in their units, by name.
 
         Args:
@@ -82,11 +82,10 @@ class Layout:
         Returns:
             Each of shape ``(..., *entry.shape)``.
         """
-        observations = np.asarray(observations, dtype=float)
+        scaled: Array = np.asarray(observations, dtype=float)
         starts = np.cumsum([0, *(entry.size for entry in self.entries)])
         return {
-            entry.name: entry.high
-            * observations[..., start : start + entry.size].reshape(*observations.shape[:-1], *entry.shape)
+            entry.name: entry.high * scaled[..., start : start + entry.size].reshape(*scaled.shape[:-1], *entry.shape)
             for entry, start in zip(self.entries, starts, strict=False)
         }
 
@@ -100,10 +99,17 @@ def layout_of(worm: Worm) -> Layout:
             Entry(
                 "ring_strain", (m,), "1", -1.0, 1.0, "change of a ring muscle's length since the start, of that length"
             ),
-            Entry("ring_rate", (m,), "1/s", -5.0, 5.0, "how fast that has changed over the last step"),
-            Entry("stretch_strain", sensors, "1", -2.0, 2.0, "the same of a stretch sensor, of its length at rest"),
+            Entry("ring_rate", (m,), "1/s", -5.0, 5.0, "how fast the same has changed over the last step"),
             Entry(
-                "touch", (n, len(SIDES)), "weights", 0.0, 1.0, "normal force of the ground on belly, left, back, right"
+                "stretch_strain",
+                sensors,
+                "1",
+                -2.0,
+                2.0,
+                "change of a stretch sensor's length from that at rest, of that length",
+            ),
+            Entry(
+                "touch", (n, len(SIDES)), "weights", 0.0, 2.0, "normal force of the ground on belly, left, back, right"
             ),
             Entry("heading", (3,), "1", -1.0, 1.0, "unit vector from the last ring to the first, along the axes below"),
             Entry("upright", (2,), "1", -1.0, 1.0, "how far the middle ring's back and left side point upwards"),

@@ -26,7 +26,7 @@ RENDER_MODES = ("rgb_array",)
 SIZE = (640, 400)
 
 
-class WormEnv(gymnasium.Env[Observation, NDArray[np.floating]]):
+class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A 3D worm whose agent sets the activation of every ring muscle.
 
     A step lasts ``interval_s``, in which activations go evenly from the last action to this one. The worm is to go
@@ -157,7 +157,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.floating]]):
         self._pictures.close()
 
 
-def action_space(worm: Worm) -> Box:
+def action_space(worm: Worm) -> Box[np.float32]:
     """Returns the space of actions: an activation for every ring muscle."""
     return Box(0.0, 1.0, (worm.n_muscles,), np.float32)
 

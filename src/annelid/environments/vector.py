@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.environments.episode import Episode, Outcome
+from annelid.environments.episode import Episode
 from annelid.environments.observation import Layout, Observation
 from annelid.environments.pictures import Pictures
 from annelid.environments.single import (
@@ -39,7 +39,7 @@ Flags = NDArray[np.bool_]
 Stepped = tuple[Observation, Array, Flags, Flags, dict[str, Any]]
 
 
-class WormVectorEnv(VectorEnv[Observation, NDArray[np.floating], NDArray[Any]]):
+class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
     """Worms that are each, bit for bit, a `WormEnv`; one that breaks down ends alone.
 
     Attributes:
@@ -169,7 +169,7 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.floating], NDArray[Any]]):
             Observations, rewards, terminations, truncations and infos, as of so many `WormEnv`.
 
         Raises:
-            ConfigError: Actions of another shape or out of their range, or with autoreset disabled a worm that has ended.
+            ConfigError: Actions of another shape or out of their range, or a worm that has ended and is not reset.
         """
         actions = np.asarray(actions, dtype=float)
         if actions.shape != self.action_space.shape:

@@ -1,13 +1,9 @@
-"""A worm learns to crawl: evolution finds a rhythm, the lag between neighbours, and a stretch reflex.
+"""A worm learns to crawl: evolution finds a rhythm, the lag between neighbouring rings, and a stretch reflex.
 
-    python examples/learn_to_crawl.py [folder]
+At first it contracts all over at once and stays where it is. Takes minutes on two cores.
 
-Every ring contracts by one rhythm, each a lag after its neighbour in front, and gives way or resists as its segment is
-stretched: five numbers, found by CMA-ES (package cmaes). The start is a worm that contracts all over at once and stays
-where it is. Takes about two minutes on two cores; needs pip install 'annelid[gym,tune]'.
+    pip install 'annelid[gym,tune]' && python examples/learn_to_crawl.py [folder]
 """
-
-from __future__ import annotations
 
 import sys
 from pathlib import Path
@@ -17,15 +13,13 @@ import numpy as np
 from cmaes import CMA
 from rich.progress import track
 
-import annelid.environments  # noqa: F401 -- makes the worms known to gymnasium
 from annelid.view.canvas import canvas, save
 
-START = np.array([0.0, 0.0, 0.0, 0.0, 0.0])
-WORMS, EPISODE_S = 8, 6.0
+START, WORMS = np.zeros(5), 8
 
 
 def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.ndarray:
-    """Activation of every ring, (worms, rings), from five numbers a worm and the strain of its segments."""
+    """Activation of the rings, (worms, rings), from five numbers a worm, (worms, 5), and the strain of segments."""
     pace, lag, rest, steepness, reflex = numbers.T[:, :, np.newaxis]
     turn = time_s * 0.6 * np.exp(0.5 * pace) - 0.2 * lag * np.arange(stretch.shape[1])
     drive = np.cos(2.0 * np.pi * turn) - 0.5 * rest + reflex * stretch
@@ -35,37 +29,31 @@ def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.nd
 def returns(envs: gymnasium.vector.VectorEnv, numbers: np.ndarray) -> np.ndarray:
     """Sum of rewards of one episode of every worm, each with five numbers of its own, (worms, 5)."""
     observations, _ = envs.reset(seed=0)
-    total, going, time_s = np.zeros(len(numbers)), np.ones(len(numbers), dtype=bool), 0.0
-    while going.any():
+    total, going, time_s = 0.0, True, 0.0
+    while np.any(going):
         stretch = envs.unwrapped.layout.named(observations)["stretch_strain"].mean(axis=-1)
         observations, rewards, over, late, infos = envs.step(activation(numbers, time_s, stretch))
-        total, going, time_s = total + going * rewards, going & ~(over | late), float(infos["time_s"].max())
+        total, going, time_s = total + going * rewards, going & ~(over | late), infos["time_s"].max()
     return total
 
 
 def main(folder: Path, generations: int = 25, **worm: object) -> tuple[float, float]:
-    """Learns, prints and draws; returns what the start and the best worm got."""
-    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=WORMS, **{"episode_s": EPISODE_S, **worm})
+    """Learns, prints and draws; returns what the start and the mean of the search got in the end."""
+    envs = gymnasium.make_vec("annelid.environments:annelid/Worm-v0", num_envs=WORMS, **{"episode_s": 6.0, **worm})
     search = CMA(mean=START, sigma=0.5, population_size=WORMS, seed=1)
-    start = float(returns(envs, np.tile(START, (WORMS, 1)))[0])
-    best, found, curve = start, START, []
+    curve = [returns(envs, np.tile(START, (WORMS, 1)))]
     for _ in track(range(generations), description="generations"):
         asked = np.stack([search.ask() for _ in range(WORMS)])
-        got = returns(envs, asked)
-        search.tell(list(zip(asked, -got, strict=True)))
-        if got.max() > best:
-            best, found = float(got.max()), asked[got.argmax()]
-        curve.append((got.mean(), best))
-    envs.close()
-    print(f"return of the start {start:.2f}, learned {best:.2f}, with {np.round(found, 2)}")
+        curve.append(returns(envs, asked))
+        search.tell(list(zip(asked, -curve[-1], strict=True)))
+    start, learned = curve[0][0], returns(envs, np.tile(search.mean, (WORMS, 1)))[0]
+    print(f"return of the start {start:.2f}, learned {learned:.2f}, with {np.round(search.mean, 3).tolist()}")
     with canvas(3.0) as figure:
-        axes = figure.subplots()
-        axes.plot(range(1, generations + 1), curve, label=["mean of a generation", "best so far"])
-        axes.axhline(start, color="0.6", linestyle=":", label="start")
-        axes.set(xlabel="generation", ylabel="return")
-        axes.legend()
+        axes = figure.subplots(subplot_kw={"xlabel": "generation", "ylabel": "return"})
+        axes.plot(curve, "o", color="0.7", markersize=3)
+        axes.plot(np.mean(curve, axis=1))
         save(figure, folder / "learning_curve.png")
-    return start, best
+    return start, learned
 
 
 if __name__ == "__main__":

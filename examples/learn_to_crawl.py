@@ -28,8 +28,7 @@ def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.nd
 
 def returns(envs: gymnasium.vector.VectorEnv, numbers: np.ndarray) -> np.ndarray:
     """Sum of rewards of one episode of every worm, each with five numbers of its own, (worms, 5)."""
-    observations, _ = envs.reset(seed=0)
-    total, going, time_s = 0.0, True, 0.0
+    (observations, _), total, going, time_s = envs.reset(seed=0), 0.0, True, 0.0
     while np.any(going):
         stretch = envs.unwrapped.layout.named(observations)["stretch_strain"].mean(axis=-1)
         observations, rewards, over, late, infos = envs.step(activation(numbers, time_s, stretch))

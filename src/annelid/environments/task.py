@@ -14,7 +14,7 @@ from annelid.errors import ConfigError, require_at_least, require_positive, sugg
 COARSE = "coarse"
 COARSE_BASE = "fast"
 COARSE_CHANGES: Mapping[str, Any] = {"body.mesh.elements_per_side": 1}
-"""The default resolution: level `fast` with a third of its vertices; docs/environments.md says what that costs."""
+"""The default resolution: level `fast` with 0.43 of its coordinates; docs/environments.md says what that costs."""
 FIDELITIES = (COARSE, *LEVELS)
 UNUSED = ("controller", "turning", "record", "duration", "seed", "clock.control")
 """Beginnings of fields that an environment has no use for: the agent acts, and nothing is recorded."""

@@ -113,6 +113,7 @@ def test_gymnasium_makes_it_the_way_it_makes_others() -> None:
         ({"render_mode": "human"}, "unknown render_mode 'human'"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_what_cannot_be_is_refused_in_one_sentence(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ConfigError, match=sentence):
         WormVectorEnv(**options)

@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from worms import CHEAP, same
 
+from annelid.config import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
 from annelid.environments.reward import Deed, reward_terms
 from annelid.environments.task import Weights
@@ -49,9 +50,10 @@ def rollout(env: WormEnv, n_steps: int, seed: int, actions: np.random.Generator)
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
 def test_gymnasium_finds_nothing_to_complain_about(name: str) -> None:
-    env = gymnasium.make(f"annelid.environments:annelid/{name}", **CHEAP, episode_s=0.24)
-    check_env(env.unwrapped, skip_render_check=True)
-    assert env.unwrapped.task.goal_m == (None if name == "Worm-v0" else pytest.approx(0.7))
+    env = gymnasium.make(f"annelid.environments:annelid/{name}", **CHEAP, episode_s=0.24).unwrapped
+    assert isinstance(env, WormEnv)
+    check_env(env, skip_render_check=True)
+    assert env.task.goal_m == (None if name == "Worm-v0" else pytest.approx(0.7))
 
 
 def test_a_thousand_steps_are_the_same_to_the_last_bit() -> None:
@@ -78,6 +80,7 @@ def test_a_worm_at_rest_feels_nothing_and_lies_on_its_belly(env: WormEnv) -> Non
 def test_what_it_tells_is_what_the_worm_does(env: WormEnv) -> None:
     env.reset(seed=0)
     before = rest = env.sensation
+    told = {}
     for k in range(6):
         observation, *_, info = env.step(wave(k, 3))
         told, felt = env.layout.named(observation), env.sensation
@@ -209,6 +212,7 @@ def test_weights_change_the_reward_and_nothing_else() -> None:
 def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
     own = WormEnv(CHEAP["preset"], {"body.mesh.n_helices": 6}, fidelity=None, episode_s=0.12)
     assert own.task.config.clock.physics_timestep_s == 0.01
+    assert isinstance(own.task.config.body, WormBody)
     assert own.task.config.body.mesh.elements_per_side == 2
     assert own.task.moves_per_step == 12
 

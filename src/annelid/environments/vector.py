@@ -47,6 +47,9 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         layout: How an observation is laid out; ``layout.named(observations)`` takes those of all worms apart.
     """
 
+    closed = True
+    """Until it is whole, since Gymnasium closes even what could not be made."""
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -127,6 +130,7 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._random = [seeding.np_random()[0] for _ in range(num_envs)]
         self._observations = np.zeros((num_envs, self.layout.size), dtype=np.float32)
         self._ended = np.ones(num_envs, dtype=bool)
+        self.closed = False
 
     @property
     def sensations(self) -> list[Sensation]:

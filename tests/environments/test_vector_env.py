@@ -68,6 +68,17 @@ def test_the_number_of_threads_changes_nothing() -> None:
     assert same(told[0], told[2])
 
 
+def test_in_pipes_of_different_shapes_too_each_is_the_one_that_moves_alone() -> None:
+    changes = [CHEAP["changes"] | {"arena.radius": radius, "arena.straight": 0.0} for radius in (0.4, 0.8)]
+    ours = WormVectorEnv(2, OPTIONS["preset"], changes, arena="pipe.bend", episode_s=0.72)
+    alone = [WormEnv(OPTIONS["preset"], own, arena="pipe.bend", episode_s=0.72) for own in changes]
+    told = [ours.reset(seed=1)[0], *(ours.step(np.full((2, 3), 0.8))[0] for _ in range(4))]
+    for worm, env in enumerate(alone):
+        expected = [env.reset(seed=1 + worm)[0], *(env.step(np.full(3, 0.8))[0] for _ in range(4))]
+        assert same([one[worm] for one in told], expected)
+    assert not np.array_equal(told[-1][0], told[-1][1])
+
+
 def test_one_that_breaks_down_leaves_the_others_alone() -> None:
     alone, beside = WormEnv(changes=CHANGES[0], **OPTIONS), batched(threads=1)
     alone.reset(seed=0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,8 @@ class Pictures:
         view_angles(camera)
         self._camera, self._width, self._height = camera, width, height
         self._scenes: dict[str, PostureScene] = {}
+        # OpenGL cannot be freed any more once Python is shutting down, and environments are often left open.
+        weakref.finalize(self, _close, self._scenes)
 
     def draw(self, episode: Episode) -> NDArray[np.uint8]:
         """Draws a worm: pixels, ``(height, width, 3)``.
@@ -38,6 +42,10 @@ class Pictures:
 
     def close(self) -> None:
         """Frees what was opened."""
-        for scene in self._scenes.values():
-            scene.close()
-        self._scenes.clear()
+        _close(self._scenes)
+
+
+def _close(scenes: dict[str, PostureScene]) -> None:
+    for scene in scenes.values():
+        scene.close()
+    scenes.clear()

@@ -1,18 +1,21 @@
 """Environments: steps a second with random actions on one thread and on two, and what a coarse worm costs in accuracy.
 
     python benchmarks/environments.py throughput [worms] [steps] [rounds]
+    python benchmarks/environments.py share [worms] [steps]
     python benchmarks/environments.py fidelity
 
 The first compares one and two threads in turn within one process and gives the ratio of every round: absolute figures
-differ between machines and hours, so run it where nothing else computes. The second lets the same wave act on worms of
-different resolution, on open ground and in pipes; its speeds are those of the worm, its times CPU times.
+differ between machines and hours, so run it where nothing else computes. The second tells how much of a thread's CPU
+time goes to the engine, which steps without Python's lock. The third lets the same wave act on worms of different
+resolution, on open ground and in pipes; its speeds are those of the worm, its times CPU times.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from time import perf_counter, process_time
+from time import perf_counter, process_time, thread_time
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -48,6 +51,36 @@ def throughput(n_worms: int, n_steps: int, rounds: int) -> None:
         load = os.getloadavg()[0]
         one, two = (random_steps_per_s(threads, n_worms, n_steps) for threads in (1, 2))
         print(f"{load:5.1f} {one:10.1f} {two:10.1f} {two / one:6.2f}", flush=True)
+
+
+class TimedBatch:
+    """An engine batch that adds up the CPU time of its steps, s."""
+
+    def __init__(self, batch: Any) -> None:
+        self.batch, self.seconds = batch, 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.batch, name)
+
+    def step(self, *arguments: Any) -> None:
+        began = thread_time()
+        self.batch.step(*arguments)
+        self.seconds += thread_time() - began
+
+
+def share(n_worms: int, n_steps: int) -> None:
+    """Prints how much of the CPU time of steps with random actions is the engine's, on one thread."""
+    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=n_worms, threads=1)
+    bodies = envs.unwrapped._teams[0]._bodies
+    bodies._batch = timed = TimedBatch(bodies._batch)
+    envs.reset(seed=0)
+    envs.action_space.seed(0)
+    began = thread_time()
+    for _ in range(n_steps):
+        envs.step(envs.action_space.sample())
+    seconds = thread_time() - began
+    of_one_ms = 1e3 * seconds / (n_worms * n_steps)
+    print(f"{of_one_ms:.1f} ms of CPU time a step of a worm, {timed.seconds / seconds:.0%} in the engine")
 
 
 def timed_wave(time_s: float, n: int) -> np.ndarray:
@@ -88,6 +121,8 @@ if __name__ == "__main__":
     what, *numbers = sys.argv[1:] or ["throughput"]
     if what == "fidelity":
         fidelity()
+    elif what == "share":
+        share(*map(int, [*numbers, *("8", "15")[len(numbers) :]]))
     else:
         n, steps, times = [*numbers, *("16", "25", "5")[len(numbers) :]]
         throughput(int(n), int(steps), int(times))

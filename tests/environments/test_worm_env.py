@@ -233,6 +233,7 @@ def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
         ({"fidelity": "corse"}, "did you mean 'coarse'"),
         ({"render_mode": "rgb"}, "did you mean 'rgb_array'"),
         ({"camera": "sidewards"}, "unknown camera"),
+        ({"width": 0}, "width must be at least 1, not 0"),
         ({"arena": "pip"}, "unknown arena"),
     ],
 )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.environments.episode import Episode
+from annelid.errors import require_at_least
 from annelid.view.camera import view_angles
 from annelid.view.scene import PostureScene
 
@@ -20,8 +21,10 @@ class Pictures:
 
         Raises:
             RunFileError: No camera has that name.
+            ConfigError: A picture without pixels.
         """
         view_angles(camera)
+        require_at_least(1, width=width, height=height)
         self._camera, self._width, self._height = camera, width, height
         self._scenes: dict[str, PostureScene] = {}
         # OpenGL cannot be freed any more once Python is shutting down, and environments are often left open.

@@ -2,6 +2,7 @@
 
 from annelid.cli.bench import bench_command
 from annelid.cli.calibrate import calibrate_command
+from annelid.cli.cite import cite
 from annelid.cli.entry import app, main
 from annelid.cli.experiment import experiment
 from annelid.cli.limit_cycle import limit_cycle_command
@@ -27,6 +28,7 @@ for _name, _command in (
     ("robustness", robustness_command),
     ("tune", tune_command),
     ("calibrate", calibrate_command),
+    ("cite", cite),
     ("presets", presets),
     ("arenas", arenas),
     ("doctor", doctor),

@@ -5,6 +5,7 @@ from annelid.cli.calibrate import calibrate_command
 from annelid.cli.cite import cite
 from annelid.cli.entry import app, main
 from annelid.cli.experiment import experiment
+from annelid.cli.export import export_command
 from annelid.cli.limit_cycle import limit_cycle_command
 from annelid.cli.paper import paper_command
 from annelid.cli.results import plot, render, show
@@ -22,6 +23,7 @@ for _name, _command in (
     ("show", show),
     ("plot", plot),
     ("render", render),
+    ("export", export_command),
     ("limit-cycle", limit_cycle_command),
     ("paper", paper_command),
     ("bench", bench_command),

@@ -32,7 +32,12 @@ FPS_RANGE = (1.0, 240.0)
 _H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
 # 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
 _PALETTE = "split[all][drawn];[all]palettegen=stats_mode=diff[colors];[drawn][colors]paletteuse=dither=bayer"
-_GIF: dict[str, Any] = {"codec": "gif", "pix_fmt_out": "pal8", "output_params": ["-filter_complex", _PALETTE]}
+_GIF: dict[str, Any] = {
+    "codec": "gif",
+    "pix_fmt_out": "pal8",
+    "macro_block_size": 1,
+    "output_params": ["-filter_complex", _PALETTE],
+}
 _FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip install imageio-ffmpeg"
 
 Progress = Callable[[int, int], object]
@@ -105,7 +110,7 @@ def render_video(
         fps: Frames a second of the video, 1 to 240; the recorded posture nearest to each is shown.
         speed: Simulated seconds a second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.view.camera.VIEWS_DEG`; by default isometric.
-        size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`.
+        size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
         progress: Called after every frame.
 
     Returns:
@@ -123,7 +128,7 @@ def render_video(
         raise RunFileError(f"fps = {fps:g}: a video has {slowest:g} to {fastest:g} frames a second")
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a video must be positive and finite")
-    size = size or VIDEO_SIZE[run.config.body.kind]
+    size = size or _video_size(run.config.body.kind, path)
     with (
         _scene(run, size, camera, fine=False) as scene,
         whole_file(path) as draft,
@@ -158,6 +163,12 @@ def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
             f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
         )
     return int(np.abs(times_s - time_s).argmin())
+
+
+def _video_size(kind: str, path: Path) -> tuple[int, int]:
+    """A GIF is large for what it shows, and so it is drawn smaller."""
+    width, height = VIDEO_SIZE[kind]
+    return (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
 
 
 class _VideoWriter:

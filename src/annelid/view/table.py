@@ -66,16 +66,27 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
     table.add_column("this run", min_width=_NARROWEST_OURS, overflow="fold")
     if beside:
         table.add_column("published", overflow="fold")
-    first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
-    for label, ours, field in _cells(numbers, first_sensor):
-        theirs = _theirs(field, beside.get(field))
-        if ours != UNKNOWN or theirs:
-            table.add_row(label, ours, *([theirs] if beside else []))
+    for label, ours, theirs in summary_rows(numbers, config):
+        table.add_row(label, ours, *([theirs] if beside else []))
     if beside:
-        places = ", ".join(dict.fromkeys(entry.place for entry in beside.values()))
-        table.caption = f"pp: peak to peak. published: {next(iter(beside.values())).paper}, {places}"
+        table.caption = legend(config)
         table.caption_justify = "left"
     return table
+
+
+def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, str]]:
+    """Returns label, our number and the published one of every row in which there is either, each with its unit."""
+    beside = published(config)
+    first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
+    rows = [(label, ours, _theirs(field, beside.get(field))) for label, ours, field in _cells(numbers, first_sensor)]
+    return [row for row in rows if row[1] != UNKNOWN or row[2]]
+
+
+def legend(config: RunConfig) -> str:
+    """Says where the published numbers of a configuration stand; empty where there are none."""
+    beside = published(config)
+    places = ", ".join(dict.fromkeys(entry.place for entry in beside.values()))
+    return f"pp: peak to peak. published: {next(iter(beside.values())).paper}, {places}" if beside else ""
 
 
 def presets_table(presets: Sequence[RunConfig]) -> Table:

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from annelid.analysis import gait, summary
-from annelid.config import PlanarWorm, RunConfig, fields_of, toml_value
+from annelid.config import PlanarWorm, RunConfig, field_value, fields_of, toml_value
 from annelid.errors import AnnelidError
 from annelid.references import bibtex, references_of
 from annelid.studies.markdown import anchors, code, emphasis, table, words
@@ -100,13 +100,15 @@ def _pictures(run: Run) -> list[Picture]:
 
 
 def _configuration(config: RunConfig) -> list[str]:
-    rows = []
+    """A table for every section."""
+    sections: dict[str, list[list[str]]] = {}
     for path, meaning in fields_of(config).items():
-        value = config
-        for key in path.split("."):
-            value = getattr(value, key)
-        rows.append([code(path), code("not set" if value is None else toml_value(value)), words(meaning)])
-    return ["## Configuration", table(["field", "value", "meaning"], rows)]
+        section, _, name = path.rpartition(".")
+        value = field_value(config, path)
+        shown = "not set" if value is None else toml_value(value)
+        sections.setdefault(section or "run", []).append([code(name), code(shown), words(meaning)])
+    tables = [(f"### {words(name)}", table(["field", "value", "meaning"], rows)) for name, rows in sections.items()]
+    return ["## Configuration", *(block for pair in tables for block in pair)]
 
 
 def _to_cite(run: Run) -> list[str]:

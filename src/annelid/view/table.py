@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import WormBody, fields_of, toml_value
+from annelid.config import WormBody, field_value, fields_of, toml_value
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -113,9 +113,7 @@ def field_lines(config: RunConfig) -> list[str]:
     """Returns one line for every field of a configuration: path, value as TOML writes it, and what it means."""
     lines = []
     for path, meaning in fields_of(config).items():
-        value: Any = config
-        for key in path.split("."):
-            value = getattr(value, key)
+        value = field_value(config, path)
         setting = f"{path} = {toml_value(value)}" if value is not None else f"{path} (not set)"
         lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
     return lines

@@ -72,4 +72,3 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Keyframe] = ()) -> str:
     except ValueError as error:
         raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
     return spec.to_xml()
-

@@ -3,6 +3,7 @@
 from annelid.cli.bench import bench_command
 from annelid.cli.calibrate import calibrate_command
 from annelid.cli.cite import cite
+from annelid.cli.compare import compare_command
 from annelid.cli.entry import app, main
 from annelid.cli.experiment import experiment
 from annelid.cli.export import export_command
@@ -21,6 +22,7 @@ for _name, _command in (
     ("run", run_command),
     ("build", build),
     ("show", show),
+    ("compare", compare_command),
     ("plot", plot),
     ("render", render),
     ("export", export_command),

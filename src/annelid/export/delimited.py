@@ -1,17 +1,14 @@
-"""Tables as comma-separated values, and what the run is beside them as JSON."""
+"""Tables as comma-separated values."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from annelid.export.tables import Table
-from annelid.view.output import whole_file, write_csv
+from annelid.view.output import write_csv
 
 CHUNK_ROWS = 20_000
-ABOUT = "about.json"
 
 
 def write_table(table: Table, path: Path, wrote: Callable[[int], object] = lambda _: None) -> Path:
@@ -26,17 +23,6 @@ def write_table(table: Table, path: Path, wrote: Callable[[int], object] = lambd
         RunFileError: The file cannot be written.
     """
     return write_csv(path, [column.heading for column in table.columns], _rows(table, wrote))
-
-
-def write_about(facts: dict[str, Any], path: Path) -> Path:
-    """Writes what a run is as JSON.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
-    with whole_file(path) as draft:
-        draft.write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
-    return path
 
 
 def _rows(table: Table, wrote: Callable[[int], object]) -> Iterator[Sequence[object]]:

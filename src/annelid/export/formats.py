@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from annelid.errors import RunFileError, suggest
-from annelid.export.delimited import ABOUT, write_about, write_table
-from annelid.export.matlab import require_scipy, write_matlab
+from annelid.errors import MissingDependency, RunFileError, suggest
+from annelid.export.delimited import write_table
+from annelid.export.matlab import write_matlab
 from annelid.export.mjcf import write_mjcf
 from annelid.export.page import write_page
-from annelid.export.parquet import require_pyarrow, write_parquet
+from annelid.export.parquet import write_parquet
 from annelid.export.tables import Table, about, tables_of
-from annelid.view.output import with_suffix
+from annelid.view.output import with_suffix, write_json
 from annelid.view.render import Progress, render_video
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 WINDOW = frozenset({"--from-time", "--to-time"})
 SELECTION = WINDOW | {"--signals", "--every"}
 GIF_FPS = 12.5
+ABOUT = "about.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ class Format:
         suffix: How the name of its files ends.
         options: Options of the selection that it takes.
         write: Writes a run to a path, calling back with steps done and in all; returns the files.
-        require: Makes sure that what it needs is installed.
+        package: What it needs that not everybody has installed, or None.
     """
 
     name: str
@@ -43,12 +45,23 @@ class Format:
     suffix: str
     options: frozenset[str]
     write: Callable[[Run, Path, Progress], list[Path]]
-    require: Callable[[], None] = lambda: None
+    package: str | None = None
 
     @property
     def many(self) -> bool:
         """Whether it writes a folder of files."""
         return not Path(self.default).suffix
+
+    def require(self) -> None:
+        """Makes sure that what it needs is installed.
+
+        Raises:
+            MissingDependency: It is not.
+        """
+        if self.package is not None and find_spec(self.package) is None:
+            raise MissingDependency(
+                f"exporting to {self.name} needs {self.package}: install it with  pip install 'annelid[export]'"
+            )
 
     def target(self, run: Run, output: Path | None) -> Path:
         """Returns what is written: the path that was named, or the default in the run's folder.
@@ -78,7 +91,7 @@ def find_format(name: str) -> Format:
 
 def _csv(run: Run, path: Path, progress: Progress) -> list[Path]:
     written = _tables(run, path, ".csv", write_table, progress)
-    return written if path in written else [*written, write_about(about(run), path / ABOUT)]
+    return written if path in written else [*written, write_json(path / ABOUT, about(run))]
 
 
 def _parquet(run: Run, path: Path, progress: Progress) -> list[Path]:
@@ -147,8 +160,8 @@ FORMATS = {
     each.name: each
     for each in (
         Format("csv", "csv", ".csv", SELECTION, _csv),
-        Format("mat", "run.mat", ".mat", SELECTION, _matlab, require_scipy),
-        Format("parquet", "parquet", ".parquet", SELECTION, _parquet, require_pyarrow),
+        Format("mat", "run.mat", ".mat", SELECTION, _matlab, "scipy"),
+        Format("parquet", "parquet", ".parquet", SELECTION, _parquet, "pyarrow"),
         Format("mp4", "video.mp4", ".mp4", WINDOW, _mp4),
         Format("gif", "video.gif", ".gif", WINDOW, _gif),
         Format("html", "report.html", ".html", WINDOW, _html),

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.errors import MissingDependency
 from annelid.export.selection import CLOCKS, signal_names
 from annelid.export.tables import about, labels_of
 from annelid.view.output import whole_file
@@ -20,18 +19,6 @@ if TYPE_CHECKING:
 LONGEST_NAME = 63
 """Characters that MATLAB reads of a name."""
 STRUCTS = ("units", "long_name", "dimensions", "labels", "config", "run")
-
-
-def require_scipy() -> None:
-    """Makes sure that a MATLAB file can be written.
-
-    Raises:
-        MissingDependency: scipy is not installed.
-    """
-    try:
-        import scipy.io
-    except ImportError:
-        raise MissingDependency("MATLAB files need scipy: install it with  pip install 'annelid[export]'") from None
 
 
 def write_matlab(run: Run, path: Path) -> Path:

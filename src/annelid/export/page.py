@@ -38,7 +38,8 @@ def write_page(run: Run, path: Path, progress: Progress = lambda done, total: No
         RunFileError: The file cannot be written.
     """
     with TemporaryDirectory() as temporary:
-        blocks = [*_numbers(run), *_figures(run, Path(temporary), progress), *_configuration(run.config), *_to_cite(run)]
+        figures = _figures(run, Path(temporary), progress)
+        blocks = [*_numbers(run), *figures, *_configuration(run.config), *_to_cite(run)]
         headings = [block.removeprefix("## ") for block in blocks if block.startswith("## ")]
         links = zip(headings, anchors(headings), strict=True)
         contents = "\n".join(f"- [{heading}](#{anchor})" for heading, anchor in links)

@@ -6,21 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from annelid.errors import MissingDependency
 from annelid.export.tables import Table
 from annelid.view.output import whole_file
-
-
-def require_pyarrow() -> None:
-    """Makes sure that Parquet can be written.
-
-    Raises:
-        MissingDependency: pyarrow is not installed.
-    """
-    try:
-        import pyarrow.parquet
-    except ImportError:
-        raise MissingDependency("Parquet needs pyarrow: install it with  pip install 'annelid[export]'") from None
 
 
 def write_parquet(table: Table, path: Path, facts: dict[str, Any]) -> Path:

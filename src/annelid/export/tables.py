@@ -1,4 +1,4 @@
-"""A run's signals as tidy tables: one table for all signals of the same dimensions, one row for each of their values."""
+"""A run's signals as tidy tables: one for all signals of the same dimensions, with a row for each of their values."""
 
 from __future__ import annotations
 

@@ -196,7 +196,13 @@ def _video_writer(path: Path, fps: float, size: tuple[int, int], name: Path) -> 
     if shutil.which(ffmpeg) is None:
         raise MissingDependency(f"no ffmpeg to write {name} with, there is no program {ffmpeg}: {_FFMPEG_REMEDY}")
     settings = _GIF if path.suffix.lower() == ".gif" else _H264
-    frames = imageio_ffmpeg.write_frames(str(path), size, fps=fps, ffmpeg_log_level="quiet", **settings)
+    frames = imageio_ffmpeg.write_frames(
+        str(path),
+        size,
+        fps=fps,  # type: ignore[arg-type]
+        ffmpeg_log_level="quiet",
+        **settings,
+    )
     frames.send(None)
     writer = _VideoWriter(frames)
     broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"

@@ -18,8 +18,8 @@ UNKNOWN = "-"
 _ONSETS_SHOWN = 12
 _NARROWEST, _NARROWEST_OURS = 12, 16
 
-# Field of the summary: what it is called, what it is multiplied by, digits, unit.
-_ROWS = {
+Row = tuple[str, float, int, str]
+SUMMARY_ROWS: dict[str, Row] = {
     "period_s": ("period", 1.0, 3, "s"),
     "elongation_first_helix_pp_m": ("elongation, first helix, pp", 100.0, 2, "cm"),
     "elongation_mean_max_m": ("elongation, mean, maximum", 100.0, 2, "cm"),
@@ -38,6 +38,7 @@ _ROWS = {
     "pin_gap_max_m": ("largest pin gap", 1000.0, 2, "mm"),
     "real_time_factor": ("times real time", 1.0, 3, ""),
 }
+"""Field of the summary: what it is called, what it is multiplied by, digits, unit."""
 
 
 def summary_table(numbers: Summary, config: RunConfig) -> Table:
@@ -125,11 +126,11 @@ def _cells(numbers: Summary, first_sensor: str | None) -> list[tuple[str, str, s
         ("segment at onset (s)", _onsets(numbers), "order"),
         ("wave 1-2-..-N", _wave(numbers), "wave"),
     ]
-    for field, (label, factor, digits, unit) in _ROWS.items():
+    for field, (label, factor, digits, unit) in SUMMARY_ROWS.items():
         if first_sensor is None and ", mean" in label:
             continue
         label = label.replace(", first helix", f", {first_sensor}" if first_sensor else "")
-        text = _quantity(getattr(numbers, field), factor, digits, unit)
+        text = quantity(getattr(numbers, field), factor, digits, unit)
         if field == "period_s" and numbers.period_std_s is not None:
             text += f" (std {numbers.period_std_s:.3f} s)"
         cells.append((label, text, field))
@@ -155,14 +156,15 @@ def _theirs(field: str, entry: Published | None) -> str:
         return ""
     if isinstance(entry.value, str):
         return entry.value
-    _, factor, digits, unit = _ROWS[field]
-    return _quantity(entry.value, factor, digits, unit)
+    _, factor, digits, unit = SUMMARY_ROWS[field]
+    return quantity(entry.value, factor, digits, unit)
 
 
-def _quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
+def quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
+    """Returns a number, or one a segment, as a row says: multiplied, rounded, with its unit; a dash for None."""
     if value is None:
         return UNKNOWN
     if isinstance(value, list | tuple):
-        return f"{' / '.join(_quantity(v, factor, digits, '') for v in value)} {unit}"
+        return f"{' / '.join(quantity(v, factor, digits, '') for v in value)} {unit}"
     assert isinstance(value, int | float)
     return f"{factor * value:z.{digits}f} {unit}".rstrip()

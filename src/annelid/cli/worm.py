@@ -102,13 +102,26 @@ def arenas(
     Console().print(arenas_table({each: arena_summary(each) for each in arena_names()}))
 
 
-def doctor() -> None:
+def doctor(
+    report: Annotated[
+        bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
+    ] = False,
+) -> None:
     """Tell what is missing and how to install it.
+
+    The report names no user, no machine and no folder.
 
     \b
     annelid doctor
+    annelid doctor --report
     """
     from annelid.view.doctor import examine
+
+    if report:
+        from annelid.view.bug_report import bug_report
+
+        typer.echo(bug_report(list(examine())))
+        return
 
     for finding in examine():
         typer.echo(finding.line())

@@ -20,7 +20,7 @@ SOURCES = {
     "daltorio2013": {"daltorio2013"},
     "boxerbaum2012": {"boxerbaum2012"},
     "wang": {"wang", "riddle2025models"},
-    **dict.fromkeys(("riddle2023", "riddle2023-rods", "riddle2023-fast"), {"riddle2023", "wang", "riddle2022"}),
+    **{name: {"wang", "riddle2022"} for name in preset_names() if name.startswith("riddle2023")},
 }
 """What each preset is named after, or its file states as its source; all others come from the robot of 2025."""
 CONTROLLERS = {
@@ -116,7 +116,8 @@ def test_what_is_printed_parses_with_its_reasons(preset: str) -> None:
 
 
 def test_the_tool_is_cited_as_its_citation_file_says() -> None:
-    facts = dict(re.findall(r"^([\w-]+): \"?([^\"\n]+)", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE))
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    facts = dict(re.findall(r"^([\w-]+): \"?([^\"\n]+)", text, re.MULTILINE))
     entry = bibtexparser.parse_string(entries()["annelid"]).entries[0]
     assert entry["title"].replace("{", "").replace("}", "") == facts["title"]
     assert entry["version"] == facts["version"] == annelid.__version__

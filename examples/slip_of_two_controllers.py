@@ -2,11 +2,10 @@
 
     python examples/slip_of_two_controllers.py [folder]
 
-Daltorio et al. 2013 found that such a channel loses about 40 % less energy to slip than the best sine wave. Losses are
-given for each metre travelled, after the first third of every run, since slow waves slip little and go nowhere; the
-best wave is sought among those with a foothold for 95 % of the time, since fast ones glide. In this model it comes out
-the other way round: under one long sine wave a single foothold need not slip, while the channel stretches the worm
-between two. Takes some minutes on two cores.
+Daltorio et al. 2013 found that such a channel loses about 40 % less energy to slip than the best sine wave. Here it
+comes out the other way round: under one long sine wave a single foothold need not slip, while the channel stretches the
+worm between two. Losses are for each metre travelled, since slow waves slip little and go nowhere, and the best wave is
+one with a foothold for 95 % of the time, since fast ones glide. Takes some minutes on two cores.
 """
 
 from __future__ import annotations

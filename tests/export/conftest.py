@@ -18,7 +18,7 @@ def squeeze(sensation: Sensation) -> np.ndarray:
 
 @pytest.fixture(scope="session")
 def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A second of a planar worm with forces."""
+    """A second of a planar worm."""
     config = load_config("riddle2022-planar", {"duration_s": 1.0})
     return simulate(config, tmp_path_factory.mktemp("planar") / "run", progress=False)
 
@@ -28,6 +28,13 @@ def rods_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """The first moments of a 3D worm, segment 1 contracting."""
     config = load_config("riddle2023-rods", {"duration_s": 0.2})
     return simulate(config, tmp_path_factory.mktemp("rods") / "run", progress=False)
+
+
+@pytest.fixture(scope="session")
+def chain_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The same as a chain of capsules."""
+    config = load_config("riddle2023", {"duration_s": 0.02})
+    return simulate(config, tmp_path_factory.mktemp("chain") / "run", progress=False)
 
 
 @pytest.fixture(scope="session")

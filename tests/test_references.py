@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
 
-import bibtexparser
 import pytest
+from bibtexparser.entrypoint import parse_string
 
 import annelid
 from annelid.config import PlanarWorm, RunConfig, load_config, preset_names
@@ -95,11 +95,11 @@ def test_every_key_has_an_entry() -> None:
 
 def test_the_file_parses_and_every_entry_can_be_cited() -> None:
     text = bibtex(list(entries()))
-    library = bibtexparser.parse_string(text)
+    library = parse_string(text)
     assert library.failed_blocks == []
     assert [entry.key for entry in library.entries] == list(entries())
     whole = (Path(annelid.__file__).parent / "data" / "references.bib").read_text(encoding="utf-8")
-    assert [entry.key for entry in bibtexparser.parse_string(whole).entries] == list(entries())
+    assert [entry.key for entry in parse_string(whole).entries] == list(entries())
     for entry in library.entries:
         fields = {field.key for field in entry.fields}
         assert "author" in fields
@@ -109,7 +109,7 @@ def test_the_file_parses_and_every_entry_can_be_cited() -> None:
 @pytest.mark.parametrize("preset", preset_names())
 def test_what_is_printed_parses_with_its_reasons(preset: str) -> None:
     references = references_of(load_config(preset))
-    library = bibtexparser.parse_string(bibtex(references))
+    library = parse_string(bibtex(references))
     assert library.failed_blocks == []
     assert [entry.key for entry in library.entries] == list(references)
     assert all(references.values())
@@ -118,7 +118,7 @@ def test_what_is_printed_parses_with_its_reasons(preset: str) -> None:
 def test_the_tool_is_cited_as_its_citation_file_says() -> None:
     text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     facts = dict(re.findall(r"^([\w-]+): \"?([^\"\n]+)", text, re.MULTILINE))
-    entry = bibtexparser.parse_string(entries()["annelid"]).entries[0]
+    entry = parse_string(entries()["annelid"]).entries[0]
     assert entry["title"].replace("{", "").replace("}", "") == facts["title"]
     assert entry["version"] == facts["version"] == annelid.__version__
     assert entry["year"] == facts["date-released"][:4]

@@ -19,9 +19,9 @@ def run(finished: Path, tmp_path: Path) -> Path:
 
 
 def test_an_export_goes_into_the_run_and_may_be_repeated(annelid: Command, run: Path) -> None:
-    for _ in range(2):
-        done = annelid("export", run, "--to", "csv")
-        assert done.exit_code == 0, done.err
+    annelid("export", run, "--to", "csv")
+    done = annelid("export", run, "--to", "csv")
+    assert done.exit_code == 0, done.err
     assert str(run / "csv" / "time_muscle.csv") in done.out.split()
     assert all(Path(line).exists() for line in done.out.split())
 

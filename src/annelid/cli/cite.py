@@ -23,7 +23,7 @@ def cite(
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="Print every entry that annelid knows.")] = False,
 ) -> None:
-    """Print BibTeX of what a run, a preset or a file of yours rests on.
+    """Print BibTeX of what a run or a preset rests on.
 
     Above each entry stands what it is cited for. Fields that annelid does not know for certain are left out, and
     the entry's note says which to complete.

@@ -36,7 +36,7 @@ def export_command(
     force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:
-    """Take a run elsewhere: to a spreadsheet, MATLAB, a slide, a web page or plain MuJoCo.
+    """Write a run as tables, MATLAB, video, HTML or MJCF.
 
     \b
     csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is

@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "morphology": set(),
     "nervous": {"errors"},
     "config": {"errors"},
+    "references": {"config"},
     "arena": {"config"} | BASE,
     "body": {"config", "morphology", "arena"} | BASE,
     "control": {"config", "nervous"} | BASE,
@@ -29,7 +30,8 @@ MAY_IMPORT = {
     "view": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
     "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "view"} | BASE,
     "studies": {"config", "morphology", "nervous", "body", "simulation", "analysis", "view"} | BASE,
-    "cli": {"config", "body", "simulation", "analysis", "view", "studies"} | BASE,
+    "export": {"config", "references", "body", "simulation", "analysis", "view", "studies"} | BASE,
+    "cli": {"config", "references", "body", "simulation", "analysis", "view", "studies", "export"} | BASE,
 }
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}

@@ -11,7 +11,7 @@ import pytest
 import annelid
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-MOST_LINES = 80
+MOST_LINES = 60
 
 
 def example(name: str) -> ModuleType:

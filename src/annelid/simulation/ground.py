@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +12,20 @@ from annelid.arena.surface import ground_of
 from annelid.config import Arena
 from annelid.morphology import Array, MeshGeometry
 
+FILM_M = 1e-3
+"""Skin this near to the ground is felt as touching: it may leave freely, but comes no nearer faster than contacts let
+it. Otherwise a light vertex on which the body leans is free for a whole step once it has lifted by a micrometre, and
+at 5 ms is thrown 4 mm into the ground."""
+BARELY_M = 1e-5
+"""Depth in its plane of skin that is felt before it touches."""
+
 
 class MovingGround:
     """Lays the planes of `annelid.arena.contact.add_moving_planes` before every step.
 
-    What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
-    the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions
-    and velocities alone, so a run continues and a batch computes to the same bits.
+    The engine acts on where the skin is before a step, and would stop it a step too late. What approaches the ground
+    therefore finds its plane nearer, by so much that it ends the step on the ground. Planes and friction follow from
+    the engine's positions and velocities alone, so a run continues and a batch computes to the same bits.
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:
@@ -30,6 +39,8 @@ class MovingGround:
         self._model = model
         self._surface = ground_of(arena)
         self._skin, self._planes = _skin_and_planes(model)
+        self._radius_m = model.geom_size[self._skin, 0]
+        self._rows = rows_of(model)
         self._bodies = model.geom_bodyid[self._skin]
         self._roots = model.body_rootid[self._bodies]
         self._setae = _Setae(model, geometry, arena, self._skin) if arena.has_setae else None
@@ -48,11 +59,56 @@ class MovingGround:
         with np.errstate(invalid="ignore", over="ignore"):
             velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
             distance, normal = self._surface.nearest(places, first_order=True)
-            ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
-            data.mocap_pos[self._planes] = places - (distance - ahead)[:, np.newaxis] * normal
+            approach = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
+            depth = depth_m(distance - self._radius_m, approach, self._rows)
+            data.mocap_pos[self._planes] = places - (self._radius_m - depth)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
             if self._setae is not None:
                 model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
+
+
+class Rows(NamedTuple):
+    """How contacts act in a step of h: at a depth d they turn a velocity v, outwards, into (a v + k d / h) / q.
+
+    Attributes:
+        kept: a, ``(n,)``.
+        stiffness: k, h squared times stiffness over mass, ``(n,)``.
+        divisor: q, ``(n,)``.
+    """
+
+    kept: Array
+    stiffness: Array
+    divisor: Array
+
+
+def rows_of(model: mujoco.MjModel) -> Rows:
+    """Returns how the contacts of a model's pairs act, all critically damped.
+
+    The integrator `discrete` takes spring and damper at the end of the step, and none faster than a step; the others
+    take them at its beginning, and none faster than two.
+    """
+    step, stiffest = model.opt.timestep, model.pair_solimp[:, 1]
+    implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
+    share = step / (stiffest * np.maximum(model.pair_solref[:, 0], step if implicit else 2.0 * step))
+    stiffness, damping, one = share * share, 2.0 * share, np.ones_like(share)
+    return Rows(one, stiffness, 1.0 + damping + stiffness) if implicit else Rows(1.0 - damping, stiffness, one)
+
+
+def depth_m(gap_m: Array, approach_m: Array, rows: Rows) -> Array:
+    """Tells how deep skin has to lie in its plane before a step to end it on the ground, if nothing else acts on it.
+
+    Args:
+        gap_m: Distance of the skin from the ground, negative within it, m, ``(n,)``.
+        approach_m: What the skin would come nearer in the step, m, at least 0, ``(n,)``.
+        rows: How contacts act.
+
+    Returns:
+        Depths, m, ``(n,)``: negative for skin that is not felt, and never less than how far it is in the ground.
+    """
+    above = np.maximum(gap_m, 0.0)
+    landing = (rows.kept * approach_m - rows.divisor * above) / rows.stiffness
+    felt = np.where(above < approach_m + FILM_M, BARELY_M, -np.inf)
+    return np.maximum(-gap_m, np.maximum(landing, felt))
 
 
 def _skin_and_planes(model: mujoco.MjModel) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.simulation.ground import BARELY_M, FILM_M, depth_m, rows_of
+from annelid.simulation.ground import BARELY_M, HELD_WITHIN_M, depth_m, rows_of
 
 RADIUS_M = 0.003
 
@@ -59,7 +59,7 @@ def test_a_ball_that_comes_fast_ends_the_step_on_the_ground(
 
 def test_skin_in_the_ground_is_pressed_out_by_as_much_as_it_is_in() -> None:
     rows = rows_of(falling(0.005, 0.01, "DISCRETE"))
-    at_rest = depth_m(np.array([-0.002, 0.5 * FILM_M, 1.5 * FILM_M]), np.zeros(3), rows)
+    at_rest = depth_m(np.array([-0.002, 0.5 * HELD_WITHIN_M, 1.5 * HELD_WITHIN_M]), np.zeros(3), rows)
     assert at_rest[0] == 0.002
     assert 0.0 < at_rest[1] < 1e-4
     assert at_rest[2] < 0.0

@@ -12,10 +12,10 @@ from annelid.arena.surface import ground_of
 from annelid.config import Arena
 from annelid.morphology import Array, MeshGeometry
 
-FILM_M = 1e-3
-"""Skin this near to the ground is felt as touching: it may leave freely, but comes no nearer faster than contacts let
-it. Otherwise a light vertex on which the body leans is free for a whole step once it has lifted by a micrometre, and
-at 5 ms is thrown 4 mm into the ground."""
+HELD_WITHIN_M = 1e-3
+"""Skin that leaves the ground keeps its contact this far, which then lets it go but not come back at once. Otherwise a
+light vertex on which the body leans is free for a whole step once it has lifted by a micrometre, and is thrown into the
+ground: by 4 mm in a step of 5 ms."""
 BARELY_M = 1e-5
 """Depth in its plane of skin that is felt before it touches."""
 
@@ -84,14 +84,17 @@ class Rows(NamedTuple):
 def rows_of(model: mujoco.MjModel) -> Rows:
     """Returns how the contacts of a model's pairs act, all critically damped.
 
-    The integrator `discrete` takes spring and damper at the end of the step, and none faster than a step; the others
-    take them at its beginning, and none faster than two.
+    The integrator `discrete` takes spring and damper at the end of the step, and has one row for all that would be
+    faster than the step. The others take them at its beginning, and none as faster than two steps.
     """
     step, stiffest = model.opt.timestep, model.pair_solimp[:, 1]
     implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
-    share = step / (stiffest * np.maximum(model.pair_solref[:, 0], step if implicit else 2.0 * step))
-    stiffness, damping, one = share * share, 2.0 * share, np.ones_like(share)
-    return Rows(one, stiffness, 1.0 + damping + stiffness) if implicit else Rows(1.0 - damping, stiffness, one)
+    share = step / (stiffest * np.maximum(model.pair_solref[:, 0], 0.0 if implicit else 2.0 * step))
+    one = np.ones_like(share)
+    if not implicit:
+        return Rows(one - 2.0 * share, share * share, one)
+    resolved = share >= 1.0
+    return Rows(one, np.where(resolved, 1.0, share * share), np.where(resolved, 2.0, (1.0 + share) ** 2))
 
 
 def depth_m(gap_m: Array, approach_m: Array, rows: Rows) -> Array:
@@ -107,7 +110,7 @@ def depth_m(gap_m: Array, approach_m: Array, rows: Rows) -> Array:
     """
     above = np.maximum(gap_m, 0.0)
     landing = (rows.kept * approach_m - rows.divisor * above) / rows.stiffness
-    felt = np.where(above < approach_m + FILM_M, BARELY_M, -np.inf)
+    felt = np.where(above < np.where(approach_m > 0.0, approach_m, HELD_WITHIN_M), BARELY_M, -np.inf)
     return np.maximum(-gap_m, np.maximum(landing, felt))
 
 

@@ -50,16 +50,17 @@ def test_a_ball_that_comes_fast_ends_the_step_on_the_ground(
     approach = speed_m_per_s * step_s
     gap_m = gap * approach
     data.qpos[0], data.qvel[0] = gap_m + RADIUS_M, -speed_m_per_s
-    depth = depth_m(np.array([gap_m]), np.array([approach]), rows_of(model))
+    depth = depth_m(np.array([gap_m]), np.array([approach]), np.array([False]), rows_of(model))
     data.mocap_pos[0, 2] = data.qpos[0] - (RADIUS_M - depth[0])
     mujoco.mj_step(model, data)
     reached = data.qpos[0] - RADIUS_M
     assert min(gap_m, 0.0) - 1e-3 * approach <= reached <= max(gap_m, 0.0) + 1e-3 * approach + BARELY_M
 
 
-def test_skin_in_the_ground_is_pressed_out_by_as_much_as_it_is_in() -> None:
+def test_skin_is_felt_in_the_ground_and_near_to_it_once_it_has_touched() -> None:
     rows = rows_of(falling(0.005, 0.01, "DISCRETE"))
-    at_rest = depth_m(np.array([-0.002, 0.5 * HELD_WITHIN_M, 1.5 * HELD_WITHIN_M]), np.zeros(3), rows)
+    gap = np.array([-0.002, 0.5 * HELD_WITHIN_M, 0.5 * HELD_WITHIN_M, 1.5 * HELD_WITHIN_M])
+    at_rest = depth_m(gap, np.zeros(4), np.array([True, True, False, True]), rows)
     assert at_rest[0] == 0.002
     assert 0.0 < at_rest[1] < 1e-4
-    assert at_rest[2] < 0.0
+    assert at_rest[2:] == pytest.approx(-gap[2:])

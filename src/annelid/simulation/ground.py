@@ -13,9 +13,9 @@ from annelid.config import Arena
 from annelid.morphology import Array, MeshGeometry
 
 HELD_WITHIN_M = 1e-3
-"""Skin that leaves the ground keeps its contact this far, which then lets it go but not come back at once. Otherwise a
-light vertex on which the body leans is free for a whole step once it has lifted by a micrometre, and is thrown into the
-ground: by 4 mm in a step of 5 ms."""
+"""Skin that touched keeps its contact as far as this from the ground: it may leave, but not come back at once.
+Otherwise a light vertex on which the body leans is free for a whole step once it has lifted by a micrometre, and is
+thrown into the ground: by 5 mm in a step of 5 ms."""
 BARELY_M = 1e-5
 """Depth in its plane of skin that is felt before it touches."""
 
@@ -25,7 +25,7 @@ class MovingGround:
 
     The engine acts on where the skin is before a step, and would stop it a step too late. What approaches the ground
     therefore finds its plane nearer, by so much that it ends the step on the ground. Planes and friction follow from
-    the engine's positions and velocities alone, so a run continues and a batch computes to the same bits.
+    the engine's state alone, so a run continues and a batch computes to the same bits.
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:
@@ -40,6 +40,7 @@ class MovingGround:
         self._surface = ground_of(arena)
         self._skin, self._planes = _skin_and_planes(model)
         self._radius_m = model.geom_size[self._skin, 0]
+        self._plane_geoms = np.where(model.pair_geom1 == self._skin, model.pair_geom2, model.pair_geom1)
         self._rows = rows_of(model)
         self._bodies = model.geom_bodyid[self._skin]
         self._roots = model.body_rootid[self._bodies]
@@ -49,9 +50,10 @@ class MovingGround:
         """Lays every plane where the ground is nearest to its part of the skin, and sets friction.
 
         Args:
-            data: Positions and velocities; its kinematics are brought up to date.
+            data: Positions, velocities and the planes as laid before the last step; its kinematics are brought up to
+                date.
         """
-        model = self._model
+        model, step = self._model, self._model.opt.timestep
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
             stage(model, data)
         places = data.geom_xpos[self._skin]
@@ -59,12 +61,18 @@ class MovingGround:
         with np.errstate(invalid="ignore", over="ignore"):
             velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
             distance, normal = self._surface.nearest(places, first_order=True)
-            approach = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
-            depth = depth_m(distance - self._radius_m, approach, self._rows)
+            approach = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * step
+            touched = self._depth_m(data, places - step * velocity) > 0.0
+            depth = depth_m(distance - self._radius_m, approach, touched, self._rows)
             data.mocap_pos[self._planes] = places - (self._radius_m - depth)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
             if self._setae is not None:
                 model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
+
+    def _depth_m(self, data: mujoco.MjData, places: Array) -> Array:
+        """Tells how deep in its present plane each part of the skin lies that is at a place, m; ``(n_skin,)``."""
+        normal = data.geom_xmat[self._plane_geoms, 2::3]
+        return self._radius_m - ((places - data.geom_xpos[self._plane_geoms]) * normal).sum(axis=-1)
 
 
 class Rows(NamedTuple):
@@ -97,12 +105,13 @@ def rows_of(model: mujoco.MjModel) -> Rows:
     return Rows(one, np.where(resolved, 1.0, share * share), np.where(resolved, 2.0, (1.0 + share) ** 2))
 
 
-def depth_m(gap_m: Array, approach_m: Array, rows: Rows) -> Array:
+def depth_m(gap_m: Array, approach_m: Array, touched: NDArray[np.bool_], rows: Rows) -> Array:
     """Tells how deep skin has to lie in its plane before a step to end it on the ground, if nothing else acts on it.
 
     Args:
         gap_m: Distance of the skin from the ground, negative within it, m, ``(n,)``.
         approach_m: What the skin would come nearer in the step, m, at least 0, ``(n,)``.
+        touched: Whether it lay in its plane before the last step, ``(n,)``.
         rows: How contacts act.
 
     Returns:
@@ -110,7 +119,7 @@ def depth_m(gap_m: Array, approach_m: Array, rows: Rows) -> Array:
     """
     above = np.maximum(gap_m, 0.0)
     landing = (rows.kept * approach_m - rows.divisor * above) / rows.stiffness
-    felt = np.where(above < np.where(approach_m > 0.0, approach_m, HELD_WITHIN_M), BARELY_M, -np.inf)
+    felt = np.where(above < np.maximum(approach_m, HELD_WITHIN_M * touched), BARELY_M, -np.inf)
     return np.maximum(-gap_m, np.maximum(landing, felt))
 
 

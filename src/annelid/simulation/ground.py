@@ -62,14 +62,14 @@ class MovingGround:
             velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
             distance, normal = self._surface.nearest(places, first_order=True)
             approach = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * step
-            touched = self._depth_m(data, places - step * velocity) > 0.0
+            touched = self._depth_in_planes_m(data, places - step * velocity) > 0.0
             depth = depth_m(distance - self._radius_m, approach, touched, self._rows)
             data.mocap_pos[self._planes] = places - (self._radius_m - depth)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
             if self._setae is not None:
                 model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
 
-    def _depth_m(self, data: mujoco.MjData, places: Array) -> Array:
+    def _depth_in_planes_m(self, data: mujoco.MjData, places: Array) -> Array:
         """Tells how deep in its present plane each part of the skin lies that is at a place, m; ``(n_skin,)``."""
         normal = data.geom_xmat[self._plane_geoms, 2::3]
         return self._radius_m - ((places - data.geom_xpos[self._plane_geoms]) * normal).sum(axis=-1)

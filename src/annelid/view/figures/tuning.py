@@ -93,8 +93,8 @@ def pareto_figure(
         steps = "steps-pre" if more_is_better else "steps-post"
         reached = _columns([mark.values for mark in on_front])
         axes.plot(*reached, "o-", drawstyle=steps, color=_BEST, markersize=4.5, label="front, with numbers of trials")
-        for mark in on_front:
-            axes.annotate(str(mark.number), mark.values, (5, -9), textcoords="offset points", fontsize=7, color=_BEST)
+        for mark, x, y in zip(on_front, *reached, strict=True):
+            axes.annotate(str(mark.number), (x, y), (5, -9), textcoords="offset points", fontsize=7, color=_BEST)
         axes.margins(0.08)
         begun = [mark.values for mark in walking if mark.number < 0]
         axes.plot(*_columns(begun), "D", color=_START, markersize=7, label="start")

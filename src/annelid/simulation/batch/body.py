@@ -116,7 +116,6 @@ class BodyBatch:
         assert ground is not None
         assert self._mocap is not None
         scratch.qpos[:], scratch.qvel[:] = self._qpos[row], self._qvel[row]
-        scratch.mocap_pos[:], scratch.mocap_quat[:] = (bound[row] for bound in self._mocap)
         ground.lay(scratch)
         for bound, laid in zip(self._mocap, (scratch.mocap_pos, scratch.mocap_quat), strict=True):
             bound[row] = laid

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import Floor, RunConfig, WormBody
+from annelid.config import CourseTurning, Floor, RunConfig, WormBody
 from annelid.errors import RunFileError
 from annelid.view.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.view.gl import Canvas, find_backend
@@ -35,6 +35,8 @@ ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
 SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
 """Axial springs, apart from the red of a contracted ring."""
+WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
+WAYPOINT_HALF_HEIGHT_M = 1e-3
 
 
 class WormScene:
@@ -345,6 +347,24 @@ def _model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]
         light.specular = [0.1, 0.1, 0.1]
     for tendon in spec.tendons:
         tendon.rgba = SPRING_RGBA
+    _mark_waypoints(spec, config)
     model = spec.compile()
     names = ring_names(config.body.n_segments, config.body.rings)
     return model, np.array([model.tendon(name).id for name in names])
+
+
+def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:
+    """Lays a disc on the floor where each waypoint of a course counts as reached."""
+    import mujoco
+
+    if not (isinstance(config.turning, CourseTurning) and isinstance(config.arena, Floor)):
+        return
+    for x, y in config.turning.waypoints:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[x, y, WAYPOINT_HALF_HEIGHT_M - config.arena.floor_gap_m],
+            size=[config.turning.reach_m, WAYPOINT_HALF_HEIGHT_M, 0.0],
+            rgba=WAYPOINT_RGBA,
+            contype=0,
+            conaffinity=0,
+        )

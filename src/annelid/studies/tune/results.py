@@ -149,10 +149,11 @@ def _figure(task: Task, trials: Sequence[Trial], stem: Path) -> Path:
     labels = [objective.label for objective in task.objectives]
     values = [tuple(trial.judged.value(one) for one in task.objectives) for trial in trials]
     marks = [Mark(trial.number, value, not trial.judged.problem) for trial, value in zip(trials, values, strict=True)]
+    more_is_better = task.objectives[0].better == "more"
     if len(task.objectives) == 1:
-        return progress_figure(marks, labels[0], task.objectives[0].better == "more", stem)
+        return progress_figure(marks, labels[0], more_is_better, stem)
     on_front = {trial.number for trial in front(trials, task.objectives)}
-    return pareto_figure(marks, on_front, (labels[0], labels[1]), stem)
+    return pareto_figure(marks, on_front, (labels[0], labels[1]), more_is_better, stem)
 
 
 def _thinned(leaders: list[Trial]) -> list[Trial]:

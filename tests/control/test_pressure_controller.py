@@ -1,4 +1,4 @@
-"""The peristalsis network with pressure feedback: what each of its two neurons a segment does, and nothing else."""
+"""The peristalsis network with pressure feedback: what each of its synapses does, and nothing else."""
 
 from __future__ import annotations
 
@@ -18,6 +18,18 @@ from annelid.protocols import SIDES, Array, Sensation
 
 N = 4
 SENSOR = StretchSensor(tolerance_m=0.005, startup_hold_s=0.0)
+
+
+ALONE: dict[str, Any] = {
+    "hold": 0.0,
+    "release": 0.0,
+    "landing": 0.0,
+    "exchange": 0.0,
+    "light_N": 1.0,
+    "full_N": 6.0,
+    "pressure_time_constant_s": 0.005,
+}
+"""No synapse of ours, and quick neurons."""
 
 
 def controller(**changes: Any) -> PressureController:
@@ -54,9 +66,31 @@ def sensory(driven: PressureController, load_N: Array, longer_m: Array, seconds:
 @pytest.mark.parametrize("hold", [0.4, 0.8])
 def test_a_stretched_segment_holds_only_as_far_as_it_bears_load(load: float, share: float, hold: float) -> None:
     """Segment 2, while segment 1 is contracted and so sends no relay; the synapse is exact at no and full pressure."""
-    driven = controller(hold=hold, release=0.0, pressure_time_constant_s=0.005)
+    driven = controller(**(ALONE | {"hold": hold}))
     reached = sensory(driven, np.array([0.0, load, 0.0, 0.0]), np.full(N, 0.02), 0.04)
     assert reached[1] == pytest.approx(share * hold * 20.0, abs=0.3)
+
+
+@pytest.mark.parametrize("load", [0.0, 3.5, 20.0])
+def test_landing_holds_the_segment_before_a_loaded_one_as_its_own_load_would(load: float) -> None:
+    """Segment 2, stretched and free, by the load of segment 3 as by its own."""
+    longer = np.full(N, 0.02)
+    follower = controller(**(ALONE | {"landing": 0.6}))
+    itself = controller(**(ALONE | {"hold": 0.6}))
+    by_follower = sensory(follower, np.array([0.0, 0.0, load, 0.0]), longer, 0.04)
+    by_itself = sensory(itself, np.array([0.0, load, 0.0, 0.0]), longer, 0.04)
+    assert by_follower[1] == by_itself[1]
+    assert (by_follower[1] > 1.0) == (load > 1.0)
+
+
+@pytest.mark.parametrize("exchange", [0.5, 0.9])
+def test_a_contracting_segment_ends_the_contraction_two_segments_before(exchange: float) -> None:
+    """Segment 1 contracts at the start; segment 2, at rest length, sends no relay to segment 3, two before it."""
+    lengths = np.array([0.02, 0.0, 0.02, 0.02])
+    reached = sensory(controller(**(ALONE | {"exchange": exchange})), np.zeros(N), lengths, 0.04)
+    without = sensory(controller(**ALONE), np.zeros(N), lengths, 0.04)
+    assert reached[2] == pytest.approx(exchange * 20.0, abs=0.3)
+    assert without[2] == pytest.approx(0.0, abs=0.3)
 
 
 def test_an_extended_segment_lets_the_next_one_go_loaded_or_not() -> None:
@@ -73,7 +107,7 @@ def test_the_last_segment_lets_the_first_one_go() -> None:
 
 
 def test_without_conductances_it_is_the_paper_s_network_to_the_last_bit() -> None:
-    section = PressureSns(hold=0.0, release=0.0)
+    section = PressureSns(hold=0.0, release=0.0, landing=0.0, exchange=0.0)
     ours, papers = (
         PressureController(section, SENSOR, N, N, 0.001),
         SnsController(section.network, SENSOR, N, N, 0.001),

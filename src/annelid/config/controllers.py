@@ -252,6 +252,16 @@ class PressureSns(Section):
     release: Annotated[float, Field(ge=0, le=20)] = Field(
         default=2.0, description="stretch sensors' currents that a full extension neuron cancels; 0 for none"
     )
+    landing: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.0,
+        description="potential, over R, that full pressure alone gives the sensory neuron of the segment before; 0 for "
+        "none",
+    )
+    exchange: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.0,
+        description="potential, over R, that a full contraction neuron alone gives the sensory neuron two segments "
+        "before; 0 for none",
+    )
     pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=10)] = Field(
         default=0.06, description="time constant of the pressure neurons"
     )

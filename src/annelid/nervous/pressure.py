@@ -7,11 +7,13 @@ go of the ground before the one ahead has its length (the aim of the contact fee
 
 - *Pressure*: driven by the load that the segment bears, it excites the segment's sensory neuron. A segment that stands
   on the ground holds itself expanded, stretched or not; one that lands while it is contracted soon lets go of its
-  contraction and becomes an anchor.
+  contraction and becomes an anchor. By a second synapse, *landing*, it excites the sensory neuron of the segment
+  before as well, the last segment's being before the first: that one ends its contraction sooner while its follower
+  stands on the ground.
 - *Extension*: driven by the segment's length, it inhibits the next segment's sensory neuron. The next segment lets go
   of the ground once this one is extended, loaded or not, rather than once this one comes back.
 
-With both conductances at zero what remains is the network of Riddle et al. The design is our own.
+With all three at zero what remains is the network of Riddle et al. The design is our own.
 """
 
 from __future__ import annotations
@@ -36,20 +38,29 @@ class PressureParameters:
         peristalsis: The network of Riddle et al.
         hold: Potential that a full pressure neuron alone gives its sensory neuron, over R; 0 for no pressure feedback.
         release: How many times the current of a stretch sensor a full extension neuron cancels; 0 for none.
+        landing: Potential that a full pressure neuron alone gives the sensory neuron of the segment before, over R; 0
+            for none.
+        exchange: Potential that a full contraction neuron alone gives the sensory neuron two segments before, over R; 0
+            for none.
         pressure_ms: Time constant of the pressure neurons.
 
     Raises:
-        ConfigError: A time constant that is not positive, or ``hold`` or ``release`` below 0.
+        ConfigError: A time constant that is not positive, or ``hold``, ``release``, ``landing`` or ``exchange``
+            below 0.
     """
 
     peristalsis: PeristalsisParameters = field(default_factory=PeristalsisParameters)
     hold: float = 0.6
     release: float = 2.0
+    landing: float = 0.0
+    exchange: float = 0.0
     pressure_ms: float = 60.0
 
     def __post_init__(self) -> None:
         require_positive(pressure_ms=self.pressure_ms)
-        require_at_least(0, hold=self.hold, release=self.release)
+        require_at_least(
+            0, hold=self.hold, release=self.release, landing=self.landing, exchange=self.exchange
+        )
 
 
 def pressure_network(n_segments: int, parameters: PressureParameters | None = None) -> Network:
@@ -64,7 +75,8 @@ def pressure_network(n_segments: int, parameters: PressureParameters | None = No
         their inputs ``load_s`` and ``length_s``, all behind its own. ``Gm R`` nA is the full scale of these inputs.
 
     Raises:
-        ConfigError: As `peristalsis_network`, or a ``hold`` beyond what the excitatory reversal potential can give.
+        ConfigError: As `peristalsis_network`, or a ``hold``, ``landing`` or ``exchange`` beyond
+            what the excitatory reversal potential can give.
     """
     require_at_least(3, n_segments=n_segments)
     design = PressureParameters() if parameters is None else parameters
@@ -78,8 +90,14 @@ def pressure_network(n_segments: int, parameters: PressureParameters | None = No
     signals = Signals(reach, leak, p.capacitance_nF, p.excitatory_reversal_mV, p.inhibitory_reversal_mV)
     release = p.inhibitory(design.release * p.conductances.relay_to_next_sensory)
     for segment in range(1, n_segments + 1):
+        before, two_before = ((segment - 1 - steps) % n_segments + 1 for steps in (1, 2))
         if design.hold > 0:
             network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", transmission(design.hold, signals))
+        if design.landing > 0:
+            network.add_synapse(f"pressure_{segment}", f"sensory_{before}", transmission(design.landing, signals))
+        if design.exchange > 0:
+            synapse = transmission(design.exchange, signals)
+            network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", synapse)
         if design.release > 0:
             network.add_synapse(f"extension_{segment}", f"sensory_{segment % n_segments + 1}", release)
         network.add_input(f"load_{segment}", f"pressure_{segment}")

@@ -25,7 +25,7 @@ def slip_command(
 
     A six-segment worm crawls on several frictions with the paper's network, with our extension neurons, and with
     pressure neurons too (controller sns-pressure). Speed and loss are those of whole cycles. Writes slip.csv, .png and
-    .svg, and keeps runs, so that an interrupted call goes on. Eighteen runs of about ten seconds each; docs/slip.md
+    .svg, and keeps runs, so that an interrupted call goes on. Twenty-one runs of about ten seconds each; docs/slip.md
     explains the results.
 
     \b
@@ -59,7 +59,7 @@ def slip_command(
         rows = np.array([(friction, cost.loss_J_per_m, cost.speed_m_per_s) for friction, cost in judged])
         if len(rows):
             lines[feedback] = (rows[:, 0], rows[:, 1], rows[:, 2])
-    tuned_at = TUNED_AT if preset == PRESET else None
+    tuned_at = TUNED_AT if preset == PRESET else ()
     for written in (path, feedback_figure(lines, tuned_at, path.with_suffix(""))):
         typer.echo(written)
 

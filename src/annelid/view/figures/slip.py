@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from annelid.morphology import Array
@@ -12,12 +12,14 @@ from annelid.view.style import panel_title, segment_colors
 _MARKERS = "os^Dv"
 
 
-def feedback_figure(lines: Mapping[str, tuple[Array, Array, Array]], tuned_at: float | None, stem: str | Path) -> Path:
+def feedback_figure(
+    lines: Mapping[str, tuple[Array, Array, Array]], tuned_at: Collection[float], stem: str | Path
+) -> Path:
     """Draws loss per metre and speed against friction.
 
     Args:
         lines: By the kind of feedback: frictions, loss per way (J/m) and speed (m/s), each ``(n,)``.
-        tuned_at: Friction that gets a dotted line, if any.
+        tuned_at: Frictions that get a dotted line.
         stem: Path without suffix; ``.svg`` and ``.png`` are written.
 
     Returns:
@@ -35,9 +37,9 @@ def feedback_figure(lines: Mapping[str, tuple[Array, Array, Array]], tuned_at: f
             strict=True,
         ):
             panel_title(axes, title)
-            axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at is not None else ""))
-            if tuned_at is not None:
-                axes.axvline(tuned_at, color="0.35", linewidth=0.8, linestyle=":")
+            axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at else ""))
+            for friction in tuned_at:
+                axes.axvline(friction, color="0.35", linewidth=0.8, linestyle=":")
             axes.set_ylabel(label)
         for (name, (friction, loss, speed)), color, marker in zip(
             lines.items(), segment_colors(len(lines)), _MARKERS, strict=False

@@ -2,18 +2,23 @@
 
 The network of Riddle et al. (`annelid.nervous.peristalsis`) knows lengths only. On a body with weight a contracting
 segment stretches its neighbour, whose stretch sensor then lets go too early: two or three segments contract almost at
-once, the front droops and is dragged along the ground. Two neurons a segment even the wave out, so that no segment lets
-go of the ground before the one ahead has its length (the aim of the contact feedback of Daltorio et al. 2013):
+once, the front droops and is dragged along the ground. Two neurons a segment and four kinds of synapse even the wave
+out, so that no segment lets go of the ground before the one ahead has its length (the aim of the contact feedback of
+Daltorio et al. 2013), and each comes back while another one lengthens. All act on sensory neurons, which hold a segment
+expanded and end its contraction:
 
-- *Pressure*: driven by the load that the segment bears, it excites the segment's sensory neuron. A segment that stands
-  on the ground holds itself expanded, stretched or not; one that lands while it is contracted soon lets go of its
-  contraction and becomes an anchor. By a second synapse, *landing*, it excites the sensory neuron of the segment
-  before as well, the last segment's being before the first: that one ends its contraction sooner while its follower
-  stands on the ground.
-- *Extension*: driven by the segment's length, it inhibits the next segment's sensory neuron. The next segment lets go
-  of the ground once this one is extended, loaded or not, rather than once this one comes back.
+- *Hold*: the pressure neuron, driven by the load that the segment bears, excites the segment's own. A segment that
+  stands on the ground holds itself expanded, stretched or not; one that lands while it is contracted soon lets go of
+  its contraction and becomes an anchor.
+- *Landing*: the pressure neuron excites that of the segment before. That one stays expanded, or ends its contraction
+  sooner, while its follower stands on the ground.
+- *Release*: the extension neuron, driven by the segment's length, inhibits that of the next segment. It lets go of the
+  ground once this one is extended, loaded or not, rather than once this one comes back.
+- *Exchange*: the contraction neuron excites that of the segment two before. What lies between the anchors in front and
+  behind keeps its length, since one segment shortens while another one lengthens, and neither anchor is pushed along.
 
-With all three at zero what remains is the network of Riddle et al. The design is our own.
+Before the first segment comes the last. With all four at zero what remains is the network of Riddle et al. The design
+is our own.
 """
 
 from __future__ import annotations
@@ -36,12 +41,12 @@ class PressureParameters:
 
     Attributes:
         peristalsis: The network of Riddle et al.
-        hold: Potential that a full pressure neuron alone gives its sensory neuron, over R; 0 for no pressure feedback.
+        hold: Potential that a full pressure neuron alone gives its sensory neuron, over R; 0 for none.
         release: How many times the current of a stretch sensor a full extension neuron cancels; 0 for none.
         landing: Potential that a full pressure neuron alone gives the sensory neuron of the segment before, over R; 0
             for none.
         exchange: Potential that a full contraction neuron alone gives the sensory neuron two segments before, over R; 0
-            for none.
+            for none. Three segments have none: there the segment two before is the next one.
         pressure_ms: Time constant of the pressure neurons.
 
     Raises:
@@ -50,17 +55,15 @@ class PressureParameters:
     """
 
     peristalsis: PeristalsisParameters = field(default_factory=PeristalsisParameters)
-    hold: float = 0.6
-    release: float = 2.0
-    landing: float = 0.0
-    exchange: float = 0.0
-    pressure_ms: float = 60.0
+    hold: float = 1.0
+    release: float = 1.8
+    landing: float = 0.1
+    exchange: float = 0.8
+    pressure_ms: float = 30.0
 
     def __post_init__(self) -> None:
         require_positive(pressure_ms=self.pressure_ms)
-        require_at_least(
-            0, hold=self.hold, release=self.release, landing=self.landing, exchange=self.exchange
-        )
+        require_at_least(0, hold=self.hold, release=self.release, landing=self.landing, exchange=self.exchange)
 
 
 def pressure_network(n_segments: int, parameters: PressureParameters | None = None) -> Network:
@@ -95,7 +98,7 @@ def pressure_network(n_segments: int, parameters: PressureParameters | None = No
             network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", transmission(design.hold, signals))
         if design.landing > 0:
             network.add_synapse(f"pressure_{segment}", f"sensory_{before}", transmission(design.landing, signals))
-        if design.exchange > 0:
+        if design.exchange > 0 and n_segments > 3:
             synapse = transmission(design.exchange, signals)
             network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", synapse)
         if design.release > 0:

@@ -31,9 +31,9 @@ FRICTIONS = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5)
 QUICK = (0.7, 1.0)
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
-PLAIN, EXTENSION, PRESSURE = "none", "extension", "pressure and extension"
+PLAIN, EXTENSION, PRESSURE = "none", "extension and exchange", "these and pressure"
 FEEDBACKS = (PLAIN, EXTENSION, PRESSURE)
-"""What is fed back beside the paper's stretch sensors: nothing, the first half of our design, all of it."""
+"""What is fed back beside the paper's stretch sensors: nothing, what of our design needs no touch, all of it."""
 COLUMNS = (
     "feedback",
     "friction",
@@ -72,7 +72,7 @@ def case(feedback: str, friction: float, preset: str = PRESET) -> Case:
     if feedback != PLAIN:
         changes["controller"] = {"kind": "sns-pressure", "network": load_config(preset).controller.model_dump()}
     if feedback == EXTENSION:
-        changes["controller"]["hold"] = 0.0
+        changes["controller"] |= {"hold": 0.0, "landing": 0.0}
     return Case(preset, changes)
 
 

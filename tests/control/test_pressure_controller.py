@@ -124,7 +124,20 @@ def test_the_network_extends_the_paper_s() -> None:
     assert list(extended.neurons)[: len(names)] == names
     assert len(extended.neurons) == len(names) + 2 * N
     assert extended.connections[: len(plain.connections)] == plain.connections
-    assert len(extended.connections) == len(plain.connections) + 2 * N
+    assert len(extended.connections) == len(plain.connections) + 4 * N
+
+
+@pytest.mark.parametrize(("n_segments", "expected"), [(3, 0), (4, 4), (6, 6)])
+def test_every_segment_ends_the_contraction_two_before_where_that_is_not_the_next_one(
+    n_segments: int, expected: int
+) -> None:
+    links = [
+        (int(one.source.split("_")[1]), int(one.target.split("_")[1]))
+        for one in pressure_network(n_segments).connections
+        if one.source.startswith("contraction") and one.target.startswith("sensory")
+    ]
+    assert len(links) == expected
+    assert all((source - target) % n_segments == 2 for source, target in links)
 
 
 @pytest.mark.parametrize("start_s", [0.0, 0.195, 3.0])
@@ -139,11 +152,11 @@ def test_a_stride_is_so_many_steps(start_s: float) -> None:
 
 
 def test_the_first_segment_is_not_held_by_its_load_at_the_start() -> None:
-    """Its first contraction is the paper's; without the hold at the start its load ends it sooner."""
+    """Without landing its first contraction is the paper's; without the hold at the start its own load ends it."""
     lengths = []
     for startup_hold_s in (0.2, 0.0):
         sensor = StretchSensor(tolerance_m=0.005, startup_hold_s=startup_hold_s)
-        ours = PressureController(PressureSns(), sensor, N, N, 0.001)
+        ours = PressureController(PressureSns(landing=0.0), sensor, N, N, 0.001)
         papers = SnsController(PressureSns().network, StretchSensor(startup_hold_s=0.2), N, N, 0.001)
         counts = [0, 0]
         for i in range(190):
@@ -159,9 +172,10 @@ def test_the_first_segment_is_not_held_by_its_load_at_the_start() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"controller.light_N": 6.0}, "controller.light_N = 6 must be less than controller.full_N = 6"),
-        ({"controller.extended_m": 0.05}, "controller.extending_m = 0.056 must be less than"),
+        ({"controller.light_N": 9.0}, "controller.light_N = 9 must be less than controller.full_N = 9"),
+        ({"controller.extended_m": 0.04}, "controller.extending_m = 0.045 must be less than"),
         ({"controller.hold": -1.0}, "hold = -1.0: must be at least 0"),
+        ({"controller.exchange": 6.0}, "exchange = 6.0: must be at most 5"),
     ],
 )
 def test_scales_that_do_not_rise_are_refused(changes: dict[str, Any], words: str) -> None:

@@ -10,6 +10,7 @@ from annelid.view.canvas import canvas, save_both
 from annelid.view.style import panel_title, segment_colors
 
 _MARKERS = "os^Dv"
+_LOSSES = (2, 5, 10, 20, 50, 100)
 
 
 def feedback_figure(
@@ -46,8 +47,10 @@ def feedback_figure(
         ):
             panels[0].plot(friction, loss, color=color, marker=marker, markersize=4, label=name)
             panels[1].plot(friction, 100.0 * speed, color=color, marker=marker, markersize=4)
-        for axes in panels:
-            axes.set_ylim(bottom=0.0)
+        panels[0].set_yscale("log")
+        panels[0].set_yticks(_LOSSES, [f"{loss}" for loss in _LOSSES])
+        panels[0].minorticks_off()
+        panels[1].set_ylim(bottom=0.0)
         panels[0].legend(title="feedback")
         return save_both(figure, stem)
 

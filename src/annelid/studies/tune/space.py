@@ -81,6 +81,8 @@ _CONTROLLERS: Mapping[str, tuple[str, ...]] = {
         "controller.network.gate_time_constant_ms=80:900:log",
         "controller.hold=0:2",
         "controller.release=0:6",
+        "controller.landing=0:0.2",
+        "controller.exchange=0:2",
         "sensor.tolerance_m=0.001:0.03:log",
     ),
     "sns-robust": ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log"),

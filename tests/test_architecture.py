@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "morphology": set(),
     "nervous": {"errors"},
     "config": {"errors"},
+    "references": {"config"},
     "arena": {"config"} | BASE,
     "body": {"config", "morphology", "arena"} | BASE,
     "control": {"config", "nervous"} | BASE,
@@ -27,8 +28,10 @@ MAY_IMPORT = {
     "simulation": {"config", "morphology", "arena", "body", "control", "planar", "nervous"} | BASE,
     "analysis": {"config", "morphology", "arena", "control", "simulation"} | BASE,
     "view": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
+    "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "view"} | BASE,
     "studies": {"config", "morphology", "nervous", "body", "simulation", "analysis", "view"} | BASE,
-    "cli": {"config", "body", "simulation", "analysis", "view", "studies"} | BASE,
+    "export": {"config", "references", "body", "simulation", "analysis", "view", "studies"} | BASE,
+    "cli": {"config", "references", "body", "simulation", "analysis", "view", "studies", "export"} | BASE,
 }
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}

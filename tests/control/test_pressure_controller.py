@@ -1,4 +1,4 @@
-"""The peristalsis network with pressure feedback: what each of its two neurons a segment does, and nothing else."""
+"""The peristalsis network with pressure feedback: what each of its synapses does, and nothing else."""
 
 from __future__ import annotations
 
@@ -18,6 +18,18 @@ from annelid.protocols import SIDES, Array, Sensation
 
 N = 4
 SENSOR = StretchSensor(tolerance_m=0.005, startup_hold_s=0.0)
+
+
+ALONE: dict[str, Any] = {
+    "hold": 0.0,
+    "release": 0.0,
+    "landing": 0.0,
+    "exchange": 0.0,
+    "light_N": 1.0,
+    "full_N": 6.0,
+    "pressure_time_constant_s": 0.005,
+}
+"""No synapse of ours, and quick neurons."""
 
 
 def controller(**changes: Any) -> PressureController:
@@ -54,9 +66,31 @@ def sensory(driven: PressureController, load_N: Array, longer_m: Array, seconds:
 @pytest.mark.parametrize("hold", [0.4, 0.8])
 def test_a_stretched_segment_holds_only_as_far_as_it_bears_load(load: float, share: float, hold: float) -> None:
     """Segment 2, while segment 1 is contracted and so sends no relay; the synapse is exact at no and full pressure."""
-    driven = controller(hold=hold, release=0.0, pressure_time_constant_s=0.005)
+    driven = controller(**(ALONE | {"hold": hold}))
     reached = sensory(driven, np.array([0.0, load, 0.0, 0.0]), np.full(N, 0.02), 0.04)
     assert reached[1] == pytest.approx(share * hold * 20.0, abs=0.3)
+
+
+@pytest.mark.parametrize("load", [0.0, 3.5, 20.0])
+def test_landing_holds_the_segment_before_a_loaded_one_as_its_own_load_would(load: float) -> None:
+    """Segment 2, stretched and free, by the load of segment 3 as by its own."""
+    longer = np.full(N, 0.02)
+    follower = controller(**(ALONE | {"landing": 0.6}))
+    itself = controller(**(ALONE | {"hold": 0.6}))
+    by_follower = sensory(follower, np.array([0.0, 0.0, load, 0.0]), longer, 0.04)
+    by_itself = sensory(itself, np.array([0.0, load, 0.0, 0.0]), longer, 0.04)
+    assert by_follower[1] == by_itself[1]
+    assert (by_follower[1] > 1.0) == (load > 1.0)
+
+
+@pytest.mark.parametrize("exchange", [0.5, 0.9])
+def test_a_contracting_segment_ends_the_contraction_two_segments_before(exchange: float) -> None:
+    """Segment 1 contracts at the start; segment 2, at rest length, sends no relay to segment 3, two before it."""
+    lengths = np.array([0.02, 0.0, 0.02, 0.02])
+    reached = sensory(controller(**(ALONE | {"exchange": exchange})), np.zeros(N), lengths, 0.04)
+    without = sensory(controller(**ALONE), np.zeros(N), lengths, 0.04)
+    assert reached[2] == pytest.approx(exchange * 20.0, abs=0.3)
+    assert without[2] == pytest.approx(0.0, abs=0.3)
 
 
 def test_an_extended_segment_lets_the_next_one_go_loaded_or_not() -> None:
@@ -73,7 +107,7 @@ def test_the_last_segment_lets_the_first_one_go() -> None:
 
 
 def test_without_conductances_it_is_the_paper_s_network_to_the_last_bit() -> None:
-    section = PressureSns(hold=0.0, release=0.0)
+    section = PressureSns(hold=0.0, release=0.0, landing=0.0, exchange=0.0)
     ours, papers = (
         PressureController(section, SENSOR, N, N, 0.001),
         SnsController(section.network, SENSOR, N, N, 0.001),
@@ -90,7 +124,20 @@ def test_the_network_extends_the_paper_s() -> None:
     assert list(extended.neurons)[: len(names)] == names
     assert len(extended.neurons) == len(names) + 2 * N
     assert extended.connections[: len(plain.connections)] == plain.connections
-    assert len(extended.connections) == len(plain.connections) + 2 * N
+    assert len(extended.connections) == len(plain.connections) + 4 * N
+
+
+@pytest.mark.parametrize(("n_segments", "expected"), [(3, 0), (4, 4), (6, 6)])
+def test_every_segment_ends_the_contraction_two_before_where_that_is_not_the_next_one(
+    n_segments: int, expected: int
+) -> None:
+    links = [
+        (int(one.source.split("_")[1]), int(one.target.split("_")[1]))
+        for one in pressure_network(n_segments).connections
+        if one.source.startswith("contraction") and one.target.startswith("sensory")
+    ]
+    assert len(links) == expected
+    assert all((source - target) % n_segments == 2 for source, target in links)
 
 
 @pytest.mark.parametrize("start_s", [0.0, 0.195, 3.0])
@@ -105,11 +152,11 @@ def test_a_stride_is_so_many_steps(start_s: float) -> None:
 
 
 def test_the_first_segment_is_not_held_by_its_load_at_the_start() -> None:
-    """Its first contraction is the paper's; without the hold at the start its load ends it sooner."""
+    """Without landing its first contraction is the paper's; without the hold at the start its own load ends it."""
     lengths = []
     for startup_hold_s in (0.2, 0.0):
         sensor = StretchSensor(tolerance_m=0.005, startup_hold_s=startup_hold_s)
-        ours = PressureController(PressureSns(), sensor, N, N, 0.001)
+        ours = PressureController(PressureSns(landing=0.0), sensor, N, N, 0.001)
         papers = SnsController(PressureSns().network, StretchSensor(startup_hold_s=0.2), N, N, 0.001)
         counts = [0, 0]
         for i in range(190):
@@ -125,9 +172,10 @@ def test_the_first_segment_is_not_held_by_its_load_at_the_start() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"controller.light_N": 6.0}, "controller.light_N = 6 must be less than controller.full_N = 6"),
-        ({"controller.extended_m": 0.05}, "controller.extending_m = 0.056 must be less than"),
+        ({"controller.light_N": 9.0}, "controller.light_N = 9 must be less than controller.full_N = 9"),
+        ({"controller.extended_m": 0.04}, "controller.extending_m = 0.045 must be less than"),
         ({"controller.hold": -1.0}, "hold = -1.0: must be at least 0"),
+        ({"controller.exchange": 6.0}, "exchange = 6.0: must be at most 5"),
     ],
 )
 def test_scales_that_do_not_rise_are_refused(changes: dict[str, Any], words: str) -> None:

@@ -266,7 +266,7 @@ def test_a_walking_worm_stays_within_its_pipe() -> None:
     [
         *("pipe", "pipe.bend", "pipe.taper", "pipe.hourglass", "rough"),
         pytest.param("pipe.helix", marks=pytest.mark.xfail(reason="1.2 mm: docs/arenas.md")),
-        pytest.param("steps", marks=pytest.mark.xfail(reason="2.5 mm at the edges: docs/arenas.md")),
+        pytest.param("steps", marks=pytest.mark.xfail(reason="2.5 mm: docs/arenas.md")),
     ],
 )
 def test_a_worm_that_walks_for_half_a_minute_stays_within_its_arena(arena: str) -> None:

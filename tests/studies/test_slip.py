@@ -19,6 +19,7 @@ from annelid.studies.slip.feedback import (
     GAITS,
     PLAIN,
     PRESSURE,
+    TUNED_AT,
     Reading,
     case,
     compared,
@@ -39,7 +40,7 @@ def test_only_the_feedback_differs(preset: str) -> None:
     assert isinstance(extension.controller, PressureSns)
     assert isinstance(pressure.controller, PressureSns)
     assert plain.controller == extension.controller.network == pressure.controller.network
-    assert (extension.controller.hold, extension.controller.release) == (0.0, pressure.controller.release)
+    assert extension.controller == pressure.controller.model_copy(update={"hold": 0.0, "landing": 0.0})
     assert pressure.controller == PressureSns(network=plain.controller)
     for one in (extension, pressure):
         assert one.model_copy(update={"controller": plain.controller}) == plain
@@ -82,9 +83,11 @@ def test_scores_are_written_under_their_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_pressure_feedback_saves_slip_at_no_less_speed(tmp_path: Path) -> None:
-    """On a friction that it was not tuned on."""
-    readings = slip_feedback(Store(tmp_path), [1.0], jobs=1)
+@pytest.mark.parametrize("friction", [0.7, 1.0])
+def test_pressure_feedback_saves_slip_at_no_less_speed(tmp_path: Path, friction: float) -> None:
+    """On frictions that it was not tuned on."""
+    assert friction not in TUNED_AT
+    readings = slip_feedback(Store(tmp_path), [friction], jobs=1)
     pressure = next(one for one in readings if one.feedback == PRESSURE)
     assert pressure.one_wave
     gains = compared(readings, pressure)

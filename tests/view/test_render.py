@@ -9,7 +9,9 @@ import imageio.v3
 import numpy as np
 import pytest
 
+from annelid.config import load_config
 from annelid.errors import MissingDependency, RenderingUnavailable, RunFileError
+from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 from annelid.view.camera import VIEWS_DEG
 from annelid.view.gl import find_backend
@@ -101,6 +103,19 @@ def test_every_named_view_draws_something_else(rods_run: Run) -> None:
             seen.append(scene.picture(0))
     for i, one in enumerate(seen):
         assert all(np.any(one != other) for other in seen[:i])
+
+
+@needs_gl
+def test_waypoints_are_seen_where_they_count_as_reached(tmp_path: Path) -> None:
+    course = {"kind": "course", "waypoints": [[-0.2, 0.0]], "reach_m": 0.2}
+    config = load_config("riddle2023-rods", {"body.rings.layout": "halves", "turning": course, "duration_s": 0.04})
+    run = simulate(config, tmp_path / "run", progress=False)
+    with WormScene(run, 240, 120, "top", fine=False) as scene:
+        red, green, blue = scene.picture(0).astype(int).transpose(2, 0, 1)
+    rows, columns = np.nonzero((green > red + 20) & (green > blue + 5))
+    assert columns.size > 100
+    assert columns.mean() < 100, "in front of the worm"
+    assert rows.mean() == pytest.approx(60, abs=10)
 
 
 @pytest.mark.parametrize(

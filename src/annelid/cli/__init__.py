@@ -2,8 +2,11 @@
 
 from annelid.cli.bench import bench_command
 from annelid.cli.calibrate import calibrate_command
+from annelid.cli.cite import cite
+from annelid.cli.compare import compare_command
 from annelid.cli.entry import app, main
 from annelid.cli.experiment import experiment
+from annelid.cli.export import export_command
 from annelid.cli.limit_cycle import limit_cycle_command
 from annelid.cli.paper import paper_command
 from annelid.cli.results import plot, render, show
@@ -20,15 +23,18 @@ for _name, _command in (
     ("run", run_command),
     ("build", build),
     ("show", show),
+    ("compare", compare_command),
     ("plot", plot),
     ("render", render),
     ("view", view_command),
+    ("export", export_command),
     ("limit-cycle", limit_cycle_command),
     ("paper", paper_command),
     ("bench", bench_command),
     ("robustness", robustness_command),
     ("tune", tune_command),
     ("calibrate", calibrate_command),
+    ("cite", cite),
     ("presets", presets),
     ("arenas", arenas),
     ("doctor", doctor),

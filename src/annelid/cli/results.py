@@ -80,7 +80,7 @@ def render(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Frame to write: .png, .jpg  [default: frame.png in the run]")
     ] = None,
-    video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv")] = None,
+    video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv, .gif")] = None,
     fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
     camera: Annotated[

@@ -111,10 +111,10 @@ def _worm_or_run(
 
 
 def _export(worm: RunConfig | Run, path: Path, speed: float, force: bool) -> None:
-    from annelid.view.gallery import video_bar
+    from annelid.view.gallery import task_bar
     from annelid.view.live.page import export_page, page_path
 
     path = page_path(path)
     refuse_existing(path, force, "--export")
-    with video_bar("writing the page") as progress:
+    with task_bar("writing the page") as progress:
         typer.echo(export_page(worm, path, speed=speed, progress=progress))

@@ -20,7 +20,6 @@ from annelid.cli.common import (
     overrides_of,
     refuse_existing,
 )
-from annelid.errors import ConfigError
 
 
 def build(
@@ -34,28 +33,22 @@ def build(
 ) -> None:
     """Write a worm and its arena as MJCF, for plain MuJoCo.
 
+    A worm with servos has the keyframe rest, to be loaded before the first step: in it their cables are paid out.
+    The last state of a run: annelid export RUN --to mjcf.
+
     \b
     annelid build riddle2023-rods -o worm.xml
     annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
-    from annelid.body import build_spec, compile_spec
+    from annelid.body.mjcf import mjcf_text
     from annelid.view.output import whole_file
 
     refuse_existing(output, force)
     config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity, arena)
-    if config.arena is not None and config.arena.has_setae:
-        raise ConfigError(
-            f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
-            "the same in both directions: leave it out or run the worm with annelid"
-        )
-    spec = build_spec(config)
-    try:
-        compile_spec(spec)
-    except ValueError as error:
-        raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+    text = mjcf_text(config)
     with whole_file(output) as draft:
-        draft.write_text(spec.to_xml(), encoding="utf-8")
+        draft.write_text(text, encoding="utf-8")
     typer.echo(output)
 
 
@@ -109,13 +102,26 @@ def arenas(
     Console().print(arenas_table({each: arena_summary(each) for each in arena_names()}))
 
 
-def doctor() -> None:
+def doctor(
+    report: Annotated[
+        bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
+    ] = False,
+) -> None:
     """Tell what is missing and how to install it.
+
+    The report names no user, no machine and no folder.
 
     \b
     annelid doctor
+    annelid doctor --report
     """
     from annelid.view.doctor import examine
+
+    if report:
+        from annelid.view.bug_report import bug_report
+
+        typer.echo(bug_report(list(examine())))
+        return
 
     for finding in examine():
         typer.echo(finding.line())

@@ -7,7 +7,7 @@ sets how finely a 3D worm is resolved.
 """
 
 from annelid.config.arena import Arena, ArenaSection, Floor, Pipe, Relief, Rough, Steps
-from annelid.config.checking import check_config, field_paths, fields_of
+from annelid.config.checking import check_config, field_paths, field_value, fields_of
 from annelid.config.controllers import (
     AdaptiveSns,
     Contraction,
@@ -99,6 +99,7 @@ __all__ = [
     "arena_text",
     "check_config",
     "field_paths",
+    "field_value",
     "fields_of",
     "find_level",
     "load_config",

@@ -39,6 +39,14 @@ def fields_of(config: RunConfig) -> dict[str, str]:
     return _fields_of_section(config, "")
 
 
+def field_value(config: RunConfig, path: str) -> Any:
+    """Returns the value of a field by its dotted path, one of `fields_of`."""
+    value: Any = config
+    for name in path.split("."):
+        value = getattr(value, name)
+    return value
+
+
 def _fields_of_section(section: BaseModel, prefix: str) -> dict[str, str]:
     paths: dict[str, str] = {}
     for name, info in type(section).model_fields.items():

@@ -236,24 +236,35 @@ class DescendingDrive(Section):
 class PressureSns(Section):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.pressure`.
 
-    A segment that bears load holds itself expanded until the one before it is extended. Lengths and loads are those of
-    the six-segment robot, of 0.16 m radius and 19 N.
+    A segment that bears load holds itself expanded until the one before it is extended, and one that begins to contract
+    ends the contraction two segments before. Lengths and loads are those of the six-segment robot, of 0.16 m radius and
+    19 N.
     """
 
     kind: Literal["sns-pressure"] = "sns-pressure"
     network: SnsController = SnsController()
-    light_N: NonNegative = Field(default=1.0, description="load of a segment up to which its pressure neuron rests")
-    full_N: Positive = Field(default=6.0, description="load that drives it to R")
-    extending_m: NonNegative = Field(default=0.056, description="lengthening from which a segment lets the next one go")
-    extended_m: Positive = Field(default=0.070, description="lengthening at which it does so in full")
+    light_N: NonNegative = Field(default=2.5, description="load of a segment up to which its pressure neuron rests")
+    full_N: Positive = Field(default=9.0, description="load that drives it to R")
+    extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
+    extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
     hold: Annotated[float, Field(ge=0, le=5)] = Field(
-        default=0.6, description="potential, over R, that full pressure alone gives the sensory neuron; 0 for none"
+        default=1.0, description="potential, over R, that full pressure alone gives the sensory neuron; 0 for none"
     )
     release: Annotated[float, Field(ge=0, le=20)] = Field(
-        default=2.0, description="stretch sensors' currents that a full extension neuron cancels; 0 for none"
+        default=1.8, description="stretch sensors' currents that a full extension neuron cancels; 0 for none"
+    )
+    landing: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.1,
+        description="potential, over R, that full pressure alone gives the sensory neuron of the segment before; 0 for "
+        "none",
+    )
+    exchange: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.8,
+        description="potential, over R, that a full contraction neuron alone gives the sensory neuron two segments "
+        "before; 0 for none, which three segments have in any case",
     )
     pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=10)] = Field(
-        default=0.06, description="time constant of the pressure neurons"
+        default=0.03, description="time constant of the pressure neurons"
     )
 
     @model_validator(mode="after")

@@ -49,8 +49,9 @@ class PressureController(PeristalsisController):
             )
         self._config = config
         parameters = design_of(PeristalsisParameters, config.network)
-        pressure_ms = 1e3 * config.pressure_time_constant_s
-        network = pressure_network(n_segments, PressureParameters(parameters, config.hold, config.release, pressure_ms))
+        strengths = (config.hold, config.release, config.landing, config.exchange)
+        design = PressureParameters(parameters, *strengths, 1e3 * config.pressure_time_constant_s)
+        network = pressure_network(n_segments, design)
         self._full_nA = parameters.leak_conductance_uS * parameters.range_mV
         super().__init__(network, config.network, sensor, n_segments, n_muscles, control_timestep_s)
 

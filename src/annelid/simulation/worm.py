@@ -119,6 +119,21 @@ class Worm(ABC):
         return self.anatomy.n_muscles
 
     @property
+    def posture(self) -> Posture:
+        """Where the body is."""
+        return self._posture
+
+    @property
+    def touch(self) -> Touch:
+        """What the skin feels of the ground, and how far it has slid."""
+        return self._touch
+
+    @property
+    def books(self) -> Books:
+        """What the muscles have done so far, and where it went."""
+        return self._books
+
+    @property
     def total_mass_kg(self) -> float:
         """Mass of strands and pins."""
         return float(self.model.body_mass.sum())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from annelid.view.gl import candidates, find_backend, works
 
 MINIMUM_MUJOCO = (4, 0, 1)
 _PACKAGES = ("numpy", "pydantic", "xarray", "h5netcdf", "h5py", "matplotlib", "imageio", "typer", "rich")
+_DEVELOPERS_EXTRAS = ("test", "dev")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +37,15 @@ class Finding:
     remedy: str = ""
     optional: bool = False
 
+    @property
+    def state(self) -> str:
+        """In one word: ok, optional or missing."""
+        return "ok" if self.ok else "optional" if self.optional else "missing"
+
     def line(self) -> str:
         """Returns the finding as one line of text."""
-        state = "ok" if self.ok else "optional" if self.optional else "missing"
         remedy = f": {self.remedy}" if self.remedy and not self.ok else ""
-        return f"{state:<9}{self.item:<22}{self.detail}{remedy}".rstrip()
+        return f"{self.state:<9}{self.item:<22}{self.detail}{remedy}".rstrip()
 
 
 def examine() -> Iterator[Finding]:
@@ -51,9 +57,8 @@ def examine() -> Iterator[Finding]:
         yield _package(package)
     yield from _back_ends()
     yield _ffmpeg()
-    for extra in ("sns", "view"):
-        for package in _extra(extra):
-            yield _package(package, optional=True, remedy=f"pip install 'annelid[{extra}]'")
+    for package, extra in _optional_packages().items():
+        yield _package(package, optional=True, remedy=f"pip install 'annelid[{extra}]'")
 
 
 def _engine() -> Finding:
@@ -111,7 +116,11 @@ def _ffmpeg() -> Finding:
     return Finding("ffmpeg", False, f"{imageio_ffmpeg.get_ffmpeg_exe()} is no ffmpeg", remedy)
 
 
-def _extra(name: str) -> list[str]:
-    """Names of the packages that an extra of annelid asks for."""
-    marked = [line for line in requires("annelid") or [] if f"extra == '{name}'" in line.replace('"', "'")]
-    return ["".join(c if c.isalnum() or c in "-_." else " " for c in line).split()[0] for line in marked]
+def _optional_packages() -> dict[str, str]:
+    """Packages that an extra of annelid asks for, each with the first such extra; without those of developers."""
+    packages: dict[str, str] = {}
+    for line in requires("annelid") or []:
+        asked = re.match(r"([\w.-]+).*;.*extra == ['\"]([\w-]+)['\"]", line)
+        if asked is not None and asked[2] not in _DEVELOPERS_EXTRAS:
+            packages.setdefault(asked[1], asked[2])
+    return packages

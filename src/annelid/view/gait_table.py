@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from annelid.analysis.gait import Gait
+from annelid.view.table import Row, quantity
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from annelid.analysis.balance import EnergyBalance
 
-_ROWS: dict[str, tuple[str, Callable[[float], str]]] = {
-    "slip_ratio": ("slip per way", lambda x: f"{100 * x:.1f} %"),
-    "backward_ratio": ("way back per way ahead", lambda x: f"{100 * x:.1f} %"),
-    "cost_of_transport": ("cost of transport", lambda x: f"{x:.2f}"),
-    "lateral_drift": ("drift to the left per way", lambda x: f"{100 * x:.1f} %"),
-    "turning_radius_m": ("turning radius", lambda x: f"{abs(x):.2f} m to the {'left' if x > 0 else 'right'}"),
+GAIT_ROWS: dict[str, Row] = {
+    "slip_ratio": ("slip per way", 100.0, 1, "%"),
+    "backward_ratio": ("way back per way ahead", 100.0, 1, "%"),
+    "cost_of_transport": ("cost of transport", 1.0, 2, ""),
+    "lateral_drift": ("drift to the left per way", 100.0, 1, "%"),
 }
-"""Field of the gait: what it is called and how it is written."""
+"""Field of the gait: what it is called, what it is multiplied by, digits, unit."""
 
 
 def add_gait(table: Table, numbers: Gait) -> None:
@@ -48,10 +47,13 @@ def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
         rows.append(("stride", f"{100 * numbers.stride_m:.1f} cm{stride}"))
     if numbers.contact_duty is not None:
         rows.append(("on the ground", f"{' / '.join(f'{100 * share:.0f}' for share in numbers.contact_duty)} %"))
-    for field, (label, text) in _ROWS.items():
+    for field, (label, factor, digits, unit) in GAIT_ROWS.items():
         value = getattr(numbers, field)
         if value is not None:
-            rows.append((label, text(value)))
+            rows.append((label, quantity(value, factor, digits, unit)))
+    if numbers.turning_radius_m is not None:
+        side = "left" if numbers.turning_radius_m > 0 else "right"
+        rows.append(("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}"))
     if numbers.energy is not None:
         rows.append(("muscles' work, whole run", f"{numbers.energy.muscle_work_J:.2f} J"))
         rows.extend(_shares(numbers.energy))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,9 +65,14 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
         complain(f"{names} not drawn: {reason} (the run is whole; then draw with: {remedies})")
 
 
+def video_bar(*, quiet: bool = False) -> AbstractContextManager[Progress | None]:
+    """Gives the progress callback of a video."""
+    return task_bar("drawing the video", quiet=quiet)
+
+
 @contextmanager
-def video_bar(words: str = "drawing the video", *, quiet: bool = False) -> Iterator[Progress | None]:
-    """Gives a progress callback whose bar shows up on a terminal once drawing takes more than two seconds."""
+def task_bar(task: str, *, quiet: bool = False) -> Iterator[Progress | None]:
+    """Gives a progress callback whose bar shows up on a terminal once a task takes more than two seconds."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
@@ -76,12 +81,12 @@ def video_bar(words: str = "drawing the video", *, quiet: bool = False) -> Itera
 
     began = time.monotonic()
     bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
-    task = bar.add_task(words)
+    shown = bar.add_task(task)
 
     def update(done: int, total: int) -> None:
         if time.monotonic() - began > BAR_AFTER_S:
             bar.start()
-            bar.update(task, completed=done, total=total, refresh=True)
+            bar.update(shown, completed=done, total=total, refresh=True)
 
     try:
         yield update

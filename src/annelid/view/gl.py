@@ -181,6 +181,8 @@ class Canvas:
         import mujoco
 
         width, height = self._size
+        # Another canvas may have been opened in between.
+        self._context.make_current()
         mujoco.mjv_updateScene(self._model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene)
         if upright is not None:
             for eye in self._scene.camera:

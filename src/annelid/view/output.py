@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import json
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from annelid.errors import RunFileError
 
@@ -59,6 +61,24 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
+    return path
+
+
+def write_json(path: Path, content: Any) -> Path:
+    """Writes plain values as JSON; NaN is refused.
+
+    Args:
+        path: The file to write.
+        content: Plain lists, mappings, numbers, strings and None.
+
+    Returns:
+        The path.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    with whole_file(path) as draft:
+        draft.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return path
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -26,9 +26,18 @@ FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1
 VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
 """Width and height in pixels by the kind of body; a video's are multiples of 16, as its codec likes them."""
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
-VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
 DEFAULT_CAMERA = "isometric"
 FPS_RANGE = (1.0, 240.0)
+_H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
+# 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
+_PALETTE = "split[all][drawn];[all]palettegen=stats_mode=diff[colors];[drawn][colors]paletteuse=dither=bayer"
+_GIF: dict[str, Any] = {
+    "codec": "gif",
+    "pix_fmt_out": "pal8",
+    "macro_block_size": 1,
+    "output_params": ["-filter_complex", _PALETTE],
+}
 _FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip install imageio-ffmpeg"
 
 Progress = Callable[[int, int], object]
@@ -91,17 +100,17 @@ def render_video(
     size: tuple[int, int] | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Draws the whole run as a video (H.264), without shadows, which cost most of the time.
+    """Draws the whole run as a video (H.264, or an animated GIF), without shadows, which cost most of the time.
 
     The file appears under its name only when it is complete.
 
     Args:
         run: The run.
-        path: Video to write (``.mp4``, ``.mov``, ``.mkv``).
+        path: Video to write (``.mp4``, ``.mov``, ``.mkv``, ``.gif``).
         fps: Frames a second of the video, 1 to 240; the recorded posture nearest to each is shown.
         speed: Simulated seconds a second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.view.camera.VIEWS_DEG`; by default isometric.
-        size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`.
+        size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
         progress: Called after every frame.
 
     Returns:
@@ -119,11 +128,11 @@ def render_video(
         raise RunFileError(f"fps = {fps:g}: a video has {slowest:g} to {fastest:g} frames a second")
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a video must be positive and finite")
-    size = size or VIDEO_SIZE[run.config.body.kind]
+    size = size or _video_size(run.config.body.kind, path)
     with (
         _scene(run, size, camera, fine=False) as scene,
         whole_file(path) as draft,
-        _video_writer(draft, fps, path) as video,
+        _video_writer(draft, fps, size, path) as video,
     ):
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
         total = math.floor((last - first) * fps / speed + 1e-6) + 1
@@ -156,24 +165,28 @@ def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
     return int(np.abs(times_s - time_s).argmin())
 
 
+def _video_size(kind: str, path: Path) -> tuple[int, int]:
+    """A GIF is large for what it shows, and so it is drawn smaller."""
+    width, height = VIDEO_SIZE[kind]
+    return (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
+
+
 class _VideoWriter:
     """Hands pictures to ffmpeg and counts them."""
 
-    def __init__(self, writer: Any) -> None:
-        self._writer = writer
+    def __init__(self, frames: Generator[None, NDArray[np.uint8] | None, None]) -> None:
+        self._frames = frames
         self.n_frames = 0
 
     def write(self, pixels: NDArray[np.uint8]) -> None:
         """Adds a picture."""
-        self._writer.append_data(pixels)
+        self._frames.send(np.ascontiguousarray(pixels))
         self.n_frames += 1
 
 
 @contextmanager
-def _video_writer(path: Path, fps: float, name: Path) -> Iterator[_VideoWriter]:
+def _video_writer(path: Path, fps: float, size: tuple[int, int], name: Path) -> Iterator[_VideoWriter]:
     """Opens a video, and at the end makes sure that every picture is in it, for ffmpeg's exit status is lost."""
-    import imageio.v2
-
     try:
         import imageio_ffmpeg
 
@@ -182,21 +195,22 @@ def _video_writer(path: Path, fps: float, name: Path) -> Iterator[_VideoWriter]:
         raise MissingDependency(f"no ffmpeg to write {name} with: {_FFMPEG_REMEDY}") from None
     if shutil.which(ffmpeg) is None:
         raise MissingDependency(f"no ffmpeg to write {name} with, there is no program {ffmpeg}: {_FFMPEG_REMEDY}")
-    opened = imageio.v2.get_writer(
-        path,
-        format="FFMPEG",  # type: ignore[arg-type]
-        fps=fps,
-        codec="libx264",
-        quality=7,
+    settings = _GIF if path.suffix.lower() == ".gif" else _H264
+    frames = imageio_ffmpeg.write_frames(
+        str(path),
+        size,
+        fps=fps,  # type: ignore[arg-type]
         ffmpeg_log_level="quiet",
+        **settings,
     )
-    writer = _VideoWriter(opened)
+    frames.send(None)
+    writer = _VideoWriter(frames)
     broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"
     try:
         try:
             yield writer
         finally:
-            opened.close()
+            frames.close()
     except OSError as error:
         raise RunFileError(broken) from error
     try:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import Floor, RunConfig, WormBody
+from annelid.config import CourseTurning, Floor, RunConfig, WormBody
 from annelid.view.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.view.gl import Canvas, find_backend
 from annelid.view.postures import postures_of
@@ -31,8 +31,12 @@ STILL_AMBIENT = 0.7
 """Without a floor that it would bleach, there may be more light from all sides."""
 PALE = 3.0
 """On white, what lies this many half worms behind its middle would vanish."""
+ROOM = 1.3
+"""A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
 SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
 """Axial springs, apart from the red of a contracted ring."""
+WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
+WAYPOINT_HALF_HEIGHT_M = 1e-3
 
 
 class WormScene:
@@ -114,6 +118,63 @@ class WormScene:
         return _free_camera(self._angles, fitting_distance(self._offsets, *self._angles, self._aspect)), _options()
 
 
+class PostureScene:
+    """Pictures of a 3D worm in postures that are given one by one.
+
+    The camera looks at the worm's middle, from a distance that leaves it room to stretch.
+    """
+
+    def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
+        """Builds the model and opens a back-end, which `close` frees.
+
+        Args:
+            config: Configuration of the 3D worm.
+            width: Pixels.
+            height: Pixels.
+            camera: Name of a view, see `annelid.view.camera.VIEWS_DEG`.
+
+        Raises:
+            RunFileError: There is no such camera.
+            RenderingUnavailable: No OpenGL back-end works.
+        """
+        import mujoco
+
+        angles = view_angles(camera)
+        backend = find_backend()
+        self._model, self._rings = model_to_draw(config)
+        steepness = abs(math.sin(math.radians(angles[1])))
+        self._model.vis.headlight.ambient[:] = min(AMBIENT, AMBIENT + 0.1 - HEADLIGHT * steepness)
+        self._posture = mujoco.MjData(self._model)
+        self._ring_width = self._model.tendon_width[self._rings].copy()
+        self._upright = _upright(config)
+        points = _part_ends(self._model, self._posture, self._model.qpos0)
+        offsets = (points - _middle(points)) @ self._upright.T
+        self._camera = _free_camera(angles, ROOM * fitting_distance(offsets, *angles, width / height))
+        self._option = _options()
+        self._canvas = Canvas(self._model, width, height, backend, fine=False)
+        self._canvas.__enter__()
+
+    def close(self) -> None:
+        """Frees the back-end."""
+        self._canvas.close()
+
+    def picture(self, qpos: NDArray[np.float64], activation: NDArray[np.float64], caption: str) -> NDArray[np.uint8]:
+        """Draws a posture.
+
+        Args:
+            qpos: Generalised positions, as a run records them.
+            activation: Of the ring muscles, ``(n_muscles,)``.
+            caption: Words in the lower left corner.
+
+        Returns:
+            Pixels, shape ``(height, width, 3)``.
+        """
+        self._camera.lookat[:] = _middle(_part_ends(self._model, self._posture, qpos))
+        pose(self._model, self._posture, qpos)
+        color_rings(self._model, self._rings, self._ring_width, activation)
+        return self._canvas.draw(self._posture, self._camera, self._option, caption, upright=self._upright)
+
+
 @dataclass(frozen=True)
 class Still:
     """A rendered posture that marks can be drawn on.
@@ -180,7 +241,7 @@ def render_still(
     model.vis.headlight.ambient[:] = STILL_AMBIENT
     posture = mujoco.MjData(model)
     points = _part_ends(model, posture, model.qpos0 if qpos is None else qpos)
-    target = (points.min(axis=0) + points.max(axis=0)) / 2
+    target = _middle(points)
     distance = fitting_distance(points - target, *angles_deg, size[0] / size[1])
     reach = float(np.linalg.norm(points - target, axis=1).max()) / model.stat.extent
     model.vis.rgba.fog[:] = 1.0
@@ -198,6 +259,11 @@ def _upright(config: RunConfig) -> NDArray[np.float64]:
     slope = math.radians(config.arena.slope_deg) if isinstance(config.arena, Floor) else 0.0
     c, s = math.cos(slope), math.sin(slope)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def _middle(points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Middle of the box about points, m, ``(point, 3)``."""
+    return (points_m.min(axis=0) + points_m.max(axis=0)) / 2
 
 
 def pose(model: mujoco.MjModel, posture: mujoco.MjData, qpos: NDArray[np.floating]) -> None:
@@ -283,6 +349,24 @@ def model_to_draw(config: RunConfig) -> tuple[mujoco.MjModel, NDArray[np.int64]]
         light.specular = [0.1, 0.1, 0.1]
     for tendon in spec.tendons:
         tendon.rgba = SPRING_RGBA
+    _mark_waypoints(spec, config)
     model = spec.compile()
     names = ring_names(config.body.n_segments, config.body.rings)
     return model, np.array([model.tendon(name).id for name in names])
+
+
+def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:
+    """Lays a disc on the floor where each waypoint of a course counts as reached."""
+    import mujoco
+
+    if not (isinstance(config.turning, CourseTurning) and isinstance(config.arena, Floor)):
+        return
+    for x, y in config.turning.waypoints:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[x, y, WAYPOINT_HALF_HEIGHT_M - config.arena.floor_gap_m],
+            size=[config.turning.reach_m, WAYPOINT_HALF_HEIGHT_M, 0.0],
+            rgba=WAYPOINT_RGBA,
+            contype=0,
+            conaffinity=0,
+        )

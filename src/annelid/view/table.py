@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from annelid.analysis.paper import Published, published
 from annelid.analysis.summary import Summary
-from annelid.config import WormBody, fields_of, toml_value
+from annelid.config import WormBody, field_value, fields_of, toml_value
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,8 +18,8 @@ UNKNOWN = "-"
 _ONSETS_SHOWN = 12
 _NARROWEST, _NARROWEST_OURS = 12, 16
 
-# Field of the summary: what it is called, what it is multiplied by, digits, unit.
-_ROWS = {
+Row = tuple[str, float, int, str]
+SUMMARY_ROWS: dict[str, Row] = {
     "period_s": ("period", 1.0, 3, "s"),
     "elongation_first_helix_pp_m": ("elongation, first helix, pp", 100.0, 2, "cm"),
     "elongation_mean_max_m": ("elongation, mean, maximum", 100.0, 2, "cm"),
@@ -38,6 +38,7 @@ _ROWS = {
     "pin_gap_max_m": ("largest pin gap", 1000.0, 2, "mm"),
     "real_time_factor": ("times real time", 1.0, 3, ""),
 }
+"""Field of the summary: what it is called, what it is multiplied by, digits, unit."""
 
 
 def summary_table(numbers: Summary, config: RunConfig) -> Table:
@@ -66,16 +67,27 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
     table.add_column("this run", min_width=_NARROWEST_OURS, overflow="fold")
     if beside:
         table.add_column("published", overflow="fold")
-    first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
-    for label, ours, field in _cells(numbers, first_sensor):
-        theirs = _theirs(field, beside.get(field))
-        if ours != UNKNOWN or theirs:
-            table.add_row(label, ours, *([theirs] if beside else []))
+    for label, ours, theirs in summary_rows(numbers, config):
+        table.add_row(label, ours, *([theirs] if beside else []))
     if beside:
-        places = ", ".join(dict.fromkeys(entry.place for entry in beside.values()))
-        table.caption = f"pp: peak to peak. published: {next(iter(beside.values())).paper}, {places}"
+        table.caption = legend(config)
         table.caption_justify = "left"
     return table
+
+
+def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, str]]:
+    """Returns label, our number and the published one of every row in which there is either, each with its unit."""
+    beside = published(config)
+    first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
+    rows = [(label, ours, _theirs(field, beside.get(field))) for label, ours, field in _cells(numbers, first_sensor)]
+    return [row for row in rows if row[1] != UNKNOWN or row[2]]
+
+
+def legend(config: RunConfig) -> str:
+    """Says where the published numbers of a configuration stand; empty where there are none."""
+    beside = published(config)
+    places = ", ".join(dict.fromkeys(entry.place for entry in beside.values()))
+    return f"pp: peak to peak. published: {next(iter(beside.values())).paper}, {places}" if beside else ""
 
 
 def presets_table(presets: Sequence[RunConfig]) -> Table:
@@ -102,9 +114,7 @@ def field_lines(config: RunConfig) -> list[str]:
     """Returns one line for every field of a configuration: path, value as TOML writes it, and what it means."""
     lines = []
     for path, meaning in fields_of(config).items():
-        value: Any = config
-        for key in path.split("."):
-            value = getattr(value, key)
+        value = field_value(config, path)
         setting = f"{path} = {toml_value(value)}" if value is not None else f"{path} (not set)"
         lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
     return lines
@@ -116,11 +126,11 @@ def _cells(numbers: Summary, first_sensor: str | None) -> list[tuple[str, str, s
         ("segment at onset (s)", _onsets(numbers), "order"),
         ("wave 1-2-..-N", _wave(numbers), "wave"),
     ]
-    for field, (label, factor, digits, unit) in _ROWS.items():
+    for field, (label, factor, digits, unit) in SUMMARY_ROWS.items():
         if first_sensor is None and ", mean" in label:
             continue
         label = label.replace(", first helix", f", {first_sensor}" if first_sensor else "")
-        text = _quantity(getattr(numbers, field), factor, digits, unit)
+        text = quantity(getattr(numbers, field), factor, digits, unit)
         if field == "period_s" and numbers.period_std_s is not None:
             text += f" (std {numbers.period_std_s:.3f} s)"
         cells.append((label, text, field))
@@ -146,14 +156,15 @@ def _theirs(field: str, entry: Published | None) -> str:
         return ""
     if isinstance(entry.value, str):
         return entry.value
-    _, factor, digits, unit = _ROWS[field]
-    return _quantity(entry.value, factor, digits, unit)
+    _, factor, digits, unit = SUMMARY_ROWS[field]
+    return quantity(entry.value, factor, digits, unit)
 
 
-def _quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
+def quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
+    """Returns a number, or one a segment, as a row says: multiplied, rounded, with its unit; a dash for None."""
     if value is None:
         return UNKNOWN
     if isinstance(value, list | tuple):
-        return f"{' / '.join(_quantity(v, factor, digits, '') for v in value)} {unit}"
+        return f"{' / '.join(quantity(v, factor, digits, '') for v in value)} {unit}"
     assert isinstance(value, int | float)
     return f"{factor * value:z.{digits}f} {unit}".rstrip()

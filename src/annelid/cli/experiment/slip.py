@@ -23,10 +23,10 @@ def slip_command(
 ) -> None:
     """Measure what pressure feedback saves of the work lost to friction.
 
-    A six-segment worm crawls on several frictions with the paper's network, with our extension neurons, and with
-    pressure neurons too (controller sns-pressure). Speed and loss are those of whole cycles. Writes slip.csv, .png and
-    .svg, and keeps runs, so that an interrupted call goes on. Eighteen runs of about ten seconds each; docs/slip.md
-    explains the results.
+    A six-segment worm crawls on several frictions with the paper's network, and with that of controller sns-pressure,
+    without and with its pressure neurons. Speed and loss are those of whole cycles; "saved" is per second and per
+    metre. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Twenty-one runs of about
+    ten seconds each; docs/slip.md explains the results.
 
     \b
     annelid experiment slip --quick
@@ -59,7 +59,7 @@ def slip_command(
         rows = np.array([(friction, cost.loss_J_per_m, cost.speed_m_per_s) for friction, cost in judged])
         if len(rows):
             lines[feedback] = (rows[:, 0], rows[:, 1], rows[:, 2])
-    tuned_at = TUNED_AT if preset == PRESET else None
+    tuned_at = TUNED_AT if preset == PRESET else ()
     for written in (path, feedback_figure(lines, tuned_at, path.with_suffix(""))):
         typer.echo(written)
 

@@ -1,7 +1,7 @@
 """What pressure feedback saves: the same six-segment worm with and without it, over frictions.
 
 The body is that of a preset of the six-segment robot with ideal muscles, the network that of its controller. Feedback
-was tuned by hand on `PRESET` at one friction, `TUNED_AT`; every other friction is a test, and so is every other gait.
+was tuned on `PRESET` at the frictions `TUNED_AT`; every other friction is a test, and so is every other gait.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 PRESET = "riddle2025-muscles"
 GAITS = (PRESET, "crawler")
 """Presets of that robot under the paper's network, as published and tuned for speed."""
-TUNED_AT = 0.7
-"""Friction at which the feedback was tuned."""
-FRICTIONS = (0.3, 0.5, 0.7, 1.0, 1.2, 1.5)
+TUNED_AT = (0.5, 0.85)
+"""Frictions at which the feedback was tuned."""
+FRICTIONS = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5)
 QUICK = (0.7, 1.0)
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
-PLAIN, EXTENSION, PRESSURE = "none", "extension", "pressure and extension"
+PLAIN, EXTENSION, PRESSURE = "none", "no pressure", "with pressure"
 FEEDBACKS = (PLAIN, EXTENSION, PRESSURE)
-"""What is fed back beside the paper's stretch sensors: nothing, the first half of our design, all of it."""
+"""What is fed back beside the paper's stretch sensors: nothing, what of our design needs no touch, all of it."""
 COLUMNS = (
     "feedback",
     "friction",
@@ -47,8 +47,6 @@ COLUMNS = (
     "saved_per_m_percent",
     "one_wave",
 )
-
-"""Called with the stage, the number of runs done, their total, and the share of the work that is done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,7 @@ def case(feedback: str, friction: float, preset: str = PRESET) -> Case:
     if feedback != PLAIN:
         changes["controller"] = {"kind": "sns-pressure", "network": load_config(preset).controller.model_dump()}
     if feedback == EXTENSION:
-        changes["controller"]["hold"] = 0.0
+        changes["controller"] |= {"hold": 0.0, "landing": 0.0}
     return Case(preset, changes)
 
 
@@ -155,24 +153,20 @@ def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> Table:
     """Tabulates speed and loss, and what feedback gains and saves on the same friction."""
     from rich.table import Table
 
-    table = Table("friction", "feedback", title=f"slip of {preset}, over whole cycles")
-    for heading in ("cycles", "period (s)", "speed (cm/s)", "loss (W)", "loss (J/m)", "faster", "saved", "saved per m"):
+    told = f"* feedback was tuned here{'' if preset == PRESET else f', on {PRESET}'}"
+    table = Table(title=f"slip of {preset}, over whole cycles", caption=told)
+    for heading in ("friction", "feedback"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("wave", "cm/s", "J/m", "faster (%)", "saved (%)", "per m (%)"):
         table.add_column(heading, justify="right")
     for one in readings:
-        mark = " (tuned here)" if (preset, one.friction) == (PRESET, TUNED_AT) else ""
-        words = (f"{one.friction:g}{mark}", one.feedback if one.one_wave else f"{one.feedback} (no wave)")
+        friction = f"{one.friction:g}{'*' if one.friction in TUNED_AT else ''}"
+        wave = "yes" if one.one_wave else "no"
         cost, gains = one.cost, compared(readings, one)
         if cost is None:
-            table.add_row(*words, "0")
+            table.add_row(friction, one.feedback, wave, "no whole cycles")
             continue
-        told = [f"{gain:+.0f} %" for gain in gains] if gains and one.feedback != PLAIN else []
-        table.add_row(
-            *words,
-            f"{cost.cycles}",
-            f"{cost.period_s:.2f}",
-            f"{100 * cost.speed_m_per_s:.1f}",
-            f"{cost.loss_W:.3f}",
-            f"{cost.loss_J_per_m:.2f}",
-            *told,
-        )
+        percents = [f"{gain:+.0f}" for gain in gains] if gains and one.feedback != PLAIN else []
+        speed, joules = f"{100 * cost.speed_m_per_s:.1f}", f"{cost.loss_J_per_m:.2f}"
+        table.add_row(friction, one.feedback, wave, speed, joules, *percents)
     return table

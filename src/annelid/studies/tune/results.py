@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.config import toml_value
+from annelid.config import field_value, toml_value
 from annelid.studies.tune.judge import OBJECTIVES, Objective
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front
-from annelid.studies.tune.space import value_at
 from annelid.view.figures.tuning import Mark, pareto_figure, progress_figure
 from annelid.view.output import whole_file, write_csv
 
@@ -85,7 +84,7 @@ def write_trials(task: Task, trials: Sequence[Trial], path: Path) -> None:
 def _cells(trial: Trial, fields: Sequence[str]) -> list[object]:
     gait = trial.judged.gait
     numbers = ["" if gait is None else _short(getattr(gait, name)) for name in _ROWS.values()]
-    values = [_plain(value_at(trial.case.config, field)) for field in fields] if _built(trial) else []
+    values = [_plain(field_value(trial.case.config, field)) for field in fields] if _built(trial) else []
     row = [_name(trial), *(values or [_plain(trial.values[field]) for field in fields]), *numbers]
     return [*row, trial.judged.problem, trial.path.name]
 
@@ -105,7 +104,7 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> None:
     lines += [f"summary = {json.dumps(f'{before.name}, tuned for {_words(task.objectives)}')}"]
     lines += [f"{field} = {toml_value(value)}" for field, value in task.changes.items()]
     for field, value in trial.values.items():
-        lines.append(f"{field} = {toml_value(value)}    # {toml_value(value_at(before, field))} before")
+        lines.append(f"{field} = {toml_value(value)}    # {toml_value(field_value(before, field))} before")
     with whole_file(path) as draft:
         draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
@@ -140,7 +139,7 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
         table.add_row(label, *("" if gait is None else _short(getattr(gait, name)) for gait in gaits))
     table.add_section()
     for variable in task.variables:
-        table.add_row(variable.field, *(_plain(value_at(trial.case.config, variable.field)) for trial in shown))
+        table.add_row(variable.field, *(_plain(field_value(trial.case.config, variable.field)) for trial in shown))
     failed = sum(bool(trial.judged.problem) for trial in trials[1:])
     table.caption = f"{len(trials) - 1} trials, of which {failed} did not walk"
     return table
@@ -150,10 +149,11 @@ def _figure(task: Task, trials: Sequence[Trial], stem: Path) -> Path:
     labels = [objective.label for objective in task.objectives]
     values = [tuple(trial.judged.value(one) for one in task.objectives) for trial in trials]
     marks = [Mark(trial.number, value, not trial.judged.problem) for trial, value in zip(trials, values, strict=True)]
+    more_is_better = task.objectives[0].better == "more"
     if len(task.objectives) == 1:
-        return progress_figure(marks, labels[0], task.objectives[0].better == "more", stem)
+        return progress_figure(marks, labels[0], more_is_better, stem)
     on_front = {trial.number for trial in front(trials, task.objectives)}
-    return pareto_figure(marks, on_front, (labels[0], labels[1]), stem)
+    return pareto_figure(marks, on_front, (labels[0], labels[1]), more_is_better, stem)
 
 
 def _thinned(leaders: list[Trial]) -> list[Trial]:

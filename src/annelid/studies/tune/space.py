@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from annelid.config import RunConfig, fields_of, load_config, parse_assignments, toml_value
+from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments, toml_value
 from annelid.errors import ConfigError, suggest
 
 DIGITS = 4
@@ -81,6 +81,8 @@ _CONTROLLERS: Mapping[str, tuple[str, ...]] = {
         "controller.network.gate_time_constant_ms=80:900:log",
         "controller.hold=0:2",
         "controller.release=0:6",
+        "controller.landing=0:0.2",
+        "controller.exchange=0:2",
         "sensor.tolerance_m=0.001:0.03:log",
     ),
     "sns-robust": ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log"),
@@ -144,7 +146,7 @@ def parse_variable(text: str, config: RunConfig) -> Variable:
     known = fields_of(config)
     if field not in known:
         raise ConfigError(f"unknown field {field!r}: {suggest(field, known)}")
-    variable = _choice(field, right) if ":" not in right else _interval(field, right, value_at(config, field))
+    variable = _choice(field, right) if ":" not in right else _interval(field, right, field_value(config, field))
     for end in variable.values if isinstance(variable, Choice) else (variable.low, variable.high):
         load_config(config.model_dump(), {field: int(end) if getattr(variable, "whole", False) else end})
     return variable
@@ -179,15 +181,7 @@ def _interval(field: str, text: str, present: Any) -> Interval:
     return Interval(field, low, high, bool(rest), whole)
 
 
-def value_at(config: RunConfig, field: str) -> Any:
-    """Returns the value of a field by its dotted path."""
-    value: Any = config
-    for name in field.split("."):
-        value = getattr(value, name)
-    return value
-
-
 def own_values(config: RunConfig, variables: Sequence[Variable]) -> dict[str, Any] | None:
     """Returns the configuration's own values of the variables by field; None if one is outside of what it may be."""
-    own = {variable.field: value_at(config, variable.field) for variable in variables}
+    own = {variable.field: field_value(config, variable.field) for variable in variables}
     return own if all(own[variable.field] in variable for variable in variables) else None

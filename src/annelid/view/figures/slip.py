@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from annelid.morphology import Array
@@ -10,14 +10,17 @@ from annelid.view.canvas import canvas, save_both
 from annelid.view.style import panel_title, segment_colors
 
 _MARKERS = "os^Dv"
+_LOSSES = (2, 5, 10, 20, 50, 100)
 
 
-def feedback_figure(lines: Mapping[str, tuple[Array, Array, Array]], tuned_at: float | None, stem: str | Path) -> Path:
+def feedback_figure(
+    lines: Mapping[str, tuple[Array, Array, Array]], tuned_at: Collection[float], stem: str | Path
+) -> Path:
     """Draws loss per metre and speed against friction.
 
     Args:
         lines: By the kind of feedback: frictions, loss per way (J/m) and speed (m/s), each ``(n,)``.
-        tuned_at: Friction that gets a dotted line, if any.
+        tuned_at: Frictions that get a dotted line.
         stem: Path without suffix; ``.svg`` and ``.png`` are written.
 
     Returns:
@@ -35,17 +38,19 @@ def feedback_figure(lines: Mapping[str, tuple[Array, Array, Array]], tuned_at: f
             strict=True,
         ):
             panel_title(axes, title)
-            axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at is not None else ""))
-            if tuned_at is not None:
-                axes.axvline(tuned_at, color="0.35", linewidth=0.8, linestyle=":")
+            axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at else ""))
+            for friction in tuned_at:
+                axes.axvline(friction, color="0.35", linewidth=0.8, linestyle=":")
             axes.set_ylabel(label)
         for (name, (friction, loss, speed)), color, marker in zip(
             lines.items(), segment_colors(len(lines)), _MARKERS, strict=False
         ):
             panels[0].plot(friction, loss, color=color, marker=marker, markersize=4, label=name)
             panels[1].plot(friction, 100.0 * speed, color=color, marker=marker, markersize=4)
-        for axes in panels:
-            axes.set_ylim(bottom=0.0)
+        panels[0].set_yscale("log")
+        panels[0].set_yticks(_LOSSES, [f"{loss}" for loss in _LOSSES])
+        panels[0].minorticks_off()
+        panels[1].set_ylim(bottom=0.0)
         panels[0].legend(title="feedback")
         return save_both(figure, stem)
 

@@ -66,13 +66,16 @@ def progress_figure(marks: Sequence[Mark], label: str, more_is_better: bool, ste
         return save_both(figure, stem)
 
 
-def pareto_figure(marks: Sequence[Mark], front: Collection[int], labels: tuple[str, str], stem: str | Path) -> Path:
-    """Draws one objective against the other, with the front that no trial beats in both.
+def pareto_figure(
+    marks: Sequence[Mark], front: Collection[int], labels: tuple[str, str], more_is_better: bool, stem: str | Path
+) -> Path:
+    """Draws one objective against the other, with the front that no trial beats in both: steps over what was reached.
 
     Args:
         marks: The trials; those that do not walk are left out.
         front: Numbers of the trials on the front.
         labels: The objectives with their units.
+        more_is_better: Whether it is, of the first objective.
         stem: Path without suffix; ``.svg`` and ``.png`` are written.
 
     Returns:
@@ -87,7 +90,12 @@ def pareto_figure(marks: Sequence[Mark], front: Collection[int], labels: tuple[s
         axes = figure.subplots()
         tuned = [mark.values for mark in walking if mark.number >= 0]
         axes.plot(*_columns(tuned), "o", color="0.65", markersize=3.5, label="a gait")
-        axes.plot(*_columns([mark.values for mark in on_front]), "o-", color=_BEST, markersize=4.5, label="front")
+        steps = "steps-pre" if more_is_better else "steps-post"
+        reached = _columns([mark.values for mark in on_front])
+        axes.plot(*reached, "o-", drawstyle=steps, color=_BEST, markersize=4.5, label="front, with numbers of trials")
+        for mark, x, y in zip(on_front, *reached, strict=True):
+            axes.annotate(str(mark.number), (x, y), (5, -9), textcoords="offset points", fontsize=7, color=_BEST)
+        axes.margins(0.08)
         begun = [mark.values for mark in walking if mark.number < 0]
         axes.plot(*_columns(begun), "D", color=_START, markersize=7, label="start")
         axes.set_xlabel(labels[0])

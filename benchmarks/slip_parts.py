@@ -1,0 +1,57 @@
+"""What each part of pressure feedback saves of slip, and at half the physics step: ``python benchmarks/slip_parts.py``.
+
+Runs are kept in ``slip/runs``, where `annelid experiment slip` has its own, of the tuning frictions only.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from annelid.analysis.slip import slip_cost
+from annelid.studies.case import Case
+from annelid.studies.slip.feedback import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
+from annelid.studies.store import Store
+
+HALF_STEP = {"clock.physics_timestep_s": 0.005, "duration_s": 10.0}
+
+
+def without(friction: float, *synapses: str) -> Case:
+    """The run with feedback, some of its synapses left out."""
+    changes: dict[str, Any] = dict(case(PRESSURE, friction).changes)
+    changes["controller"] = changes["controller"] | dict.fromkeys(synapses, 0.0)
+    return Case(PRESET, changes)
+
+
+def half_step(feedback: str, friction: float) -> Case:
+    """The run of one kind of feedback at half the physics step, shorter than the others."""
+    return Case(PRESET, {**case(feedback, friction).changes, **HALF_STEP})
+
+
+def main() -> None:
+    pairs: list[tuple[str, float, Case, Case]] = []
+    for friction in TUNED_AT:
+        plain = case(PLAIN, friction)
+        pairs += [
+            ("all", friction, plain, case(PRESSURE, friction)),
+            ("no landing", friction, plain, without(friction, "landing")),
+            ("no hold, no landing", friction, plain, case(EXTENSION, friction)),
+            ("no exchange", friction, plain, without(friction, "exchange")),
+        ]
+    low = TUNED_AT[0]
+    pairs.append(("all, half the step", low, half_step(PLAIN, low), half_step(PRESSURE, low)))
+    store = Store(Path("slip/runs"))
+    store.compute([one for _, _, *cases in pairs for one in cases])
+    for name, friction, *cases in pairs:
+        plain_cost, cost = (slip_cost(store.run(one)) for one in cases)
+        if plain_cost is None or cost is None:
+            print(f"{name:20} friction {friction:g}: no whole cycles")
+            continue
+        saved = -percent(cost.loss_J_per_m, plain_cost.loss_J_per_m)
+        faster = percent(cost.speed_m_per_s, plain_cost.speed_m_per_s)
+        wave = "" if store[cases[1]].rhythm.is_one_wave else ", no wave"
+        print(f"{name:20} friction {friction:g}: {saved:+.0f} % saved per metre, {faster:+.0f} % faster{wave}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,152 @@
+"""Runs side by side: numbers, differences to the first run, and the fields in which they are configured unlike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from annelid.analysis.gait import gait
+from annelid.analysis.summary import summary
+from annelid.config import RunConfig, field_value, fields_of
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+Number = float | Sequence[float | None] | None
+"""One number, one a segment, or None for what a run does not have."""
+
+NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s")
+UNLIKE = ("name", "summary")
+"""Fields of the configuration that change nothing in a run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What several runs have come to.
+
+    Attributes:
+        labels: A short distinct name for each run.
+        paths: Their files.
+        statuses: How they ended.
+        orders: Segments (from 1) in the order of their contractions.
+        numbers: Fields of `Summary` and of `Gait` (``gait.speed_m_per_s``), one value a run, in SI units.
+        fields: Fields of the configuration in which they differ, one value a run; None where its kind has none.
+        lacking: Of these fields, those that some run does not have.
+    """
+
+    labels: tuple[str, ...]
+    paths: tuple[str, ...]
+    statuses: tuple[str, ...]
+    orders: tuple[tuple[int, ...], ...]
+    numbers: Mapping[str, tuple[Number, ...]]
+    fields: Mapping[str, tuple[Any, ...]]
+    lacking: Mapping[str, tuple[bool, ...]]
+
+    def differences(self, field: str) -> list[Number]:
+        """Returns how much a number of each run differs from the first run's, in shares of its size.
+
+        Returns:
+            A share, one a segment, or None: for the first run, for what either lacks, and where there is nothing to
+            divide by or the numbers of segments differ.
+        """
+        first, *others = self.numbers[field]
+        return [None, *(relative_difference(first, other) for other in others)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns plain lists, numbers, strings and None, ready for JSON."""
+        runs = zip(self.labels, self.paths, self.statuses, self.orders, strict=True)
+        return {
+            "runs": [
+                {"label": label, "path": path, "status": status, "order": list(order)}
+                for label, path, status, order in runs
+            ],
+            "numbers": {
+                field: {"values": list(values), "differences": self.differences(field)}
+                for field, values in self.numbers.items()
+            },
+            "configuration": {field: [_plain(value) for value in values] for field, values in self.fields.items()},
+        }
+
+
+def compare(runs: Sequence[Run]) -> Comparison:
+    """Lays runs side by side; they may be of any kinds of worm.
+
+    Args:
+        runs: At least one; the first is what the others are compared with.
+    """
+    summaries = [summary(run) for run in runs]
+    rows = [_numbers(one.to_dict(), gait(run).to_dict()) for one, run in zip(summaries, runs, strict=True)]
+    names = list(dict.fromkeys(field for row in rows for field in row))
+    fields, lacking = differing_fields([run.config for run in runs])
+    return Comparison(
+        labels=run_labels(runs),
+        paths=tuple(str(run.path) for run in runs),
+        statuses=tuple(run.status for run in runs),
+        orders=tuple(tuple(one.order) for one in summaries),
+        numbers={field: tuple(row.get(field) for row in rows) for field in names},
+        fields=fields,
+        lacking=lacking,
+    )
+
+
+def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Returns a short distinct name for each run: its folder's name, or as much of its path as tells them apart."""
+    parts = [run.path.absolute().parent.parts for run in runs]
+    for depth in range(1, max(map(len, parts)) + 1):
+        labels = tuple("/".join(part[-depth:]) for part in parts)
+        if len(set(labels)) == len(labels):
+            return labels
+    return tuple(f"{'/'.join(part[-1:])} ({number})" for number, part in enumerate(parts, start=1))
+
+
+def relative_difference(first: Number, other: Number) -> Number:
+    """Returns ``(other - first) / |first|``, segment by segment where there is one number a segment.
+
+    Returns:
+        None where either is None, the first is 0, or their numbers of segments differ.
+    """
+    if first is None or other is None:
+        return None
+    if isinstance(first, Sequence) or isinstance(other, Sequence):
+        if not (isinstance(first, Sequence) and isinstance(other, Sequence)) or len(first) != len(other):
+            return None
+        shares = [relative_difference(a, b) for a, b in zip(first, other, strict=True)]
+        return [share for share in shares if not isinstance(share, Sequence)]
+    return (other - first) / abs(first) if first else None
+
+
+def differing_fields(
+    configs: Sequence[RunConfig],
+) -> tuple[dict[str, tuple[Any, ...]], dict[str, tuple[bool, ...]]]:
+    """Finds the fields in which configurations differ.
+
+    Returns:
+        The values of each such field by its dotted path, None for a configuration without it; and which lack it.
+    """
+    own = [fields_of(config) for config in configs]
+    paths = [path for path in dict.fromkeys(path for each in own for path in each) if path not in UNLIKE]
+    fields, lacking = {}, {}
+    for path in paths:
+        lacks = tuple(path not in each for each in own)
+        pairs = zip(configs, lacks, strict=True)
+        values = tuple(None if lack else field_value(config, path) for config, lack in pairs)
+        if any(value != values[0] for value in values) or len(set(lacks)) > 1:
+            fields[path], lacking[path] = values, lacks
+    return fields, lacking
+
+
+def _numbers(numbers: Mapping[str, Any], walking: Mapping[str, Any]) -> dict[str, Number]:
+    found = {field: value for field, value in numbers.items() if field not in NOT_NUMBERS}
+    for field, value in walking.items():
+        if field == "energy":
+            found |= {f"gait.energy.{part}": share for part, share in (value or {}).items()}
+        else:
+            found[f"gait.{field}"] = value
+    return found
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "model_dump"):
+        return value.model_dump(mode="json")
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

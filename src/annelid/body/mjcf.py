@@ -1,0 +1,74 @@
+"""A worm in its arena as MJCF, for plain MuJoCo, with the states that it may start from as keyframes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.body.assemble import build_spec, compile_spec
+from annelid.config import RunConfig, ServoRings, WormBody
+from annelid.errors import ConfigError
+
+Array = NDArray[np.float64]
+REST = "rest"
+
+
+def _nothing() -> Array:
+    return np.empty(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Keyframe:
+    """A state to start from; what is left empty is the model's own at rest.
+
+    Attributes:
+        name: Its name in the file.
+        time: Simulated time, s.
+        qpos: Generalised positions, ``(nq,)``.
+        qvel: Generalised velocities, ``(nv,)``.
+        act: Actuator states, ``(na,)``.
+        ctrl: Controls, ``(nu,)``.
+    """
+
+    name: str
+    time: float = 0.0
+    qpos: Array = field(default_factory=_nothing)
+    qvel: Array = field(default_factory=_nothing)
+    act: Array = field(default_factory=_nothing)
+    ctrl: Array = field(default_factory=_nothing)
+
+
+def mjcf_text(config: RunConfig, keyframes: Sequence[Keyframe] = ()) -> str:
+    """Writes a worm and its arena as MJCF.
+
+    A worm with servos also gets the keyframe ``rest``, in which their cables are paid out: the engine's own reset would
+    wind them up whole.
+
+    Args:
+        config: The run's configuration.
+        keyframes: States to add.
+
+    Raises:
+        ConfigError: The body is planar, friction depends on the direction, or the engine refuses the model.
+    """
+    if config.arena is not None and config.arena.has_setae:
+        raise ConfigError(
+            f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
+            "the same in both directions: leave it out or run the worm with annelid"
+        )
+    spec = build_spec(config)
+    assert isinstance(config.body, WormBody)
+    if isinstance(config.body.rings, ServoRings):
+        paid_out = np.array([actuator.actrange[1] for actuator in spec.actuators])
+        keyframes = (Keyframe(REST, act=paid_out), *keyframes)
+    for keyframe in keyframes:
+        state = {name: value for name, value in asdict(keyframe).items() if name == "time" or len(value)}
+        spec.add_key(**state)
+    try:
+        compile_spec(spec)
+    except ValueError as error:
+        raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+    return spec.to_xml()

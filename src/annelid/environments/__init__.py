@@ -1,0 +1,53 @@
+"""Worms as Gymnasium environments (extra ``gym``), alone or many at once.
+
+Importing this module registers them, which Gymnasium can do itself (``"annelid.environments:annelid/Worm-v0"``)::
+
+    import gymnasium
+    import annelid.environments
+
+    env = gymnasium.make("annelid/Worm-v0")
+    many = gymnasium.make_vec("annelid/Worm-v0", num_envs=16)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from annelid.errors import MissingDependency
+
+if TYPE_CHECKING:
+    from annelid.environments.observation import Layout
+    from annelid.environments.single import WormEnv
+    from annelid.environments.task import Weights
+    from annelid.environments.vector import WormVectorEnv
+
+NAMESPACE = "annelid"
+PIPE_EPISODE_S = 60.0
+ENVIRONMENTS: dict[str, dict[str, Any]] = {
+    "Worm-v0": {},
+    "WormPipe-v0": {"arena": "pipe.taper", "episode_s": PIPE_EPISODE_S},
+}
+"""Names within the namespace, and what they set beyond the defaults of `WormEnv`."""
+_HOME = {"Layout": "observation", "Weights": "task", "WormEnv": "single", "WormVectorEnv": "vector"}
+
+__all__ = ["ENVIRONMENTS", "Layout", "Weights", "WormEnv", "WormVectorEnv"]
+
+try:
+    from gymnasium.envs.registration import register
+except ImportError:
+    raise MissingDependency("environments need gymnasium: install it with  pip install 'annelid[gym]'") from None
+
+for _name, _kwargs in ENVIRONMENTS.items():
+    register(
+        f"{NAMESPACE}/{_name}",
+        entry_point="annelid.environments.single:WormEnv",
+        vector_entry_point="annelid.environments.vector:WormVectorEnv",
+        kwargs=_kwargs,
+    )
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(f"annelid.environments.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'annelid.environments' has no attribute {name!r}")

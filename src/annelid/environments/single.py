@@ -1,0 +1,183 @@
+"""One worm as a Gymnasium environment: ``annelid/Worm-v0``, and in a pipe ``annelid/WormPipe-v0``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from numpy.typing import ArrayLike, NDArray
+
+from annelid.environments.episode import Episode
+from annelid.environments.observation import Layout, Observation
+from annelid.environments.pictures import Pictures
+from annelid.environments.task import COARSE, Task, task_of
+from annelid.errors import ConfigError, SimulationStopped, suggest
+from annelid.protocols import Sensation
+from annelid.simulation.worm import Worm, WormPlant
+
+PRESET = "riddle2025-muscles"
+INTERVAL_S = 0.12
+EPISODE_S = 12.0
+START_ACTIVATION = 0.1
+RENDER_MODES = ("rgb_array",)
+SIZE = (640, 400)
+
+
+class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """A 3D worm whose agent sets the activation of every ring muscle.
+
+    A step lasts ``interval_s``, in which activations go evenly from the last action to this one. The worm is to go
+    ahead, or in a pipe along its centre line. docs/environments.md lists the spaces and the terms of the reward.
+
+    Attributes:
+        task: What is asked of the worm.
+        worm: The plant.
+        layout: How observations are laid out; ``layout.named(observation)`` takes one apart.
+    """
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": round(1 / INTERVAL_S)}  # noqa: RUF012 -- as the base has it
+
+    def __init__(
+        self,
+        preset: str = PRESET,
+        changes: Mapping[str, Any] | None = None,
+        *,
+        arena: str | None = None,
+        fidelity: str | None = COARSE,
+        interval_s: float = INTERVAL_S,
+        episode_s: float = EPISODE_S,
+        weights: Mapping[str, float] | None = None,
+        start_activation: float = START_ACTIVATION,
+        render_mode: str | None = None,
+        camera: str = "isometric",
+        width: int = SIZE[0],
+        height: int = SIZE[1],
+    ) -> None:
+        """Builds the worm.
+
+        Args:
+            preset: Name of a preset of the 3D worm, or path of a TOML file; its controller is left out.
+            changes: Fields of the configuration by dotted path, for example ``{"arena.friction": 0.3}``.
+            arena: Name of an arena to put the worm into; None for the preset's own.
+            fidelity: How finely the worm is resolved: ``"coarse"``, a level of `annelid.config.LEVELS`, or None for
+                the preset's own resolution.
+            interval_s: Time of a step, s, a multiple of the physics timestep.
+            episode_s: Time after which an episode is truncated, s, a multiple of ``interval_s``.
+            weights: What terms of the reward are multiplied by, where not as usual: ``progress``, ``effort``, ``slip``,
+                ``success``, ``failure``.
+            start_activation: Activations at the start are drawn evenly from 0 to this; the only thing that the seed
+                decides, beside the noise of the sensors (``changes={"sensor.noise_m": ..}``).
+            render_mode: None, or ``"rgb_array"``.
+            camera: View of the pictures, see `annelid.view.camera.VIEWS_DEG`.
+            width: Of the pictures, pixels.
+            height: Of the pictures, pixels.
+
+        Raises:
+            ConfigError: A name, a field or a value that cannot be.
+        """
+        self.task: Task = task_of(
+            preset,
+            changes,
+            arena=arena,
+            fidelity=fidelity,
+            interval_s=interval_s,
+            episode_s=episode_s,
+            weights=weights,
+            start_activation=start_activation,
+        )
+        self.render_mode = checked_render_mode(render_mode)
+        self.metadata = {**self.metadata, "render_fps": round(1 / interval_s) or 1}
+        self._pictures = Pictures(camera, width, height)
+        self.worm: Worm = WormPlant(self.task.config)
+        self._episode = Episode(self.task, self.worm)
+        self.layout: Layout = self._episode.layout
+        self.observation_space = self.layout.space()
+        self.action_space = action_space(self.worm)
+
+    @property
+    def sensation(self) -> Sensation:
+        """What the worm feels, in full and without noise."""
+        return self._episode.sensation
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Puts the worm at its start.
+
+        Args:
+            seed: Of all that is drawn from now on; None goes on with the present random numbers.
+            options: There are none.
+
+        Returns:
+            The first observation, and info.
+
+        Raises:
+            ConfigError: There are options.
+        """
+        refuse_options(options)
+        super().reset(seed=seed)
+        return self._episode.reset(self.np_random)
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Lets the worm move for one interval.
+
+        Args:
+            action: Activation of every ring muscle in [0, 1], ``(n_muscles,)``.
+
+        Returns:
+            Observation, reward, whether the worm has passed its pipe or its simulation broke down, whether the time is
+            up, and info.
+
+        Raises:
+            ConfigError: The episode has ended, or the action has another shape or a value out of its range.
+        """
+        episode = self._episode
+        for activation in episode.activations(action):
+            try:
+                episode.felt(self.worm.step(activation))
+            except SimulationStopped as stop:
+                episode.stop(str(stop))
+            if episode.stopped:
+                break
+        return episode.outcome(action, self.np_random)
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Draws the worm as it is now: pixels, ``(height, width, 3)``; None without a render mode.
+
+        Raises:
+            RenderingUnavailable: No OpenGL back-end works.
+        """
+        return None if self.render_mode is None else self._pictures.draw(self._episode)
+
+    def close(self) -> None:
+        """Frees what drew the pictures."""
+        self._pictures.close()
+
+
+def action_space(worm: Worm) -> Box[np.float32]:
+    """Returns the space of actions: an activation for every ring muscle."""
+    return Box(0.0, 1.0, (worm.n_muscles,), np.float32)
+
+
+def refuse_options(options: Mapping[str, Any] | None) -> None:
+    """Refuses options of a reset, of which there are none.
+
+    Raises:
+        ConfigError: There is one.
+    """
+    for name in options or {}:
+        raise ConfigError(f"reset() has no option {name!r}: fields are changed where the environment is made")
+
+
+def checked_render_mode(mode: str | None) -> str | None:
+    """Returns a render mode that there is.
+
+    Raises:
+        ConfigError: There is no such mode.
+    """
+    if mode is not None and mode not in RENDER_MODES:
+        raise ConfigError(f"unknown render_mode {mode!r}: {suggest(mode, RENDER_MODES)}")
+    return mode

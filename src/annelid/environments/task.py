@@ -1,0 +1,145 @@
+"""What an environment asks of its worm: which body, where, how often it acts, for how long, and what is rewarded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from annelid.analysis.passage import reach_of
+from annelid.body import mesh_of
+from annelid.config import LEVELS, Clock, Pipe, RunConfig, WormBody, load_config
+from annelid.errors import ConfigError, require_at_least, require_positive, suggest
+
+COARSE = "coarse"
+COARSE_BASE = "fast"
+COARSE_CHANGES: Mapping[str, Any] = {"body.mesh.elements_per_side": 1}
+"""The default resolution: level `fast` with 0.43 of its coordinates; docs/environments.md says what that costs."""
+FIDELITIES = (COARSE, *LEVELS)
+UNUSED = ("controller", "turning", "record", "duration", "seed", "clock.control")
+"""Beginnings of fields that an environment has no use for: the agent acts, and nothing is recorded."""
+_WITHOUT_CONTROLLER = {"controller": {"kind": "sns"}, "turning": None}
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """What the terms of the reward are multiplied by.
+
+    Attributes:
+        progress: Of the speed of the worm's middle along its way, body lengths a second.
+        effort: Of the mean square of the action, subtracted.
+        slip: Of the mean speed at which segments slide on the ground, body lengths a second, subtracted.
+        success: Given once, when a worm has passed its pipe.
+        failure: Taken once, when the simulation of the worm breaks down.
+    """
+
+    progress: float = 1.0
+    effort: float = 0.05
+    slip: float = 0.1
+    success: float = 10.0
+    failure: float = 10.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """One worm's task.
+
+    Attributes:
+        config: Body, arena, sensors and guard; both clocks are those of the physics.
+        moves_per_step: Physics steps in a step of the environment.
+        steps_per_episode: Steps of the environment until the time is up.
+        weights: Of the reward.
+        start_activation: Largest activation that a ring may have at the start.
+        goal_m: Arc length of the pipe at which the worm's middle has passed; None on open ground.
+    """
+
+    config: RunConfig
+    moves_per_step: int
+    steps_per_episode: int
+    weights: Weights
+    start_activation: float
+    goal_m: float | None
+
+    @property
+    def interval_s(self) -> float:
+        """Time of a step of the environment, s."""
+        return self.moves_per_step * self.config.clock.physics_timestep_s
+
+
+def task_of(
+    preset: str,
+    changes: Mapping[str, Any] | None = None,
+    *,
+    arena: str | None,
+    fidelity: str | None,
+    interval_s: float,
+    episode_s: float,
+    weights: Mapping[str, float] | None,
+    start_activation: float,
+) -> Task:
+    """Checks what a user asks of an environment; the arguments are those of `annelid.environments.single.WormEnv`.
+
+    Raises:
+        ConfigError: A name or value that cannot be, or a field that an environment has no use for.
+    """
+    require_positive(interval_s=interval_s, episode_s=episode_s)
+    if not 0.0 <= start_activation <= 1.0:
+        raise ConfigError(f"start_activation = {start_activation}: must be in 0 .. 1")
+    config = _worm(preset, changes or {}, arena, fidelity)
+    physics_s = config.clock.physics_timestep_s
+    moves = _whole("interval_s", interval_s, "clock.physics_timestep_s", physics_s)
+    steps = _whole("episode_s", episode_s, "interval_s", interval_s)
+    config = config.model_copy(update={"clock": Clock(control_timestep_s=physics_s, physics_timestep_s=physics_s)})
+    return Task(config, moves, steps, weights_of(weights or {}), float(start_activation), _goal_m(config))
+
+
+def weights_of(given: Mapping[str, float]) -> Weights:
+    """Returns the usual weights with some of them changed.
+
+    Raises:
+        ConfigError: There is no such weight, or it is negative.
+    """
+    names = [field.name for field in fields(Weights)]
+    for name, value in given.items():
+        if name not in names:
+            raise ConfigError(f"unknown weight {name!r}: {suggest(name, names)}")
+        require_at_least(0.0, **{f"weights[{name!r}]": value})
+    return Weights(**{name: float(value) for name, value in given.items()})
+
+
+def _worm(preset: str, changes: Mapping[str, Any], arena: str | None, fidelity: str | None) -> RunConfig:
+    """Loads the worm, whatever the preset's own controller is."""
+    for path in changes:
+        if path.startswith(UNUSED) or (path.startswith("sensor.") and not path.startswith("sensor.noise")):
+            raise ConfigError(f"changes[{path!r}] has no effect in an environment, where the agent acts on the muscles")
+    if fidelity is not None and fidelity not in FIDELITIES:
+        raise ConfigError(f"unknown fidelity {fidelity!r}: {suggest(fidelity, FIDELITIES)}")
+    coarse = fidelity == COARSE
+    config = load_config(
+        preset,
+        {**_WITHOUT_CONTROLLER, **(COARSE_CHANGES if coarse else {}), **changes},
+        fidelity=COARSE_BASE if coarse else fidelity,
+        arena=arena,
+    )
+    if not isinstance(config.body, WormBody):
+        raise ConfigError(f"body.kind = {config.body.kind!r} has no environment; only the 3D worm ('worm') has")
+    return config
+
+
+def _whole(name: str, value: float, unit_name: str, unit: float) -> int:
+    """Returns how many times one time goes into another, which must be a whole number."""
+    ratio = value / unit
+    if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-6 * ratio:
+        near = max(1, round(ratio)) * unit
+        raise ConfigError(
+            f"{name} = {value:g}: must be an integer multiple of {unit_name} = {unit:g}, for example {near:g}"
+        )
+    return round(ratio)
+
+
+def _goal_m(config: RunConfig) -> float | None:
+    """Returns where the middle of a worm has passed a pipe: behind all that bends or narrows, else a body length on."""
+    if not isinstance(config.arena, Pipe):
+        return None
+    assert isinstance(config.body, WormBody)
+    return reach_of(config.arena)[1] or mesh_of(config.body.mesh).length_m

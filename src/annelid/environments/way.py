@@ -1,0 +1,65 @@
+"""The way that an environment's worm is to go: straight ahead on open ground, or along a pipe's centre line."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from annelid.arena.course import AHEAD, LEFT, UP, Course, course_of
+from annelid.config import Arena, Pipe
+from annelid.protocols import Array
+
+STRAIGHT = np.stack([AHEAD, LEFT, UP])
+
+
+class Place(NamedTuple):
+    """Where a worm is on its way.
+
+    Attributes:
+        along_m: How far its middle has come, m, from a point of the arena.
+        axes: Unit vectors forwards, to the left and upwards there, as rows, ``(3, 3)``.
+    """
+
+    along_m: float
+    axes: Array
+
+
+class Way(Protocol):
+    """Tells how far along a worm is."""
+
+    def place(self, ring_centre_m: Array) -> Place:
+        """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
+        ...
+
+
+class Ahead:
+    """Straight ahead, towards -x of the model, where every worm leads at the start."""
+
+    def place(self, ring_centre_m: Array) -> Place:
+        """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
+        return Place(float(ring_centre_m.mean(axis=0) @ AHEAD), STRAIGHT)
+
+
+class AlongPipe:
+    """Along a pipe's centre line, counted from where the worm's front is at the start.
+
+    Attributes:
+        course: The centre line.
+    """
+
+    def __init__(self, course: Course) -> None:
+        self.course = course
+
+    def place(self, ring_centre_m: Array) -> Place:
+        """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
+        along = float(self.course.nearest(ring_centre_m).arc_m.mean())
+        tangent = self.course.nearest(ring_centre_m.mean(axis=0)[np.newaxis]).tangent[0]
+        left = np.cross(UP, tangent)
+        left /= np.sqrt(left @ left)
+        return Place(along, np.stack([tangent, left, np.cross(tangent, left)]))
+
+
+def way_of(arena: Arena) -> Way:
+    """Returns the way through an arena."""
+    return AlongPipe(course_of(arena)) if isinstance(arena, Pipe) else Ahead()

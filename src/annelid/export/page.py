@@ -1,0 +1,116 @@
+"""A run as one HTML page that needs nothing else: numbers, figures, configuration, and what to cite."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from annelid.analysis import gait, summary
+from annelid.config import PlanarWorm, RunConfig, field_value, fields_of, toml_value
+from annelid.errors import AnnelidError
+from annelid.references import bibtex, references_of
+from annelid.studies.markdown import anchors, code, emphasis, table, words
+from annelid.studies.page import page
+from annelid.view.figures.track import track_figure
+from annelid.view.gait_table import gait_rows
+from annelid.view.output import whole_file
+from annelid.view.plots import figure7
+from annelid.view.render import Progress, render_frame
+from annelid.view.table import legend, summary_rows
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+Picture = tuple[str, Callable[["Run", Path], Path], str]
+
+
+def write_page(run: Run, path: Path, progress: Progress = lambda done, total: None) -> Path:
+    """Writes the page of a run; a figure that cannot be drawn leaves the reason in its place.
+
+    Args:
+        run: The run.
+        path: File to write.
+        progress: Called after every figure.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    with TemporaryDirectory() as temporary:
+        figures = _figures(run, Path(temporary), progress)
+        blocks = [*_numbers(run), *figures, *_configuration(run.config), *_to_cite(run)]
+        headings = [block.removeprefix("## ") for block in blocks if block.startswith("## ")]
+        links = zip(headings, anchors(headings), strict=True)
+        contents = "\n".join(f"- [{heading}](#{anchor})" for heading, anchor in links)
+        html = page(_title(run), _head(run), contents, "\n\n".join(blocks), Path(temporary))
+    with whole_file(path) as draft:
+        draft.write_text(html, encoding="utf-8")
+    return path
+
+
+def _title(run: Run) -> str:
+    times = run.data["time"].values
+    return f"{run.config.name}: {run.config.body.n_segments} segments, {times[0]:g} to {times[-1]:g} s"
+
+
+def _head(run: Run) -> str:
+    attrs = run.data.attrs
+    facts = [
+        run.status.replace("_", " ") + (f" ({run.message})" if run.message else ""),
+        f"annelid {attrs['annelid_version']}",
+        f"MuJoCo {attrs['mujoco_version']}",
+        f"{attrs['platform']}",
+        f"run of {attrs['created']}",
+    ]
+    return "\n\n".join([f"# {words(_title(run))}", words(run.config.summary), " · ".join(map(words, facts))])
+
+
+def _numbers(run: Run) -> list[str]:
+    rows = summary_rows(summary(run), run.config)
+    beside = legend(run.config)
+    rows += [(label, value, "") for label, value in gait_rows(gait(run))]
+    header = ["quantity", "this run", *(["published"] if beside else [])]
+    cells = [[words(word) for word in row[: len(header)]] for row in rows]
+    return ["## Numbers", table(header, cells), *([words(beside)] if beside else [])]
+
+
+def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:
+    blocks = ["## Figures"]
+    pictures = _pictures(run)
+    for done, (name, draw, caption) in enumerate(pictures, start=1):
+        try:
+            draw(run, folder / name)
+            blocks += [f"![{words(caption)}]({name})", words(caption)]
+        except AnnelidError as error:
+            blocks.append(emphasis(f"Not drawn: {error}."))
+        progress(done, len(pictures))
+    return blocks
+
+
+def _pictures(run: Run) -> list[Picture]:
+    """File, how it is drawn, and caption of every figure that this kind of worm can have."""
+    frames = run.data["frame_time"].values
+    middle = float(frames[len(frames) // 2]) if frames.size else 0.0
+    planar = isinstance(run.config.body, PlanarWorm)
+    pictures: list[Picture] = [
+        ("frame.png", lambda run, path: render_frame(run, middle, path), f"The worm at {middle:g} s."),
+        ("figure7.png", figure7, "Potentials of the half-centres, contractions, and lengths of the stretch sensors."),
+    ]
+    return pictures if planar else [*pictures, ("track.png", track_figure, "Where it crawled, seen from above.")]
+
+
+def _configuration(config: RunConfig) -> list[str]:
+    """A table for every section."""
+    sections: dict[str, list[list[str]]] = {}
+    for path, meaning in fields_of(config).items():
+        section, _, name = path.rpartition(".")
+        value = field_value(config, path)
+        shown = "not set" if value is None else toml_value(value)
+        sections.setdefault(section or "run", []).append([code(name), code(shown), words(meaning)])
+    tables = [(f"### {words(name)}", table(["field", "value", "meaning"], rows)) for name, rows in sections.items()]
+    return ["## Configuration", *(block for pair in tables for block in pair)]
+
+
+def _to_cite(run: Run) -> list[str]:
+    return ["## To cite", f"```bibtex\n{bibtex(references_of(run.config))}```"]

@@ -1,0 +1,102 @@
+"""Runs side by side: differences, the fields that differ, and worms of different kinds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.analysis import gait, summary
+from annelid.analysis.comparison import compare, differing_fields, relative_difference, run_labels
+from annelid.config import load_config
+from annelid.simulation.loop import simulate
+from annelid.simulation.runfile import Run
+
+NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0 or abs(x) > 1e-6)
+
+
+@pytest.fixture(scope="module")
+def planar(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    config = load_config("riddle2022-planar", {"duration_s": 1.0})
+    return simulate(config, tmp_path_factory.mktemp("one") / "planar", progress=False)
+
+
+@pytest.fixture(scope="module")
+def rods(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    config = load_config("riddle2023-rods", {"duration_s": 0.1, "body.mesh.n_segments": 4})
+    return simulate(config, tmp_path_factory.mktemp("two") / "rods", progress=False)
+
+
+@given(NUMBERS, NUMBERS)
+def test_a_difference_takes_the_first_to_the_other(first: float, other: float) -> None:
+    share = relative_difference(first, other)
+    if first == 0:
+        assert share is None
+    else:
+        assert isinstance(share, float)
+        assert first + share * abs(first) == pytest.approx(other, abs=1e-6 * max(abs(first), abs(other)))
+
+
+@given(st.lists(st.none() | NUMBERS, max_size=5), st.lists(st.none() | NUMBERS, max_size=5))
+def test_differences_go_segment_by_segment_or_not_at_all(one: list[float | None], other: list[float | None]) -> None:
+    shares = relative_difference(one, other)
+    if len(one) != len(other):
+        assert shares is None
+    else:
+        assert shares == [relative_difference(a, b) for a, b in zip(one, other, strict=True)]
+
+
+@pytest.mark.parametrize(("first", "other"), [(None, 1.0), (1.0, None), (1.0, [1.0]), ([1.0], 1.0)])
+def test_what_cannot_be_compared_is_none(first: float | list[float] | None, other: float | list[float] | None) -> None:
+    assert relative_difference(first, other) is None
+
+
+def test_worms_of_different_kinds_stand_side_by_side(planar: Run, rods: Run) -> None:
+    both = compare([planar, rods])
+    assert both.labels == ("planar", "rods")
+    assert both.numbers["ring_length_min_m"] == tuple(summary(run).ring_length_min_m for run in (planar, rods))
+    assert both.numbers["pin_gap_max_m"] == (None, None)
+    assert both.numbers["travel_m"] == (None, summary(rods).travel_m)
+    energy = gait(rods).energy
+    assert energy is not None
+    assert both.numbers["gait.energy.muscle_work_J"] == (None, energy.muscle_work_J)
+    assert both.differences("travel_m") == [None, None]
+    assert both.differences("elongation_mean_max_m") == [None, None], "three and four segments"
+    assert both.fields["body.kind"] == ("riddle2022", "worm")
+    assert both.fields["arena.friction"][0] is None
+    assert both.lacking["arena.friction"] == (True, False)
+    assert json.loads(json.dumps(both.to_dict(), allow_nan=False))["configuration"]["body.kind"] == [
+        "riddle2022",
+        "worm",
+    ]
+
+
+def test_a_run_differs_from_itself_in_nothing(planar: Run) -> None:
+    twice = compare([planar, planar])
+    assert twice.fields == {}
+    for field, values in twice.numbers.items():
+        assert values[0] == values[1]
+        share = twice.differences(field)[1]
+        assert all(one in (None, 0.0) for one in (share if isinstance(share, list) else [share]))
+
+
+def test_exactly_the_fields_that_were_changed_differ() -> None:
+    changes = {"arena.friction": 0.3, "controller.gate_time_constant_ms": 200.0, "name": "other"}
+    base = load_config("riddle2023-rods")
+    fields, lacking = differing_fields([base, load_config("riddle2023-rods", changes), base])
+    assert set(fields) == {"arena.friction", "controller.gate_time_constant_ms"}
+    assert fields["arena.friction"] == (1.0, 0.3, 1.0)
+    assert not any(any(lacks) for lacks in lacking.values())
+
+
+def test_labels_are_as_much_of_the_paths_as_tells_them_apart(planar: Run) -> None:
+    def at(*paths: str) -> list[Run]:
+        return [replace(planar, path=Path(path) / "run.nc") for path in paths]
+
+    assert run_labels(at("/a/one", "/a/two")) == ("one", "two")
+    assert run_labels(at("/a/one", "/b/one")) == ("a/one", "b/one")
+    assert run_labels(at("/a/one", "/a/one")) == ("one (1)", "one (2)")

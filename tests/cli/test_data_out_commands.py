@@ -1,0 +1,118 @@
+"""The commands `export`, `compare`, `cite` and `doctor --report`, as typed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from outcome import Command
+
+from annelid.view import doctor
+
+
+@pytest.fixture
+def run(finished: Path, tmp_path: Path) -> Path:
+    """A copy of the run, to be written into."""
+    return shutil.copytree(finished, tmp_path / "run")
+
+
+def test_an_export_goes_into_the_run_and_may_be_repeated(annelid: Command, run: Path) -> None:
+    annelid("export", run, "--to", "csv")
+    done = annelid("export", run, "--to", "csv")
+    assert done.exit_code == 0, done.err
+    assert str(run / "csv" / "time_muscle.csv") in done.out.split()
+    assert all(Path(line).exists() for line in done.out.split())
+
+
+def test_signals_times_and_thinning_reach_the_file(annelid: Command, run: Path) -> None:
+    window = ("--from-time", "0.2", "--to-time", "0.4", "--every", "10")
+    done = annelid("export", run, "--to", "csv", "--signals", "ring_length", *window, "-o", "rings.csv")
+    assert done.out.split() == ["rings.csv"]
+    rows = Path("rings.csv").read_text().splitlines()
+    assert rows[0] == "time (s),muscle,ring_length (m)"
+    assert [row.split(",")[0] for row in rows[1::3]] == ["0.2", "0.25", "0.3", "0.35000000000000003", "0.4"]
+
+
+def test_named_files_are_not_replaced_without_force(annelid: Command, run: Path) -> None:
+    Path("mine.mat").write_text("precious")
+    assert "--force" in annelid("export", run, "--to", "mat", "-o", "mine.mat").sentence()
+    assert Path("mine.mat").read_text() == "precious"
+    assert annelid("export", run, "--to", "mat", "-o", "mine.mat", "--force").exit_code == 0
+    Path("full").mkdir()
+    Path("full/notes.txt").write_text("precious")
+    assert "not empty" in annelid("export", run, "--to", "parquet", "-o", "full").sentence()
+    assert [path.name for path in Path("full").iterdir()] == ["notes.txt"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--to", "xlsx"), "unknown format 'xlsx'"),
+        (("--to", "gif", "--every", "2"), "--every has no effect on gif, which takes --from-time, --to-time"),
+        (("--to", "mjcf", "--to-time", "1"), "--to-time has no effect on mjcf, which takes the whole run"),
+        (("--to", "mat", "-o", "run.csv"), "must end in .mat"),
+        (("--to", "mjcf"), "no MuJoCo model"),
+        (("--to", "csv", "--signals", "rings"), "no signal 'rings'"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(
+    annelid: Command, run: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    before = sorted(run.rglob("*"))
+    done = annelid("export", run, *arguments)
+    assert done.exit_code == 2
+    assert words in done.sentence()
+    assert sorted(run.rglob("*")) == before
+
+
+def test_compare_prints_a_table_and_draws_into_a_folder(annelid: Command, run: Path, finished: Path) -> None:
+    done = annelid("compare", run, finished, "-o", "both", "--potentials")
+    assert done.exit_code == 0, done.err
+    assert "order of contractions" in done.out
+    assert "the configurations are the same" in done.out
+    assert sorted(path.name for path in Path("both").iterdir()) == ["comparison.json", "lengths.png", "potentials.png"]
+    assert "travel.png not drawn" in done.sentence()
+    assert "--force" in annelid("compare", run, finished, "-o", "both").sentence()
+
+
+def test_compare_json_is_json_and_nothing_else(annelid: Command, run: Path, finished: Path) -> None:
+    read = json.loads(annelid("compare", run, finished, "--json").out)
+    assert read["numbers"]["ring_length_min_m"]["differences"] == [None, 0.0]
+    assert read["configuration"] == {}
+
+
+def test_compare_needs_two_runs(annelid: Command, run: Path) -> None:
+    done = annelid("compare", run)
+    assert done.exit_code == 2
+    assert "at least two runs" in done.err
+
+
+@pytest.mark.parametrize("source", ["riddle2022-planar", "RUN", "mine.toml"])
+def test_cite_takes_a_run_a_preset_or_a_file(annelid: Command, run: Path, source: str) -> None:
+    Path("mine.toml").write_text('extends = "riddle2022-planar"\n')
+    done = annelid("cite", run if source == "RUN" else source)
+    assert done.exit_code == 0, done.err
+    assert "@misc{riddle2022," in done.out
+    assert "todorov2012" not in done.out
+
+
+def test_cite_alone_names_the_tool_and_the_paper(annelid: Command) -> None:
+    assert annelid("cite").out.count("\n@") == 2
+    assert annelid("cite", "--all").out.count("@") > 10
+
+
+@pytest.mark.parametrize(
+    ("source", "words"), [("wangg", "did you mean 'wang'"), (".", "holds no run.nc"), ("no.toml", "no.toml")]
+)
+def test_cite_says_what_it_cannot_find(annelid: Command, source: str, words: str) -> None:
+    assert words in annelid("cite", source).sentence()
+
+
+def test_doctor_reports_in_markdown(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "works", lambda backend: True)
+    done = annelid("doctor", "--report")
+    assert done.out.startswith("- annelid: ")
+    assert "| numpy | ok |" in done.out
+    assert str(Path.home()) not in done.out

@@ -1,0 +1,58 @@
+"""Pictures of the environments' worms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from worms import CHEAP
+
+from annelid.environments import WormEnv, WormVectorEnv
+from annelid.errors import RenderingUnavailable
+from annelid.view.gl import find_backend
+
+
+def a_back_end_works() -> bool:
+    try:
+        find_backend()
+    except RenderingUnavailable:
+        return False
+    return True
+
+
+needs_gl = pytest.mark.skipif(not a_back_end_works(), reason="no OpenGL back-end works on this machine")
+SMALL = {"render_mode": "rgb_array", "width": 96, "height": 64}
+
+
+@needs_gl
+def test_a_picture_shows_the_worm_as_it_is_now() -> None:
+    env = WormEnv(**CHEAP, **SMALL)
+    env.reset(seed=0)
+    first = env.render()
+    for _ in range(3):
+        env.step(np.array([0.0, 1.0, 0.0]))
+    then = env.render()
+    env.close()
+    assert first is not None
+    assert then is not None
+    assert first.shape == then.shape == (64, 96, 3)
+    assert first.dtype == np.uint8
+    assert first.std() > 5.0
+    assert np.abs(first.astype(int) - then).max() > 20
+
+
+@needs_gl
+def test_worms_in_different_arenas_are_drawn_side_by_side() -> None:
+    changes = [CHEAP["changes"] | {"arena.radius": radius} for radius in (0.3, 0.8, 0.3)]
+    envs = WormVectorEnv(3, CHEAP["preset"], changes, arena="pipe.bend", **SMALL)
+    envs.reset(seed=[1, 1, 1])
+    pictures = envs.render()
+    envs.close()
+    assert pictures is not None
+    assert np.array_equal(pictures[0], pictures[2])
+    assert not np.array_equal(pictures[0], pictures[1])
+
+
+def test_without_a_render_mode_there_are_none() -> None:
+    env = WormEnv(**CHEAP)
+    env.reset(seed=0)
+    assert env.render() is None

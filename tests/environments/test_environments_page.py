@@ -1,0 +1,45 @@
+"""The page about environments says what they are."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from annelid.environments import WormEnv, WormVectorEnv
+from annelid.environments.__main__ import action_table, observation_table
+from annelid.environments.task import Weights
+
+PAGE = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def env() -> WormEnv:
+    return WormEnv()
+
+
+def test_the_tables_are_those_of_the_spaces(env: WormEnv) -> None:
+    assert observation_table(env) in PAGE
+    assert action_table(env) in PAGE
+    assert f"`Box(.., ({env.layout.size},), float32)`" in PAGE
+
+
+def test_every_weight_and_all_that_info_says_is_there(env: WormEnv) -> None:
+    for name, value in asdict(Weights()).items():
+        assert re.search(rf"\| `reward_{name}` \|.*\| {value:g} \|", PAGE), name
+    env.reset(seed=0)
+    for name in env.step(np.zeros(6))[4]:
+        assert f"`{name}`" in PAGE, name
+
+
+@pytest.mark.parametrize("made", [WormEnv, WormVectorEnv])
+def test_every_option_is_there_with_its_default(made: type) -> None:
+    for name, parameter in inspect.signature(made).parameters.items():
+        default = parameter.default
+        shown = getattr(default, "value", default)
+        shown = f'`"{shown}"`' if isinstance(shown, str) else f"`{shown}`"
+        assert f"| `{name}` | {shown} |" in PAGE, name

@@ -1,0 +1,273 @@
+"""One worm as an environment: what it tells, what it rewards, how it ends, and that seeds decide it all."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from hypothesis import given
+from hypothesis import strategies as st
+from worms import CHEAP, same
+
+from annelid.config import WormBody
+from annelid.environments import ENVIRONMENTS, WormEnv
+from annelid.environments.reward import Deed, reward_terms
+from annelid.environments.task import Weights
+from annelid.errors import AnnelidError, ConfigError, MissingDependency
+
+TERMS = ("reward_progress", "reward_effort", "reward_slip", "reward_success", "reward_failure")
+
+
+def worm_env(changes: dict[str, Any] | None = None, **options: Any) -> WormEnv:
+    return WormEnv(CHEAP["preset"], CHEAP["changes"] | (changes or {}), **options)
+
+
+@pytest.fixture(scope="module")
+def env() -> WormEnv:
+    return worm_env(episode_s=2.4)
+
+
+def wave(k: int, n: int) -> np.ndarray:
+    """A wave of contraction, a segment every three steps."""
+    return (np.arange(n) == (k // 3) % n).astype(np.float32)
+
+
+def rollout(env: WormEnv, n_steps: int, seed: int, actions: np.random.Generator) -> list[Any]:
+    """All that an environment returns, through as many episodes as it takes."""
+    told: list[Any] = [env.reset(seed=seed)]
+    for _ in range(n_steps):
+        told.append(env.step(actions.random(env.action_space.shape).astype(np.float32)))
+        if told[-1][2] or told[-1][3]:
+            told.append(env.reset())
+    return told
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
+def test_gymnasium_finds_nothing_to_complain_about(name: str) -> None:
+    env = gymnasium.make(f"annelid.environments:annelid/{name}", **CHEAP, episode_s=0.24).unwrapped
+    assert isinstance(env, WormEnv)
+    check_env(env, skip_render_check=True)
+    assert env.task.goal_m == (None if name == "Worm-v0" else pytest.approx(0.7))
+
+
+def test_a_thousand_steps_are_the_same_to_the_last_bit() -> None:
+    noisy = {"sensor.noise_m": 0.002}
+    first, again = (rollout(worm_env(noisy), 1000, 7, np.random.default_rng(1)) for _ in range(2))
+    assert len(first) == 1000 + 1 + 10
+    assert same(first, again)
+
+
+def test_another_seed_is_another_episode(env: WormEnv) -> None:
+    first, other = (rollout(env, 3, seed, np.random.default_rng(1)) for seed in (1, 2))
+    assert not same(first[0][0], other[0][0])
+    assert not same(first[-1][0], other[-1][0])
+
+
+def test_a_worm_at_rest_feels_nothing_and_lies_on_its_belly(env: WormEnv) -> None:
+    quiet = worm_env(start_activation=0.0)
+    told = quiet.layout.named(quiet.reset(seed=0)[0])
+    assert np.allclose(told.pop("heading"), [1.0, 0.0, 0.0])
+    assert np.allclose(told.pop("upright"), [1.0, 0.0])
+    assert all(np.allclose(value, 0.0) for value in told.values())
+
+
+def test_what_it_tells_is_what_the_worm_does(env: WormEnv) -> None:
+    env.reset(seed=0)
+    before = rest = env.sensation
+    told = {}
+    for k in range(6):
+        observation, *_, info = env.step(wave(k, 3))
+        told, felt = env.layout.named(observation), env.sensation
+        assert np.allclose(told["activation"], wave(k, 3))
+        assert np.allclose(told["stretch_strain"], felt.stretch_m / felt.rest_stretch_m - 1.0, atol=1e-6)
+        assert np.allclose(told["touch"], np.minimum(felt.touch_N / (env.worm.total_mass_kg * 9.80665), 2.0), atol=1e-6)
+        assert np.allclose(told["ring_strain"], felt.ring_length_m / rest.ring_length_m - 1.0, atol=1e-6)
+        changed = (felt.ring_length_m - before.ring_length_m) / rest.ring_length_m
+        assert np.allclose(told["ring_rate"] * env.task.interval_s, changed, atol=1e-6)
+        assert info["time_s"] == pytest.approx(felt.time_s)
+        before = felt
+    assert told["ring_strain"].min() < -0.05
+
+
+def test_progress_adds_up_to_the_way(env: WormEnv) -> None:
+    _, info = env.reset(seed=0)
+    rewards, terms, ended, k = [], [], False, 0
+    while not ended:
+        _, reward, terminated, ended, info = env.step(wave(k, 3))
+        assert not terminated
+        rewards.append(reward)
+        terms.append([info[name] for name in TERMS])
+        k += 1
+    assert k == env.task.steps_per_episode == 20
+    assert np.allclose(np.sum(terms, axis=1), rewards)
+    progress, effort, slip, success, failure = np.sum(terms, axis=0)
+    assert progress * env.task.interval_s == pytest.approx(info["travel"], rel=1e-9)
+    assert effort == pytest.approx(-0.05 * k / 3)
+    assert slip < 0.0
+    assert success == failure == 0.0
+    assert info["slip_loss_J"] > 0.0
+    assert info["muscle_work_J"] != 0.0
+
+
+numbers = st.floats(0.0, 10.0)
+
+
+@given(
+    st.builds(Weights, *[numbers] * 5),
+    st.builds(
+        Deed, numbers, numbers, st.lists(st.floats(0, 1), min_size=1).map(np.array), st.booleans(), st.booleans()
+    ),
+)
+def test_every_term_has_its_weight_and_sign(weights: Weights, deed: Deed) -> None:
+    terms = reward_terms(deed, weights, 0.5, 0.1)
+    assert tuple(terms) == TERMS
+    assert terms["reward_effort"] <= 0.0
+    assert terms["reward_slip"] <= 0.0
+    assert terms["reward_failure"] == (-weights.failure if deed.broke_down else 0.0)
+    assert terms["reward_success"] == (weights.success if deed.passed else 0.0)
+    if deed.broke_down:
+        assert terms["reward_progress"] == terms["reward_effort"] == terms["reward_slip"] == 0.0
+    else:
+        assert terms["reward_progress"] == pytest.approx(weights.progress * deed.advance_m / 0.05)
+
+
+@given(
+    st.lists(st.floats(0, 1, width=32), min_size=3, max_size=3),
+    st.lists(st.floats(0, 1, width=32), min_size=3, max_size=3),
+)
+def test_activations_go_evenly_from_one_action_to_the_next(env: WormEnv, first: list[float], then: list[float]) -> None:
+    env.reset(seed=0)
+    env.step(np.array(first))
+    ramp = env._episode.activations(then)
+    assert ramp.shape == (3, 3)
+    assert np.array_equal(ramp[-1], then)
+    assert np.allclose(np.diff(np.vstack([first, ramp]), axis=0), np.subtract(then, first) / 3)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_an_observation_taken_apart_and_laid_out_is_itself(env: WormEnv, seed: int) -> None:
+    space = env.observation_space
+    space.seed(seed)
+    observation = space.sample()
+    again = env.layout.packed(env.layout.named(observation))
+    assert again in space
+    assert np.allclose(again, observation, atol=1e-6)
+
+
+def test_many_observations_are_taken_apart_alike(env: WormEnv) -> None:
+    many = np.stack([env.observation_space.sample() for _ in range(6)]).reshape(2, 3, -1)
+    told = env.layout.named(many)
+    assert told["touch"].shape == (2, 3, 3, 4)
+    assert np.array_equal(told["touch"][1, 2], env.layout.named(many[1, 2])["touch"])
+
+
+def test_numbers_beyond_their_range_are_clipped(env: WormEnv) -> None:
+    far = {entry.name: np.full(entry.shape, 99.0) for entry in env.layout.entries}
+    assert np.all(env.layout.packed(far) == 1.0)
+
+
+def test_a_worm_whose_numbers_run_away_ends_the_episode_and_can_begin_anew() -> None:
+    frail = worm_env({"guard.edge_strain": 1e-4})
+    frail.reset(seed=3)
+    observation, reward, terminated, truncated, info = frail.step(np.ones(3))
+    assert (terminated, truncated, info["is_success"]) == (True, False, False)
+    assert "guard.edge_strain" in info["stopped"]
+    assert reward == info["reward_failure"] == -10.0
+    assert observation in frail.observation_space
+    with pytest.raises(ConfigError, match=r"call reset\(\)"):
+        frail.step(np.ones(3))
+    frail.reset(seed=3)
+    assert frail.step(np.ones(3))[4]["stopped"] == info["stopped"]
+
+
+def test_an_engine_that_breaks_down_ends_the_episode(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = worm_env()
+    broken.reset(seed=0)
+    broken.worm.data.qvel[:] = np.nan  # type: ignore[attr-defined]
+    _, reward, terminated, _, info = broken.step(np.ones(3))
+    assert terminated
+    assert info["stopped"]
+    assert np.isfinite(reward)
+    observation, _ = broken.reset()
+    assert np.isfinite(observation).all()
+    assert not broken.step(np.ones(3))[2]
+
+
+def test_weights_change_the_reward_and_nothing_else() -> None:
+    usual, greedy = worm_env(), worm_env(weights={"effort": 0.0, "progress": 2.0})
+    for env in (usual, greedy):
+        env.reset(seed=0)
+    (one, *_, told), (other, *_, told_greedy) = usual.step(np.ones(3)), greedy.step(np.ones(3))
+    assert same(one, other)
+    assert told_greedy["reward_progress"] == 2.0 * told["reward_progress"]
+    assert told_greedy["reward_effort"] == 0.0 != told["reward_effort"]
+
+
+def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
+    own = WormEnv(CHEAP["preset"], {"body.mesh.n_helices": 6}, fidelity=None, episode_s=0.12)
+    assert own.task.config.clock.physics_timestep_s == 0.01
+    assert isinstance(own.task.config.body, WormBody)
+    assert own.task.config.body.mesh.elements_per_side == 2
+    assert own.task.moves_per_step == 12
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"changes": {"controller.kind": "sine"}}, r"changes\['controller.kind'\] has no effect"),
+        ({"changes": {"sensor.tolerance": 0.1}}, "has no effect"),
+        ({"changes": {"duration": 3.0}}, "has no effect"),
+        ({"changes": {"arena.frction": 0.1}}, "did you mean 'friction'"),
+        ({"interval_s": 0.05}, "interval_s = 0.05: must be an integer multiple of clock.physics_timestep_s = 0.04"),
+        ({"episode_s": 0.5}, "episode_s = 0.5: must be an integer multiple of interval_s = 0.12, for example 0.48"),
+        ({"interval_s": 0.0}, "interval_s must be positive"),
+        ({"weights": {"efort": 1.0}}, "did you mean 'effort'"),
+        ({"weights": {"effort": -1.0}}, r"weights\['effort'\] must be at least 0, not -1.0"),
+        ({"start_activation": 1.5}, "start_activation = 1.5: must be in 0 .. 1"),
+        ({"fidelity": "corse"}, "did you mean 'coarse'"),
+        ({"render_mode": "rgb"}, "did you mean 'rgb_array'"),
+        ({"camera": "sidewards"}, "unknown camera"),
+        ({"width": 0}, "width must be at least 1, not 0"),
+        ({"arena": "pip"}, "unknown arena"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_sentence(options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(AnnelidError, match=sentence):
+        worm_env(**options)
+
+
+def test_a_planar_worm_has_no_environment() -> None:
+    with pytest.raises(ConfigError, match="only the 3D worm"):
+        WormEnv("riddle2022-planar", fidelity=None)
+
+
+@pytest.mark.parametrize(
+    ("action", "sentence"),
+    [
+        ([0.0, 0.0], "must be \\(3,\\)"),
+        ([0.0, 1.2, 0.0], r"action\[1\] = 1.2: must be in 0 .. 1"),
+        ([0.0, 0.0, np.nan], r"action\[2\] = nan"),
+    ],
+)
+def test_an_action_that_cannot_be_is_refused(env: WormEnv, action: list[float], sentence: str) -> None:
+    env.reset(seed=0)
+    with pytest.raises(ConfigError, match=sentence):
+        env.step(action)
+
+
+def test_a_reset_has_no_options(env: WormEnv) -> None:
+    with pytest.raises(ConfigError, match="no option 'friction'"):
+        env.reset(options={"friction": 0.3})
+
+
+def test_without_gymnasium_the_line_that_installs_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gymnasium.envs.registration", None)
+    monkeypatch.delitem(sys.modules, "annelid.environments")
+    with pytest.raises(MissingDependency, match="pip install 'annelid\\[gym\\]'"):
+        importlib.import_module("annelid.environments")

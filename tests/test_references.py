@@ -1,0 +1,124 @@
+"""What a configuration rests on is cited, and every entry is sound BibTeX."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+from bibtexparser.entrypoint import parse_string
+
+import annelid
+from annelid.config import PlanarWorm, RunConfig, load_config, preset_names
+from annelid.references import ALWAYS, USES, bibtex, entries, references_of
+
+ROOT = Path(__file__).parent.parent
+SOURCES = {
+    "riddle2022-planar": {"riddle2022"},
+    "daltorio2013": {"daltorio2013"},
+    "boxerbaum2012": {"boxerbaum2012"},
+    "wang": {"wang", "riddle2025models"},
+    **{name: {"wang", "riddle2022"} for name in preset_names() if name.startswith("riddle2023")},
+}
+"""What each preset is named after, or its file states as its source; all others come from the robot of 2025."""
+CONTROLLERS = {
+    "sns": {"riddle2022", "szczecinski2017"},
+    "adaptive": {"riddle2022", "szczecinski2017", "nourse"},
+    "sns-robust": {"riddle2022", "szczecinski2017"},
+    "sns-pressure": {"riddle2022", "szczecinski2017", "daltorio2013"},
+    "shc": {"horchler2015", "shaw2012", "stone1990", "daltorio2013"},
+    "phase-chain": {"ijspeert2007"},
+    "timed": {"riddle2025models"},
+    "sine": set(),
+}
+
+
+def cited(source: str, changes: Mapping[str, Any] | None = None) -> set[str]:
+    return set(references_of(load_config(source, changes)))
+
+
+@pytest.mark.parametrize("preset", preset_names())
+def test_every_preset_cites_its_source(preset: str) -> None:
+    expected = SOURCES.get(preset, {"riddle2025", "riddle2025models"})
+    assert expected | set(ALWAYS) <= cited(preset)
+
+
+@pytest.mark.parametrize("preset", preset_names())
+def test_every_preset_cites_its_controller_and_what_computes_it(preset: str) -> None:
+    config = load_config(preset)
+    keys = set(references_of(config))
+    assert CONTROLLERS[config.controller.kind] <= keys
+    assert ("todorov2012" in keys) != isinstance(config.body, PlanarWorm)
+
+
+@pytest.mark.parametrize("kind", CONTROLLERS)
+def test_every_kind_of_controller_adds_its_own(kind: str) -> None:
+    assert CONTROLLERS[kind] <= cited("riddle2023-rods", {"controller.kind": kind})
+
+
+def test_the_kinds_of_controllers_above_are_all_that_there_are() -> None:
+    kinds = {load_config("riddle2023-rods", {"controller.kind": kind}).controller.kind for kind in CONTROLLERS}
+    assert len(kinds) + len({"program"}) == len(get_args(RunConfig.model_fields["controller"].annotation))
+
+
+def test_a_sine_wave_cites_no_network() -> None:
+    assert not {"riddle2022", "szczecinski2017", "nourse2023"} & cited("riddle2023-rods", {"controller.kind": "sine"})
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "reason"),
+    [
+        ({"arena.kind": "pipe"}, "riddle2025models", "pipes"),
+        ({"body.rings.layout": "halves", "turning": {"kind": "touch"}}, "riddle2025models", "contact"),
+        ({"body.rings.kind": "servo"}, "riddle2025models", "servos"),
+        ({"controller.scheme": "toolbox"}, "nourse2023", "steps"),
+    ],
+)
+def test_what_a_field_brings_in_is_cited_for_it(changes: dict[str, Any], key: str, reason: str) -> None:
+    before = references_of(load_config("riddle2023-rods", {"controller.gate_start": "steady"}))
+    after = references_of(load_config("riddle2023-rods", {"controller.gate_start": "steady"} | changes))
+    assert key not in before
+    assert reason in after[key]
+
+
+def test_a_file_of_the_users_cites_what_it_extends(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "riddle2025-muscles"\nduration_s = 1.0\n')
+    assert set(references_of(load_config(mine))) == cited("riddle2025-muscles")
+
+
+def test_every_key_has_an_entry() -> None:
+    assert {use.key for use in USES} | set(ALWAYS) <= set(entries())
+
+
+def test_the_file_parses_and_every_entry_can_be_cited() -> None:
+    text = bibtex(list(entries()))
+    library = parse_string(text)
+    assert library.failed_blocks == []
+    assert [entry.key for entry in library.entries] == list(entries())
+    whole = (Path(annelid.__file__).parent / "data" / "references.bib").read_text(encoding="utf-8")
+    assert [entry.key for entry in parse_string(whole).entries] == list(entries())
+    for entry in library.entries:
+        fields = {field.key for field in entry.fields}
+        assert "author" in fields
+        assert "note" in fields or {"title", "year"} <= fields, entry.key
+
+
+@pytest.mark.parametrize("preset", preset_names())
+def test_what_is_printed_parses_with_its_reasons(preset: str) -> None:
+    references = references_of(load_config(preset))
+    library = parse_string(bibtex(references))
+    assert library.failed_blocks == []
+    assert [entry.key for entry in library.entries] == list(references)
+    assert all(references.values())
+
+
+def test_the_tool_is_cited_as_its_citation_file_says() -> None:
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    facts = dict(re.findall(r"^([\w-]+): \"?([^\"\n]+)", text, re.MULTILINE))
+    entry = parse_string(entries()["annelid"]).entries[0]
+    assert entry["title"].replace("{", "").replace("}", "") == facts["title"]
+    assert entry["version"] == facts["version"] == annelid.__version__
+    assert entry["year"] == facts["date-released"][:4]

@@ -33,7 +33,7 @@ FRAMES_A_SECOND = 30.0
 """At most; fewer where a step of the body takes longer."""
 LONGEST_TICK_S = 0.25
 """A computer that was asleep does not make the view leap."""
-PANEL_INTERVAL_S = 0.25
+PANEL_INTERVAL_S = 0.33
 """Between two updates of plots, time and status."""
 PACE_OVER_S = 2.0
 """Over which the speed that is reached is measured."""

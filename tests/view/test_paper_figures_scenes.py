@@ -33,7 +33,7 @@ from annelid.view.figures.renderings import (
     rhombus_outline,
     strand_points,
 )
-from annelid.view.scene import render_still
+from annelid.view.still import render_still
 
 LATE_S = 0.2
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")

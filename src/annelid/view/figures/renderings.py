@@ -18,8 +18,9 @@ from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.view.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
 from annelid.view.canvas import canvas, save_both
+from annelid.view.drawn_worm import CONTRACTED_WIDTH, SPRING_RGBA
 from annelid.view.gl import find_backend
-from annelid.view.scene import CONTRACTED_WIDTH, SPRING_RGBA, render_still
+from annelid.view.still import render_still
 from annelid.view.style import CONTRACTED, activation_color, panel_title
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from time import perf_counter, sleep
 from annelid.config import RunConfig
 from annelid.errors import RenderingUnavailable, SimulationStopped
 from annelid.simulation.runfile import Run
+from annelid.view.drawn_worm import DrawnWorm
 from annelid.view.live.player import Player, config_of, player_of
-from annelid.view.scene import color_rings, model_to_draw, pose
 
 FRAMES_A_SECOND = 30.0
 _SPACE, _BACKSPACE = 32, 259
@@ -32,17 +32,14 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
     """
     config = config_of(source)
     _require_display()
-    import mujoco
     import mujoco.viewer
 
     player, _ = player_of(source, speed)
-    model, rings = model_to_draw(config)
-    widths = model.tendon_width[rings].copy()
-    posture = mujoco.MjData(model)
+    worm = DrawnWorm(config)
     pressed: list[int] = []
     try:
         window = mujoco.viewer.launch_passive(
-            model, posture, key_callback=pressed.append, show_left_ui=False, show_right_ui=False
+            worm.model, worm.posture, key_callback=pressed.append, show_left_ui=False, show_right_ui=False
         )
     except RuntimeError:
         raise RenderingUnavailable(_NO_MJPYTHON) from None
@@ -54,8 +51,8 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
             player.tick(begun - last, deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             with window.lock():
-                pose(model, posture, player.moment.qpos)
-                color_rings(model, rings, widths, player.moment.activation)
+                worm.pose(player.moment.qpos)
+                worm.color_rings(player.moment.activation)
             window.sync()
             if player.stopped:
                 break

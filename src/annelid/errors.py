@@ -26,6 +26,10 @@ class MissingDependency(AnnelidError):
     """An optional package is needed; the text names the line that installs it."""
 
 
+class ClusterError(AnnelidError):
+    """The workers that compute runs cannot be reached, were lost, or have other code than this process."""
+
+
 class SimulationStopped(AnnelidError):
     """A guard stopped the simulation because energy, height or edge strain ran away."""
 

@@ -26,8 +26,9 @@ from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.studies.case import RODS, SHEAR_OVER_YOUNG, Case
+from annelid.studies.fingerprint import physics_fingerprint
 from annelid.studies.markdown import table
-from annelid.studies.store import Store, physics_fingerprint
+from annelid.studies.store import Store
 from annelid.view.output import whole_file
 
 CONTROLLERS = ("sns", "sns-robust")

@@ -21,13 +21,14 @@ from annelid.errors import ConfigError
 from annelid.studies import workers
 from annelid.studies.case import Case, Work
 from annelid.studies.outcome import Outcome
+from annelid.studies.space import Choice, Interval, from_unit, to_unit
 from annelid.studies.store import Store, case_key
 from annelid.studies.tune import search as module
 from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
-from annelid.studies.tune.optimiser import CmaEs, Parzen, from_unit, generation_size, optimiser_of, to_unit
+from annelid.studies.tune.optimiser import CmaEs, Parzen, generation_size, optimiser_of
 from annelid.studies.tune.results import write_gait, write_results, write_trials
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front, search
-from annelid.studies.tune.space import Choice, Interval, default_variables, parse_variable, variables_of
+from annelid.studies.tune.space import default_variables, parse_variable, variables_of
 
 PRESET = "riddle2023-rods"
 GATE, TOLERANCE = "controller.gate_time_constant_ms", "sensor.tolerance_m"

@@ -38,6 +38,17 @@ ArenaName = Annotated[
         help="Put the 3D worm elsewhere: a name of `annelid arenas`, or a TOML file  [default: where the preset is]",
     ),
 ]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
+ClusterName = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="WHERE",
+        envvar="ANNELID_CLUSTER",
+        help="Where runs are computed: processes, local (Dask on this machine), slurm, the address or the scheduler"
+        " file (.json) of a Dask scheduler, or a TOML file with a table [cluster]",
+    ),
+]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
 

@@ -164,12 +164,14 @@ class Store:
                     ) from None
                 except ClusterError:
                     raise
+                except ImportError as error:
+                    raise ClusterError(f"a worker cannot import annelid: install it there too ({error})") from error
                 except Exception as error:
                     if isinstance(error, RunFileError | OSError) and tries[key] < workers.retries:
                         tries[key] += 1
                         waiting.append(case)
                     else:
-                        yield case, error
+                        yield case, workers.explained(error)
                 else:
                     yield case, None
 

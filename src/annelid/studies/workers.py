@@ -39,6 +39,10 @@ class Workers(ABC):
     def submit(self, task: Task) -> Result:
         """Has a run computed; a future that ends cancelled was lost on the way and may be submitted again."""
 
+    def explained(self, error: Exception) -> Exception:
+        """Returns an error of a run as one that a user can read."""
+        return error
+
     @abstractmethod
     def close(self, *, drop: bool) -> None:
         """Lets the workers go, ``drop`` with what they are at."""

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.config import toml_value
+from annelid.studies.space import value_at
 from annelid.studies.tune.judge import OBJECTIVES, Objective
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front
-from annelid.studies.tune.space import value_at
 from annelid.view.figures.tuning import Mark, pareto_figure, progress_figure
 from annelid.view.output import whole_file, write_csv
 

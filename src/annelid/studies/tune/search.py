@@ -10,10 +10,11 @@ from typing import Any
 from annelid.errors import ConfigError
 from annelid.studies.case import Case, refusal
 from annelid.studies.progress import StudyProgress
+from annelid.studies.space import Variable
 from annelid.studies.store import Store, case_key
 from annelid.studies.tune.judge import Judged, Objective, judge
 from annelid.studies.tune.optimiser import optimiser_of
-from annelid.studies.tune.space import Variable, own_values
+from annelid.studies.tune.space import own_values
 
 START = -1
 """Number of the gait that the search starts from, which is no trial."""

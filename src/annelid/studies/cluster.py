@@ -72,7 +72,7 @@ class DaskWorkers(Workers):
         """
         if self._client is None:
             self._client = self._join()
-            self._greet(self._client.nthreads())
+            self._greet(threads_of(self._client))
         if self._client.status == "closed":
             raise ClusterError(
                 f"the scheduler {self._where} is gone: finished runs are kept, so call again once it is back"
@@ -111,12 +111,12 @@ class DaskWorkers(Workers):
         if client.status != "running":
             return 0
         try:
-            return len(client.nthreads())
+            return len(threads_of(client))
         # Whatever a scheduler that is going away right now makes of the question: the client notices next.
         except Exception:
             return 0
 
-    def _greet(self, threads: Any) -> None:
+    def _greet(self, threads: dict[str, int]) -> None:
         if any(count > 1 for count in threads.values()):
             warnings.warn(
                 f"workers of {self._where} have several threads, of which runs use one: start them with "
@@ -143,7 +143,8 @@ class LocalWorkers(DaskWorkers):
         from distributed import Client, LocalCluster
 
         with _quiet(self.retries):
-            self._cluster = LocalCluster(
+            start: Any = LocalCluster
+            self._cluster = start(
                 n_workers=self._n,
                 threads_per_worker=1,
                 processes=True,
@@ -180,7 +181,7 @@ class SchedulerWorkers(DaskWorkers):
         from distributed import Client
 
         address = self._cluster.address
-        by = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
+        by: dict[str, Any] = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
         if "scheduler_file" in by and not os.path.exists(address):
             raise ConfigError(f"cluster.address = {address!r}: there is no such scheduler file")
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -189,7 +190,7 @@ class SchedulerWorkers(DaskWorkers):
         except (OSError, ValueError) as error:
             raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
 
-    def _greet(self, threads: Any) -> None:
+    def _greet(self, threads: dict[str, int]) -> None:
         if not threads:
             warnings.warn(
                 f"{self._where} has no workers yet: waiting for  {START_WORKERS.replace('ADDRESS', self._where)}",
@@ -216,9 +217,9 @@ class SlurmWorkers(DaskWorkers):
         from distributed import Client
 
         with _quiet(self.retries):
-            self._cluster = slurm_cluster(self._settings)
-        self._cluster.adapt(minimum_jobs=self._settings.jobs, maximum_jobs=self._settings.jobs)
-        return Client(self._cluster)
+            cluster = self._cluster = slurm_cluster(self._settings)
+        cluster.adapt(minimum_jobs=self._settings.jobs, maximum_jobs=self._settings.jobs)
+        return Client(cluster)
 
     def close(self, *, drop: bool) -> None:
         """Cancels the jobs and ends the scheduler."""
@@ -251,6 +252,12 @@ def slurm_cluster(of: settings.Slurm) -> Any:
         scheduler_options={"dashboard_address": None},
         **{name: value for name, value in optional.items() if value is not None},
     )
+
+
+def threads_of(client: Client) -> dict[str, int]:
+    """Returns the number of threads of every worker by its address."""
+    threads: Any = client.nthreads()
+    return threads
 
 
 def _require_dask() -> None:

@@ -77,11 +77,8 @@ def _coordinates(sweep: Sweep, n_segments: int) -> dict[str, Any]:
         if name in plan.levels:
             coords[name] = (name, np.array(plan.levels[name]), {"units": "1", "long_name": text})
     if any(number.per_segment for number in sweep.numbers):
-        coords[SEGMENT] = (
-            SEGMENT,
-            np.arange(1, n_segments + 1),
-            {"units": "1", "long_name": "segment, from the front"},
-        )
+        told = {"units": "1", "long_name": "segment, from the front"}
+        coords[SEGMENT] = (SEGMENT, np.arange(1, n_segments + 1), told)
     return coords
 
 

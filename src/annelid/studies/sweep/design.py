@@ -1,7 +1,7 @@
 """The design of a sweep: which values each run has, for every combination or for samples of the ranges.
 
-Samples depend on the study's seed alone. Those of a random or a Sobol design begin alike however many are drawn, so that
-more of them leave the earlier runs as they are; those of a Latin hypercube do not.
+Samples depend on the study's seed alone. Those of a random or a Sobol design begin alike however many are drawn, so
+that more of them leave the earlier runs as they are; those of a Latin hypercube do not.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a sweep leaves behind: netCDF, CSV, a table of the highest and lowest runs and of those that failed, a figure."""
+"""What a sweep leaves behind: netCDF, CSV, a figure, a table of the highest, lowest and failed runs."""
 
 from __future__ import annotations
 

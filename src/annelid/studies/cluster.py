@@ -26,6 +26,8 @@ MISSING = "runs on a cluster need Dask: install it with  pip install 'annelid[sw
 MISSING_SLURM = "jobs of Slurm need dask-jobqueue: install it with  pip install 'annelid[slurm]'"
 FRESH_S = 0.3
 """For how long the number of workers is not asked again, s."""
+_NO_DASHBOARD = {"dashboard": False, "dashboard_address": ":0"}
+"""Of the page that tells whether a scheduler is well there is no getting rid; at least it takes any free port."""
 START_WORKERS = "dask worker ADDRESS --nworkers auto --nthreads 1"
 
 
@@ -148,8 +150,7 @@ class LocalWorkers(DaskWorkers):
                 n_workers=self._n,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
-                worker_dashboard_address=None,
+                scheduler_kwargs=_NO_DASHBOARD,
                 # Left to the operating system: Dask would pause workers rather than tell of them.
                 memory_limit=0,
                 silence_logs=logging.CRITICAL,
@@ -249,7 +250,7 @@ def slurm_cluster(of: settings.Slurm) -> Any:
         walltime=of.walltime,
         job_extra_directives=list(of.directives),
         job_script_prologue=list(of.prologue),
-        scheduler_options={"dashboard_address": None},
+        scheduler_options=_NO_DASHBOARD,
         **{name: value for name, value in optional.items() if value is not None},
     )
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +46,7 @@ def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
     assert data.status.values.tolist() == [["complete"] * 2, ["failed"] * 2]
     assert all("overshoot" in reason for reason in data.reason.values[1])
     assert data.elongation_mean_max_m.sel({"body.gain": 1.0}).notnull().all()
-    rows = list(csv.DictReader(Path("out/sweep.csv").open()))
+    rows = list(csv.DictReader(Path("out/sweep.csv").read_text().splitlines()))
     assert [row["status"] for row in rows] == ["complete", "complete", "failed", "failed"]
     assert [row["controller.scheme"] for row in rows] == ["euler", "heun"] * 2
     folders = {path.name for path in Path("out/runs").iterdir() if path.is_dir()}
@@ -119,10 +119,8 @@ def started(
 
 
 def kill_all(process: subprocess.Popen[bytes]) -> None:
-    try:
+    with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
     process.wait()
 
 

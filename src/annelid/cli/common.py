@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from annelid.errors import RunFileError
 if TYPE_CHECKING:
     from annelid.config import RunConfig
     from annelid.simulation.runfile import Run
+    from annelid.studies.workers import Workers
 
 DEFAULT_PRESET = "riddle2023-rods"
 
@@ -51,6 +53,18 @@ ClusterName = Annotated[
 ]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
+
+
+def workers_for(cluster: str | None, jobs: int | None) -> AbstractContextManager[Workers | None]:
+    """Gives the workers of a cluster that the user names; None, for processes of this machine, where none is named.
+
+    Raises:
+        ConfigError: It names no cluster.
+    """
+    from annelid.config import find_cluster
+    from annelid.studies.cluster import workers_of
+
+    return nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
 
 
 def or_default(preset: str | None, fidelity: str | None = None) -> str:

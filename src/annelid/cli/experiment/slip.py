@@ -49,10 +49,8 @@ def slip_command(
     )
     from annelid.view.figures.slip import feedback_figure
 
-    with kept_runs(["slip", "--preset", preset], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (
-        store,
-        progress,
-    ):
+    words = ["slip", "--preset", preset]
+    with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         readings = slip_feedback(store, QUICK if quick else FRICTIONS, preset=preset, jobs=jobs, progress=progress)
     if not quiet:
         Console().print(feedback_table(readings, preset))
@@ -101,10 +99,8 @@ def slip_detector_command(
     )
     from annelid.view.figures.slip import detector_figure
 
-    with kept_runs(["slip-detector"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (
-        store,
-        progress,
-    ):
+    words = ["slip-detector"]
+    with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         detections = slip_detection(store, QUICK if quick else None, jobs=jobs, progress=progress)
     told = scores(detections)
     if not quiet:

@@ -40,10 +40,8 @@ def speed_command(
 
     from annelid.studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
 
-    with kept_runs(["speed", *(gaits or [])], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (
-        store,
-        progress,
-    ):
+    words = ["speed", *(gaits or [])]
+    with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         readings = crawl(store, points(gaits or GAITS, "quick" if quick else "full"), jobs=jobs, progress=progress)
     if not quiet:
         for quantity in VALUES:

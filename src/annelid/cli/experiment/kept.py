@@ -24,7 +24,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no t
 
 @contextmanager
 def kept_runs(
-    words: Sequence[str], output: Path, *, quick: bool, jobs: int | None, cluster: str | None, quiet: bool
+    words: Sequence[str], output: Path, *, quick: bool, jobs: int | None, cluster: str | None = None, quiet: bool
 ) -> Iterator[tuple[Store, StudyProgress | None]]:
     """Opens a folder's store of runs with a progress display; on Ctrl-C tells how to go on.
 

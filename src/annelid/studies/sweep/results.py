@@ -101,7 +101,7 @@ def results_table(sweep: Sweep, data: xr.Dataset) -> Table:
     columns = {name: chosen[name].values.reshape(-1) for name in told}
     table = Table(title=_title(sweep, told))
     for head in ("run", *sweep.plan.fields, *([REPEAT] if REPEAT in data.dims else []), *told):
-        table.add_column(head, justify="right")
+        table.add_column(head, justify="right", overflow="fold")
     for rows in _ends(columns[told[0]]) if told else []:
         for i in rows:
             values = (_short(column[i]) for column in columns.values())

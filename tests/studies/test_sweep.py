@@ -184,7 +184,7 @@ ONE = [{"field": GATE, "values": [100.0]}]
         ({"repeats": 0}, "repeats = 0: must be at least 1"),
         ({"repeats": 1_000_000, "vary": LISTED}, "4,000,000 runs: at most 1,000,000"),
         ({"outputs": ["speed"]}, "outputs: unknown number 'speed': did you mean"),
-        ({"outputs": ["period_s"], "rank": "travel_m"}, "rank = 'travel_m': must be an output"),
+        ({"outputs": ["period_s"], "rank": "travel_m"}, "rank = 'travel_m': must be one of the outputs"),
         ({"rank": "contact_duty"}, "rank = 'contact_duty'"),
         ({"keep": "all"}, "keep = 'all': must be one of"),
         ({"cluster": {"kind": "slurm", "jobs": 0}}, "cluster.jobs = 0: must be at least 1"),

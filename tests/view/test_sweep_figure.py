@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.view.figures.sweep import _label, _short, sweep_figure
+from annelid.view.figures.sweep import _label, sweep_figure, worded
 
 FIELDS = {
     "arena.friction": ([0.1, 0.3, 1.0], "1"),
@@ -52,7 +52,7 @@ def test_nothing_but_failures_is_drawn_too(tmp_path: Path) -> None:
 
 
 def test_labels_have_the_unit_once() -> None:
-    assert _short("speed_m_per_s", "m/s") == "speed (m/s)"
-    assert _short("heading_change_rad", "rad") == "heading change (rad)"
-    assert _short("slip_ratio", "1") == "slip ratio"
+    assert worded("speed_m_per_s", "m/s") == "speed (m/s)"
+    assert worded("heading_change_rad", "rad") == "heading change (rad)"
+    assert worded("slip_ratio", "1") == "slip ratio"
     assert _label(grid(list(FIELDS), False)["controller.gate_time_constant_ms"]) == "gate time constant (ms)"

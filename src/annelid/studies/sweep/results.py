@@ -12,7 +12,7 @@ from annelid.studies.sweep.dataset import SEGMENT
 from annelid.studies.sweep.design import REPEAT, label
 from annelid.studies.sweep.numbers import PREFERRED
 from annelid.studies.sweep.sweeping import Sweep, SweepRun
-from annelid.view.figures.sweep import sweep_figure
+from annelid.view.figures.sweep import sweep_figure, worded
 from annelid.view.output import whole_file, write_csv
 
 if TYPE_CHECKING:
@@ -100,8 +100,10 @@ def results_table(sweep: Sweep, data: xr.Dataset) -> Table:
     chosen = drawn(data, told)
     columns = {name: chosen[name].values.reshape(-1) for name in told}
     table = Table(title=_title(sweep, told))
-    for head in ("run", *sweep.plan.fields, *([REPEAT] if REPEAT in data.dims else []), *told):
-        table.add_column(head, justify="right", overflow="fold")
+    heads = [worded(name.rsplit(".", 1)[-1], data[name].attrs["units"]) for name in (*sweep.plan.fields, *told)]
+    n = len(sweep.plan.fields)
+    for head in ("run", *heads[:n], *([REPEAT] if REPEAT in data.dims else []), *heads[n:]):
+        table.add_column(head, justify="right")
     for rows in _ends(columns[told[0]]) if told else []:
         for i in rows:
             values = (_short(column[i]) for column in columns.values())

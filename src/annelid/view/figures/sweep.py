@@ -46,11 +46,13 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
     rows = ceil(len(numbers) / columns)
     with canvas(0.5 + 2.6 * rows, 3.7 * columns if len(numbers) > 1 else 4.6) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axes, name in zip(panels, numbers, strict=False):
+        for i, (axes, name) in enumerate(zip(panels, numbers, strict=False)):
             if len(fields) == 1:
                 _line(axes, data, fields[0], name)
             else:
                 _map(figure, axes, data, fields, name)
+                if i % columns:
+                    axes.set_ylabel("")
         for axes in panels[len(numbers) :]:
             axes.set_visible(False)
         return save_both(figure, stem)
@@ -72,7 +74,7 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     edge = axes.get_xaxis_transform()
     axes.plot(x[lost], np.full(lost.sum(), 0.03), "x", color=_FAILED, transform=edge, markersize=5.0)
     _name_axis(axes, "x", data[field], ticks)
-    axes.set_ylabel(_short(name, values.attrs["units"]))
+    axes.set_ylabel(worded(name, values.attrs["units"]))
 
 
 def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
@@ -97,7 +99,7 @@ def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], na
     _name_axis(axes, "x", along_x, x_ticks)
     _name_axis(axes, "y", along_y, y_ticks)
     figure.colorbar(shown, ax=axes, pad=0.02)
-    panel_title(axes, _short(name, values.attrs["units"]))
+    panel_title(axes, worded(name, values.attrs["units"]))
 
 
 def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
@@ -129,7 +131,7 @@ def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str
         width, alpha = (0.9, 0.8) if told[i] else (0.5, 0.5)
         axes.plot(range(len(shares)), lines[i], color=color, linewidth=width, alpha=alpha)
     names = [_label(data[field]) for field in fields]
-    axes.set_xticks(range(len(shares)), [*names, _short(name, flat[name].attrs["units"])])
+    axes.set_xticks(range(len(shares)), [*names, worded(name, flat[name].attrs["units"])])
     axes.set_yticks([])
     axes.set_xlim(-0.2, len(shares) - 1 + 0.05)
     axes.spines[["left", "bottom"]].set_visible(False)
@@ -138,7 +140,7 @@ def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str
         for value, text in labels or [(end, f"{end:.4g}") for end in (column.min(), column.max())]:
             share = _share(np.append(column, value))[-1]
             axes.annotate(text, (i, share), (3, 0), textcoords="offset points", fontsize=7.5, va="center", zorder=4)
-    figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=_short(name, flat[name].attrs["units"]))
+    figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=worded(name, flat[name].attrs["units"]))
 
 
 def _axis(values: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
@@ -183,10 +185,10 @@ def _mean(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _label(coordinate: xr.DataArray) -> str:
-    return _short(str(coordinate.name).rsplit(".", 1)[-1], coordinate.attrs["units"])
+    return worded(str(coordinate.name).rsplit(".", 1)[-1], coordinate.attrs["units"])
 
 
-def _short(name: str, unit: str) -> str:
+def worded(name: str, unit: str) -> str:
     """Writes a name without the unit that ends it, and the unit in brackets."""
     if unit == "1":
         return name.replace("_", " ")

@@ -58,3 +58,14 @@ def test_the_way_through_a_taper_is_laid_side_by_side(tmp_path: Path, capsys: py
     table = capsys.readouterr().out
     assert "adaptive" in table
     assert "0.183" in table, "the bore and the clearance where the worm starts"
+
+
+def test_the_best_gate_of_every_friction_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    module = example("sweep_friction_and_gate")
+    vary = [
+        {"field": "arena.friction", "values": [0.3]},
+        {"field": "controller.gate_time_constant_ms", "values": [150.0]},
+    ]
+    module.main(tmp_path, {**module.STUDY, "set": {"duration_s": 0.1}, "vary": vary}, "processes")
+    assert capsys.readouterr().out == "friction 0.3: none walks\n"
+    assert (tmp_path / "sweep.nc").exists()

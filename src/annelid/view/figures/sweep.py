@@ -135,11 +135,14 @@ def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str
     axes.set_yticks([])
     axes.set_xlim(-0.2, len(shares) - 1 + 0.05)
     axes.spines[["left", "bottom"]].set_visible(False)
-    for i, (column, labels) in enumerate(zip(columns, ticks, strict=True)):
+    for i in range(len(shares)):
         axes.axvline(i, color="0.3", linewidth=0.8, zorder=3)
+    for i, (column, labels) in enumerate(zip(columns, ticks, strict=True)):
         for value, text in labels or [(end, f"{end:.4g}") for end in (column.min(), column.max())]:
             share = _share(np.append(column, value))[-1]
-            axes.annotate(text, (i, share), (3, 0), textcoords="offset points", fontsize=7.5, va="center", zorder=4)
+            behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8}
+            at = {"textcoords": "offset points", "fontsize": 7.5, "va": "center", "zorder": 4, "bbox": behind}
+            axes.annotate(text, (i, share), (4, 0), **at)
     figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=worded(name, flat[name].attrs["units"]))
 
 

@@ -2,8 +2,8 @@
 
     python examples/sweep_friction_and_gate.py [folder]
 
-Sixteen runs of some seconds each, on all cores; a second call takes none of them again. With the address of a Dask scheduler
-in ANNELID_CLUSTER its workers compute them.
+Sixteen runs of some seconds each, on all cores; a second call computes none of them again. With the address of a Dask
+scheduler in ANNELID_CLUSTER its workers compute them.
 """
 
 from __future__ import annotations

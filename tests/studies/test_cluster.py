@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import os
 import signal
+import sys
 from collections import Counter
 from concurrent.futures import Future
 from dataclasses import replace
@@ -15,7 +16,7 @@ from typing import Any
 import pytest
 
 from annelid.config.cluster import Local, Pool, Scheduler, Slurm, find_cluster
-from annelid.errors import ClusterError, ConfigError, RunKilled
+from annelid.errors import ClusterError, ConfigError, MissingDependency, RunKilled
 from annelid.simulation.runfile import FILE_NAME
 from annelid.studies.attempt import (
     DRAFTS,
@@ -233,6 +234,19 @@ def test_without_a_scheduler_one_sentence_says_so() -> None:
         workers.slots()
     with pytest.raises(ConfigError, match="no such scheduler file"):
         SchedulerWorkers(Scheduler(address="nowhere.json")).slots()
+
+
+@pytest.mark.parametrize("text", ["local", "slurm", "tcp://127.0.0.1:9"])
+def test_without_dask_the_line_that_installs_it_is_told(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingDependency, match=r"pip install 'annelid\[sweep\]'"):
+        workers_of(find_cluster(text)).slots()
+
+
+def test_without_dask_jobqueue_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dask_jobqueue.slurm", None)
+    with pytest.raises(MissingDependency, match=r"pip install 'annelid\[slurm\]'"):
+        workers_of(Slurm()).slots()
 
 
 @pytest.mark.parametrize("text", ["processes", "local", "slurm", "tcp://10.0.0.1:8786", "scheduler.json"])

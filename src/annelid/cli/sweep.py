@@ -40,7 +40,7 @@ def sweep_command(
     annelid sweep --example > study.toml
     annelid sweep study.toml
     annelid sweep study.toml --cluster tcp://10.0.0.1:8786
-    annelid sweep study.toml --samples 512 -o more
+    annelid sweep study.toml --samples 512
     """
     if example:
         from importlib.resources import files

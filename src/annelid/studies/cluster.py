@@ -127,14 +127,14 @@ class DaskWorkers(Workers):
             )
 
 
-class LocalWorkers(DaskWorkers):
-    """Worker processes of this machine under a scheduler in this process; what dies is started again."""
+class OwnWorkers(DaskWorkers):
+    """Workers that are started for this process and end with it, under a scheduler within it."""
 
-    def __init__(self, n: int, retries: int) -> None:
-        """Prepares ``n`` of them."""
-        super().__init__(retries)
-        self._n = n
-        self._cluster: Cluster | None = None
+    _cluster: Cluster | None = None
+
+    @abstractmethod
+    def _start(self) -> Cluster:
+        """Starts the scheduler and its workers."""
 
     @property
     def _where(self) -> str:
@@ -142,19 +142,10 @@ class LocalWorkers(DaskWorkers):
 
     def _join(self) -> Client:
         _require_dask()
-        from distributed import Client, LocalCluster
+        from distributed import Client
 
         with _quiet(self.retries):
-            start: Any = LocalCluster
-            self._cluster = start(
-                n_workers=self._n,
-                threads_per_worker=1,
-                processes=True,
-                scheduler_kwargs=_NO_DASHBOARD,
-                # Left to the operating system: Dask would pause workers rather than tell of them.
-                memory_limit=0,
-                silence_logs=logging.CRITICAL,
-            )
+            self._cluster = self._start()
         return Client(self._cluster)
 
     def close(self, *, drop: bool) -> None:
@@ -163,6 +154,29 @@ class LocalWorkers(DaskWorkers):
         if self._cluster is not None:
             self._cluster.close()
             self._cluster = None
+
+
+class LocalWorkers(OwnWorkers):
+    """Worker processes of this machine; what dies is started again."""
+
+    def __init__(self, n: int, retries: int) -> None:
+        """Prepares ``n`` of them."""
+        super().__init__(retries)
+        self._n = n
+
+    def _start(self) -> Cluster:
+        from distributed import LocalCluster
+
+        start: Any = LocalCluster
+        return start(
+            n_workers=self._n,
+            threads_per_worker=1,
+            processes=True,
+            scheduler_kwargs=_NO_DASHBOARD,
+            # Left to the operating system: Dask would pause workers rather than tell of them.
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
 
 
 class SchedulerWorkers(DaskWorkers):
@@ -200,34 +214,18 @@ class SchedulerWorkers(DaskWorkers):
         super()._greet(threads)
 
 
-class SlurmWorkers(DaskWorkers):
-    """Workers in jobs of Slurm, under a scheduler in this process; a job that ends is followed by another."""
+class SlurmWorkers(OwnWorkers):
+    """Workers in jobs of Slurm; a job that ends is followed by another."""
 
     def __init__(self, cluster: settings.Slurm) -> None:
         """Prepares to submit the jobs."""
         super().__init__(cluster.retries)
         self._settings = cluster
-        self._cluster: Cluster | None = None
 
-    @property
-    def _where(self) -> str:
-        return "in this process"
-
-    def _join(self) -> Client:
-        _require_dask()
-        from distributed import Client
-
-        with _quiet(self.retries):
-            cluster = self._cluster = slurm_cluster(self._settings)
+    def _start(self) -> Cluster:
+        cluster = slurm_cluster(self._settings)
         cluster.adapt(minimum_jobs=self._settings.jobs, maximum_jobs=self._settings.jobs)
-        return Client(cluster)
-
-    def close(self, *, drop: bool) -> None:
-        """Cancels the jobs and ends the scheduler."""
-        super().close(drop=drop)
-        if self._cluster is not None:
-            self._cluster.close()
-            self._cluster = None
+        return cluster
 
 
 def slurm_cluster(of: settings.Slurm) -> Any:

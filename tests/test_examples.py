@@ -67,3 +67,14 @@ def test_a_worm_learns_to_do_better_than_at_first(tmp_path: Path, capsys: pytest
     assert learned > start
     assert "return of the start" in capsys.readouterr().out
     assert (tmp_path / "learning_curve.png").stat().st_size > 5_000
+
+
+def test_the_best_gate_of_every_friction_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    module = example("sweep_friction_and_gate")
+    vary = [
+        {"field": "arena.friction", "values": [0.3]},
+        {"field": "controller.gate_time_constant_ms", "values": [150.0]},
+    ]
+    module.main(tmp_path, {**module.STUDY, "set": {"duration_s": 0.1}, "vary": vary}, "processes")
+    assert capsys.readouterr().out == "friction 0.3: none walks\n"
+    assert (tmp_path / "sweep.nc").exists()

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from annelid.protocols import Controller, Plant, Sensation
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
     from annelid.simulation.batch import BatchResult, simulate_batch
+    from annelid.studies.sweep import sweep
 
 __version__ = "0.1.0"
 
@@ -41,6 +42,7 @@ _HOME = {
     "simulate": "simulation",
     "simulate_batch": "simulation.batch",
     "summary": "analysis",
+    "sweep": "studies.sweep",
 }
 
 __all__ = [
@@ -61,6 +63,7 @@ __all__ = [
     "simulate",
     "simulate_batch",
     "summary",
+    "sweep",
 ]
 
 

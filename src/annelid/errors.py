@@ -26,6 +26,14 @@ class MissingDependency(AnnelidError):
     """An optional package is needed; the text names the line that installs it."""
 
 
+class ClusterError(AnnelidError):
+    """The workers that compute runs cannot be reached, were lost, or have other code than this process."""
+
+
+class RunKilled(AnnelidError):
+    """Every worker that computed a run died."""
+
+
 class SimulationStopped(AnnelidError):
     """A guard stopped the simulation because energy, height or edge strain ran away."""
 

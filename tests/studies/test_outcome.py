@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from annelid.analysis import rhythm_score, summary
+from annelid.analysis import gait, rhythm_score, summary
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 from annelid.studies.case import FAST, PLANAR, RODS, Case, one_after_the_other
@@ -41,6 +41,8 @@ def test_an_outcome_is_the_runs_own_numbers(held: Run) -> None:
     assert (read.path, read.message) == (held.path.parent, "")
     assert read.summary == summary(held)
     assert read.rhythm == rhythm_score(held)
+    assert read.gait == gait(held)
+    assert read.gait.energy is not None
 
 
 def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path) -> None:
@@ -49,7 +51,7 @@ def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path) -> None:
         read_outcome(tmp_path / "outcome.json", "yours")
 
 
-@pytest.mark.parametrize("loss", ["summary", "rhythm", "holds", "message"])
+@pytest.mark.parametrize("loss", ["summary", "rhythm", "holds", "message", "gait"])
 def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path, loss: str) -> None:
     path = tmp_path / "outcome.json"
     write_outcome(outcome(held), path, "mark")

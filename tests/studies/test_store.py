@@ -14,9 +14,11 @@ import pytest
 from annelid.errors import ConfigError
 from annelid.simulation.runfile import FILE_NAME
 from annelid.studies import store as module
+from annelid.studies import workers
+from annelid.studies.attempt import OUTCOME_NAME, compute_run, keep_outcome
 from annelid.studies.case import PLANAR, RODS, Case
 from annelid.studies.outcome import Outcome
-from annelid.studies.store import OUTCOME_NAME, Store, case_key, compute_case
+from annelid.studies.store import Store, case_key
 
 
 def planar(seed: int = 0, duration_s: float = 0.2) -> Case:
@@ -35,7 +37,7 @@ def filled(tmp_path_factory: pytest.TempPathFactory) -> Store:
 def single(tmp_path: Path) -> Store:
     """A store with one run, computed in this process."""
     store = Store(tmp_path / "runs")
-    compute_case(planar(), store.path(planar()))
+    compute_run(planar().config, store.path(planar()))
     return store
 
 
@@ -46,12 +48,11 @@ def no_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("a run was computed")
 
-    monkeypatch.setattr(module, "ProcessPoolExecutor", refuse)
-    monkeypatch.setattr(module, "compute_case", refuse)
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", refuse)
 
 
 def test_every_case_is_computed_once(filled: Store) -> None:
-    assert len(list(filled.folder.iterdir())) == 2
+    assert len(list(filled.folder.glob("[!.]*"))) == 2
     assert planar(0) in filled
     assert planar(2) not in filled
     assert filled[planar(1)].path == filled.path(planar(1))
@@ -120,8 +121,8 @@ def test_the_key_is_that_of_the_configuration_not_of_its_words() -> None:
 def test_a_run_that_a_guard_stops_is_an_outcome(tmp_path: Path) -> None:
     case = Case(RODS, {"duration_s": 0.3, "guard.edge_strain": 1e-6})
     folder = tmp_path / "stopped"
-    compute_case(case, folder)
-    stopped = module.keep_outcome(folder)
+    compute_run(case.config, folder)
+    stopped = keep_outcome(folder)
     assert stopped.message
     assert json.loads((folder / OUTCOME_NAME).read_text())["message"] == stopped.message
 

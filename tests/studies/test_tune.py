@@ -18,16 +18,17 @@ from annelid.analysis import RhythmScore, Summary
 from annelid.analysis.gait import Gait
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.studies import store as store_module
+from annelid.studies import workers
 from annelid.studies.case import Case, Work
 from annelid.studies.outcome import Outcome
-from annelid.studies.store import Store
+from annelid.studies.space import Choice, Interval, from_unit, to_unit
+from annelid.studies.store import Store, case_key
 from annelid.studies.tune import search as module
 from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
-from annelid.studies.tune.optimiser import CmaEs, Parzen, from_unit, generation_size, optimiser_of, to_unit
+from annelid.studies.tune.optimiser import CmaEs, Parzen, generation_size, optimiser_of
 from annelid.studies.tune.results import write_gait, write_results, write_trials
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front, search
-from annelid.studies.tune.space import Choice, Interval, default_variables, parse_variable, variables_of
+from annelid.studies.tune.space import default_variables, parse_variable, variables_of
 
 PRESET = "riddle2023-rods"
 GATE, TOLERANCE = "controller.gate_time_constant_ms", "sensor.tolerance_m"
@@ -162,10 +163,11 @@ class NoStore(Store):
         self.asked: list[Work] = []
         self._refused = refused
 
-    def compute(self, cases: Any, **_: Any) -> Mapping[str, Outcome]:
+    def compute(self, cases: Any, *, failed: Any = None, **_: Any) -> Mapping[str, Outcome]:
         self.asked += cases
-        if self._refused and any(self._refused in case.command for case in cases):
-            raise ConfigError("no design rule has a solution")
+        for case in cases:
+            if self._refused and self._refused in case.command:
+                failed[case_key(case)] = ConfigError("no design rule has a solution")
         return {}
 
 
@@ -337,5 +339,5 @@ def test_a_second_search_computes_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     folder = tmp_path / "runs"
     first = [trial for generation in search(task, Store(folder), jobs=2) for trial in generation]
     assert {trial.judged.problem for trial in first} == {"out of order: too short: fewer than two cycles"}
-    monkeypatch.setattr(store_module, "ProcessPoolExecutor", None)
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
     assert [trial for generation in search(task, Store(folder)) for trial in generation] == first

@@ -12,6 +12,7 @@ from annelid.cli.paper import paper_command
 from annelid.cli.results import plot, render, show
 from annelid.cli.robustness import robustness_command
 from annelid.cli.run import run_command
+from annelid.cli.sweep import sweep_command
 from annelid.cli.tune import tune_command
 from annelid.cli.view import view_command
 from annelid.cli.worm import arenas, build, doctor, presets
@@ -32,6 +33,7 @@ for _name, _command in (
     ("paper", paper_command),
     ("bench", bench_command),
     ("robustness", robustness_command),
+    ("sweep", sweep_command),
     ("tune", tune_command),
     ("calibrate", calibrate_command),
     ("cite", cite),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +13,7 @@ from annelid.errors import RunFileError
 if TYPE_CHECKING:
     from annelid.config import RunConfig
     from annelid.simulation.runfile import Run
+    from annelid.studies.workers import Workers
 
 DEFAULT_PRESET = "riddle2023-rods"
 
@@ -38,8 +40,31 @@ ArenaName = Annotated[
         help="Put the 3D worm elsewhere: a name of `annelid arenas`, or a TOML file  [default: where the preset is]",
     ),
 ]
+Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
+ClusterName = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="WHERE",
+        envvar="ANNELID_CLUSTER",
+        help="Where runs are computed: processes, local (Dask on this machine), slurm, the address or the scheduler"
+        " file (.json) of a Dask scheduler, or a TOML file with a table [cluster]",
+    ),
+]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
+
+
+def workers_for(cluster: str | None, jobs: int | None) -> AbstractContextManager[Workers | None]:
+    """Gives the workers of a cluster that the user names; None, for processes of this machine, where none is named.
+
+    Raises:
+        ConfigError: It names no cluster.
+    """
+    from annelid.config import find_cluster
+    from annelid.studies.cluster import workers_of
+
+    return nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
 
 
 def or_default(preset: str | None, fidelity: str | None = None) -> str:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from annelid.cli.common import ClusterName, Jobs, workers_for
 from annelid.cli.entry import EXIT_INTERRUPTED, complain
 from annelid.errors import RunFileError
 
@@ -20,9 +21,8 @@ def paper_command(
         list[str] | None,
         typer.Option("--only", metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
-    ] = None,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
     claims: Annotated[
         Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
     ] = None,
@@ -54,12 +54,14 @@ def paper_command(
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
     try:
-        with study_progress(quiet=quiet) as progress:
-            report = reproduce(output, "quick" if quick else "full", only=only or None, jobs=jobs, progress=progress)
+        with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:
+            effort = "quick" if quick else "full"
+            report = reproduce(output, effort, only=only or None, jobs=jobs, workers=workers, progress=progress)
             html = write_report(report, output)
     except KeyboardInterrupt:
         options = [*(["--quick"] if quick else []), *(word for name in only or () for word in ("--only", name))]
         options += ["--jobs", str(jobs)] if jobs else []
+        options += ["--cluster", cluster] if cluster else []
         options += ["--claims", str(claims)] if claims else []
         again = shlex.join(["annelid", "paper", "-o", str(output), *options])
         complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")

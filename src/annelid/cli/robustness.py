@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from annelid.cli.common import ClusterName, Jobs, workers_for
 from annelid.cli.entry import EXIT_INTERRUPTED, complain
 from annelid.errors import RunFileError
 
@@ -26,9 +27,8 @@ def robustness_command(
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
     ] = False,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
-    ] = None,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the paths.")] = False,
 ) -> None:
     """Compare how often controllers walk over a designed sample of worms.
@@ -50,7 +50,7 @@ def robustness_command(
     if output.exists() and not output.is_dir():
         raise RunFileError(f"{output} is a file: name a folder with -o")
     try:
-        with study_progress(quiet=quiet) as progress:
+        with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:
             judged = robustness(
                 output,
                 points,
@@ -58,6 +58,7 @@ def robustness_command(
                 n_segments=segments,
                 keep=keep,
                 jobs=jobs,
+                workers=workers,
                 progress=progress,
             )
     except KeyboardInterrupt:
@@ -65,6 +66,7 @@ def robustness_command(
         words += ["--segments", str(segments)] if segments else []
         words += [word for kind in controller or () for word in ("--controller", kind)]
         words += ["--keep"] if keep else []
+        words += ["--cluster", cluster] if cluster else []
         again = shlex.join([*words, *(["--jobs", str(jobs)] if jobs else [])])
         complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
         raise typer.Exit(EXIT_INTERRUPTED) from None

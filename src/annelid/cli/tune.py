@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.common import Assignments, Preset, or_default, overrides_of
+from annelid.cli.common import Assignments, ClusterName, Jobs, Preset, or_default, overrides_of, workers_for
 from annelid.cli.entry import EXIT_INTERRUPTED, complain
 from annelid.errors import RunFileError
 
@@ -40,9 +40,8 @@ def tune_command(
     ] = None,
     trials: Annotated[int, typer.Option("--trials", min=1, help="Runs that the search may take.")] = 100,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the optimiser.")] = 0,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")
-    ] = None,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
 ) -> None:
     """Search for a faster, cheaper or less slipping gait.
@@ -84,12 +83,13 @@ def tune_command(
     found: list[Trial] = []
     written: list[Path] = []
     try:
-        with study_progress(quiet=quiet) as progress:
-            for generation in search(task, Store(output / "runs"), jobs=jobs, progress=progress):
+        with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:
+            for generation in search(task, Store(output / "runs", workers), jobs=jobs, progress=progress):
                 found += generation
                 written = write_results(task, found, shlex.join(words), output)
     except KeyboardInterrupt:
         again = shlex.join([*words, "-o", str(output), *(["--jobs", str(jobs)] if jobs else [])])
+        again += f" --cluster {shlex.quote(cluster)}" if cluster else ""
         complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
         raise typer.Exit(EXIT_INTERRUPTED) from None
     if not quiet:

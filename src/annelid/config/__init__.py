@@ -7,7 +7,8 @@ sets how finely a 3D worm is resolved.
 """
 
 from annelid.config.arena import Arena, ArenaSection, Floor, Pipe, Relief, Rough, Steps
-from annelid.config.checking import check_config, field_paths, field_value, fields_of
+from annelid.config.checking import check_config, field_paths, field_value, fields_of, unit_of, whole_path
+from annelid.config.cluster import Cluster, find_cluster
 from annelid.config.controllers import (
     AdaptiveSns,
     Contraction,
@@ -36,6 +37,7 @@ from annelid.config.loading import (
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
 from annelid.config.run import Clock, Guard, Record, RunConfig
 from annelid.config.sections import Section
+from annelid.config.study import Study, Vary, load_study
 from annelid.config.turning import (
     ConstantTurning,
     CourseTurning,
@@ -54,6 +56,7 @@ __all__ = [
     "Boxerbaum2012Body",
     "Chain",
     "Clock",
+    "Cluster",
     "ConstantTurning",
     "Contraction",
     "CourseTurning",
@@ -90,9 +93,11 @@ __all__ = [
     "Steps",
     "Strands",
     "StretchSensor",
+    "Study",
     "TimedWave",
     "TouchTurning",
     "TurningSection",
+    "Vary",
     "WormBody",
     "arena_names",
     "arena_summary",
@@ -101,10 +106,14 @@ __all__ = [
     "field_paths",
     "field_value",
     "fields_of",
+    "find_cluster",
     "find_level",
     "load_config",
+    "load_study",
     "parse_assignments",
     "preset_names",
     "preset_text",
     "toml_value",
+    "unit_of",
+    "whole_path",
 ]

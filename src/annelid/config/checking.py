@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any, get_origin
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -13,13 +13,21 @@ from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import ConfigError
 
+Checked = TypeVar("Checked", bound=Section)
+
 
 def check_config(tree: Mapping[str, Any]) -> RunConfig:
     """Turns a nested mapping into a checked `RunConfig`, or raises `ConfigError` naming the field."""
+    return check_section(RunConfig, tree)
+
+
+def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
+    """Turns a nested mapping into a checked section of any kind, or raises `ConfigError` naming the field."""
     try:
-        return RunConfig.model_validate(tree)
+        return section.model_validate(tree)
     except ValidationError as error:
-        raise ConfigError("; ".join(dict.fromkeys(_explain(detail) for detail in error.errors()))) from None
+        sentences = dict.fromkeys(_explain(detail, section) for detail in error.errors())
+        raise ConfigError("; ".join(sentences)) from None
 
 
 def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
@@ -109,6 +117,14 @@ def whole_path(path: str, tree: Mapping[str, Any]) -> str:
     return ".".join((*sections, *(whole or [leaf])))
 
 
+def unit_of(path: str) -> str:
+    """Returns the unit that ends a field's name, as "m/s" for ``.._m_per_s``; empty where there is none."""
+    words = path.rsplit(".", 1)[-1].split("_")
+    start = next((i for i in range(1, len(words)) if UNITS.issuperset(words[i:])), len(words))
+    unit = " ".join(words[start:])
+    return unit.replace("per ", "1/", 1) if unit.startswith("per ") else unit.replace(" per ", "/")
+
+
 def _field_sections(section: type[BaseModel], field: str) -> list[type[Section]]:
     return _sections_of(section.model_fields[field].annotation)
 
@@ -145,6 +161,10 @@ _KINDS = {
     "heading",
     "course",
     "touch",
+    "processes",
+    "local",
+    "scheduler",
+    "slurm",
 }
 _WORDS = {
     "greater_than": "must be greater than {gt:g}",
@@ -163,12 +183,14 @@ _WORDS = {
     "bool_parsing": "must be true or false",
     "tuple_type": "must be a list",
     "too_long": "has too many entries",
+    "too_short": "must have at least {min_length:d} entries",
+    "string_type": "must be a text in quotes",
     "model_type": "is a section; set one of its fields instead",
     "model_attributes_type": "is a section; set one of its fields instead",
 }
 
 
-def _explain(detail: ErrorDetails) -> str:
+def _explain(detail: ErrorDetails, root: type[Section]) -> str:
     loc = detail["loc"]
     # What follows a kind is a field, even where it is called as another kind is.
     kinds = [part in _KINDS and (not i or loc[i - 1] not in _KINDS) for i, part in enumerate(loc)]
@@ -176,7 +198,7 @@ def _explain(detail: ErrorDetails) -> str:
     path = ".".join(parts)
     kind = detail["type"]
     if kind == "extra_forbidden":
-        return f"unknown field {path!r}: {_nearest_fields(detail['loc'])}"
+        return f"unknown field {path!r}: {_nearest_fields(detail['loc'], root)}"
     if kind == "missing":
         return f"{path} must be given"
     if kind == "value_error":
@@ -195,12 +217,12 @@ def _is_type_label(part: int | str) -> bool:
     return isinstance(part, str) and ("[" in part or "constrained" in part)
 
 
-def _nearest_fields(loc: tuple[int | str, ...]) -> str:
+def _nearest_fields(loc: tuple[int | str, ...], root: type[Section]) -> str:
     """Suggests a field for the last part of a location that names none."""
-    section, leaf = _section_at(loc[:-1]), str(loc[-1])
-    siblings = sorted(section.model_fields)
+    section, leaf = _section_at(loc[:-1], root), str(loc[-1])
+    siblings = sorted(info.alias or name for name, info in section.model_fields.items())
     by_leaf: dict[str, str] = {}
-    for path in field_paths():
+    for path in field_paths(root):
         by_leaf.setdefault(path.rsplit(".", 1)[-1], path)
     near = get_close_matches(leaf, siblings, n=1, cutoff=0.6)
     near_elsewhere = get_close_matches(leaf, by_leaf, n=1, cutoff=0.6)
@@ -213,9 +235,9 @@ def _nearest_fields(loc: tuple[int | str, ...]) -> str:
     return f"{hint}Valid here: {', '.join(siblings)}"
 
 
-def _section_at(loc: tuple[int | str, ...]) -> type[BaseModel]:
+def _section_at(loc: tuple[int | str, ...], root: type[Section]) -> type[BaseModel]:
     """Follows a location through sections and the tags of their kinds."""
-    section: type[BaseModel] = RunConfig
+    section: type[BaseModel] = root
     members: list[type[Section]] = []
     for part in loc:
         if part in section.model_fields and not members:

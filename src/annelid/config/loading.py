@@ -141,7 +141,7 @@ def toml_value(value: Any) -> str:
 def _arena_instead(present: Any, name: str | Path) -> dict[str, Any]:
     """Returns the table of another arena, with the fields of every arena from the present one where it has none."""
     from_file = str(name).endswith(".toml")
-    stated = (_read_file(Path(name)) if from_file else tomllib.loads(arena_text(str(name)))).get("arena")
+    stated = (read_toml(Path(name)) if from_file else tomllib.loads(arena_text(str(name)))).get("arena")
     if not isinstance(stated, Mapping):
         raise ConfigError(f"{name} describes no arena: it must have a table [arena]")
     shared = present if isinstance(present, Mapping) else {}
@@ -172,7 +172,7 @@ def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] =
         base = own.pop("extends", None)
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
-        own = _read_file(path)
+        own = read_toml(path)
         own.setdefault("name", path.stem)
         if path.resolve() in above:
             raise ConfigError(f"{path} extends itself: {' -> '.join(file.name for file in (*above, path))}")
@@ -189,7 +189,12 @@ def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] =
     return _merge(_read_tree(base, above), own)
 
 
-def _read_file(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
+    """Reads a TOML file.
+
+    Raises:
+        ConfigError: It cannot be read, or is not valid TOML.
+    """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
+from annelid.errors import ConfigError
 
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
@@ -100,6 +101,15 @@ class Case(Work):
     def but(self, changes: Mapping[str, Any]) -> Case:
         """Returns the case with further changes."""
         return Case(self.preset, {**self.changes, **changes})
+
+
+def refusal(case: Work) -> ConfigError | None:
+    """Returns why a case's configuration is refused; None if it is not."""
+    try:
+        _ = case.config
+    except ConfigError as error:
+        return error
+    return None
 
 
 def run_command(preset: str, changes: Mapping[str, Any]) -> str:

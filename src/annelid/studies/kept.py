@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from annelid.studies.store import code_fingerprint
+from annelid.studies.fingerprint import code_fingerprint
 from annelid.view.output import whole_file
 
 

@@ -1,15 +1,16 @@
-"""What a study keeps of a run: its summary, the score of its rhythm, and readings at the end of each contraction."""
+"""What a study keeps of a run: its numbers, the score of its rhythm, and readings at the end of each contraction."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from annelid.analysis import RhythmScore, Summary, rhythm_score, summary
+from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
+from annelid.analysis.balance import EnergyBalance
 from annelid.config import Program
 from annelid.simulation.runfile import Run
 
@@ -45,6 +46,7 @@ class Outcome:
         rhythm: The score of its rhythm.
         holds: Readings of its open-loop contractions, in the order of the program; empty in closed loop.
         message: Why it ended before its time; empty if it did not.
+        gait: How the worm gets along.
     """
 
     path: Path
@@ -52,11 +54,12 @@ class Outcome:
     rhythm: RhythmScore
     holds: tuple[Hold, ...]
     message: str
+    gait: Gait = field(default_factory=Gait)
 
 
 def outcome(run: Run) -> Outcome:
     """Reads a run's outcome."""
-    return Outcome(run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message)
+    return Outcome(run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message, gait(run))
 
 
 def write_outcome(read: Outcome, path: Path, reader: str) -> None:
@@ -67,6 +70,7 @@ def write_outcome(read: Outcome, path: Path, reader: str) -> None:
         "rhythm": asdict(read.rhythm),
         "holds": [asdict(hold) for hold in read.holds],
         "message": read.message,
+        "gait": read.gait.to_dict(),
     }
     path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
 
@@ -87,12 +91,14 @@ def read_outcome(path: Path, reader: str) -> Outcome:
             {name: tuple(value) if isinstance(value, list) else value for name, value in hold.items()}
             for hold in content["holds"]
         ]
+        energy = content["gait"]["energy"]
         return Outcome(
             path.parent,
             Summary(**content["summary"]),
             RhythmScore(**rhythm),
             tuple(Hold(**hold) for hold in holds),
             content["message"],
+            Gait(**{**content["gait"], "energy": energy and EnergyBalance(**energy)}),
         )
     except (KeyError, TypeError) as error:
         raise ValueError(f"{path} is no outcome: {error}") from None

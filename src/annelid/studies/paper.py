@@ -21,6 +21,7 @@ from annelid.studies.examinations import EXAMINATIONS
 from annelid.studies.kept import kept
 from annelid.studies.outcome import Outcome
 from annelid.studies.store import Store, case_key
+from annelid.studies.workers import Workers
 
 Progress = Callable[[str, int, int, float], object]
 """Called with what is being done, the number of runs (or pictures) done, their total, and the share of the work."""
@@ -45,6 +46,7 @@ def reproduce(
     *,
     only: Sequence[str] | None = None,
     jobs: int | None = None,
+    workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Reruns everything the paper shows or claims, as far as it has not been run into the folder before.
@@ -55,6 +57,7 @@ def reproduce(
         only: Names of the examinations wanted, with the main numbers but without figures and claims; None for the
             whole.
         jobs: Processes, by default one a core.
+        workers: Who computes the runs instead of processes of this machine.
         progress: Called as the work goes on.
 
     Returns:
@@ -68,7 +71,7 @@ def reproduce(
     cases = [*variants.values(), *(case for examination in chosen for case in examination.cases(effort))]
     if only is None:
         cases += claim_cases(effort)
-    store = Store(folder / "runs")
+    store = Store(folder / "runs", workers)
     outcomes = store.compute(cases, jobs=jobs, progress=progress and _stage(progress, "running worms"))
     results = Results(outcomes, case_key)
     pictures = folder / "figures"

@@ -26,8 +26,10 @@ from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.studies.case import RODS, SHEAR_OVER_YOUNG, Case
+from annelid.studies.fingerprint import physics_fingerprint
 from annelid.studies.markdown import table
-from annelid.studies.store import Store, physics_fingerprint
+from annelid.studies.store import Store
+from annelid.studies.workers import Workers
 from annelid.view.output import whole_file
 
 CONTROLLERS = ("sns", "sns-robust")
@@ -212,6 +214,7 @@ def robustness(
     n_segments: int | None = None,
     keep: bool = False,
     jobs: int | None = None,
+    workers: Workers | None = None,
     progress: Progress | None = None,
 ) -> list[Judged]:
     """Walks the first points of the sample under each controller, as far as the folder does not tell how that goes.
@@ -225,6 +228,7 @@ def robustness(
             that costs less; None for the sample as it is.
         keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
         jobs: Processes; default: one a core.
+        workers: Who computes the runs instead of processes of this machine.
         progress: Called before the first and after every run.
 
     Returns:
@@ -249,7 +253,7 @@ def robustness(
     }
     missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
     cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
-    store, total_s, before_s = Store(folder / "runs"), sum(case.cost_s for case in cases.values()), 0.0
+    store, total_s, before_s = Store(folder / "runs", workers), sum(case.cost_s for case in cases.values()), 0.0
 
     def judge_what_is_there() -> None:
         for (kind, i), case in cases.items():

@@ -1,6 +1,6 @@
 """The store of runs: computed in parallel, each kept in a folder named by all that it depends on.
 
-A run is there or it is not: a folder counts once its outcome is written, which happens last. So a second call
+A run is there or it is not: a folder gets its name once its outcome is written, which happens last. So a second call
 computes nothing, a killed one loses the runs in progress and no other, and changed code makes new folders.
 """
 
@@ -8,40 +8,53 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
-from functools import cache
-from importlib.metadata import version
-from multiprocessing import get_context
+import shutil
+import time
+import uuid
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, wait
+from contextlib import contextmanager
 from pathlib import Path
 
-import annelid
-from annelid.errors import SimulationStopped
+from annelid.errors import ClusterError, RunFileError
 from annelid.simulation.runfile import Run, open_run
+from annelid.studies.attempt import (
+    DRAFTS,
+    MARK_NAME,
+    Keep,
+    Task,
+    bring_home,
+    own_code,
+    run_of_draft,
+    stored_outcome,
+)
 from annelid.studies.case import Work
-from annelid.studies.outcome import Outcome, outcome, read_outcome, write_outcome
-
-PHYSICS = ("morphology.py", "clock.py", "arena", "body", "nervous", "control", "planar", "simulation")
-"""The rooms whose code a run depends on, beside its configuration."""
-READERS = ("analysis", "studies/outcome.py")
-"""The code that reads a run's outcome: where it has changed, the outcome is read again, and the run kept."""
-
-OUTCOME_NAME = "outcome.json"
+from annelid.studies.fingerprint import physics_fingerprint
+from annelid.studies.outcome import Outcome
+from annelid.studies.workers import Processes, Result, Workers
 
 Progress = Callable[[int, int, float], object]
 """Called with the number of runs done, their total, and the share of the work that is done."""
 
-_SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+POLL_S = 0.5
+"""How often workers are looked for that have come or gone, s."""
 
 
 class Store:
     """A folder of runs."""
 
-    def __init__(self, folder: Path) -> None:
-        """Opens a store; the folder is made when the first run is computed."""
+    def __init__(self, folder: Path, workers: Workers | None = None, keep: Keep = "runs") -> None:
+        """Opens a store; the folder is made when the first run is computed.
+
+        Args:
+            folder: The folder.
+            workers: Who computes its runs; None for processes of this machine.
+            keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
+        """
         self.folder = folder
+        self._workers = workers
+        self._keep: Keep = keep
 
     def path(self, case: Work) -> Path:
         """Folder of a case's run."""
@@ -66,121 +79,131 @@ class Store:
         return open_run(self.path(case))
 
     def _stored(self, case: Work) -> Outcome | None:
-        folder = self.path(case)
-        try:
-            return read_outcome(folder / OUTCOME_NAME, code_fingerprint(*READERS))
-        except OSError:
-            return None
-        except ValueError:
-            return keep_outcome(folder)
+        return stored_outcome(self.path(case), self._keep)
 
     def compute(
-        self, cases: Iterable[Work], *, jobs: int | None = None, progress: Progress | None = None
+        self,
+        cases: Iterable[Work],
+        *,
+        jobs: int | None = None,
+        progress: Progress | None = None,
+        failed: MutableMapping[str, Exception] | None = None,
     ) -> Mapping[str, Outcome]:
         """Runs those cases that are not there yet, the longest first, several at a time.
 
         Args:
             cases: The cases; a case given twice runs once.
-            jobs: Processes, by default as many as there are cores.
+            jobs: Processes, by default as many as there are cores; has no effect on workers given to the store.
             progress: Called at the start and after every run.
+            failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
+                end the call.
 
         Returns:
-            The outcome of every case by its `case_key`.
+            The outcome by its `case_key` of every case but those that failed.
 
         Raises:
-            AnnelidError: A case cannot be built, or its file cannot be written. A run that a guard stops is no
-                error: its outcome says so.
+            AnnelidError: A case cannot be built, or its file cannot be written, and ``failed`` is None. A run that a
+                guard stops is no error: its outcome says so.
+            ClusterError: The workers are lost for good, or have other code. Finished runs are kept.
             KeyboardInterrupt: Runs in progress are dropped, all others kept.
         """
         wanted = {case_key(case): case for case in cases}
         found = {key: stored for key, case in wanted.items() if (stored := self._stored(case)) is not None}
         missing = sorted((wanted[key] for key in wanted if key not in found), key=lambda case: -case.cost_s)
         total_s = sum(case.cost_s for case in missing)
-        left_s = total_s
+        left_s, done = total_s, len(found)
 
         def report() -> None:
             if progress is not None:
-                progress(len(found), len(wanted), 1.0 - left_s / total_s if total_s else 1.0)
+                progress(done, len(wanted), 1.0 - left_s / total_s if total_s else 1.0)
 
         report()
         if not missing:
             return found
-        self.folder.mkdir(parents=True, exist_ok=True)
-        n_workers = min(jobs or os.cpu_count() or 1, len(missing))
-        with _single_threaded(), ProcessPoolExecutor(n_workers, mp_context=get_context("spawn")) as pool:
-            # No more than the workers take at once: what lies in the pool's own queue could not be taken back.
-            waiting, running = deque(missing), dict[Future[None], Work]()
-            try:
-                while waiting or running:
-                    while waiting and len(running) < n_workers:
-                        case = waiting.popleft()
-                        running[pool.submit(compute_case, case, self.path(case))] = case
-                    done, _ = wait(running, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        case = running.pop(future)
-                        future.result()
-                        found[case_key(case)] = self[case]
-                        left_s -= case.cost_s
-                    report()
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        mark = self._mark()
+        with self._opened(min(jobs or os.cpu_count() or 1, len(missing))) as workers:
+            for case, error in self._computed(workers, missing, mark):
+                left_s, done = left_s - case.cost_s, done + 1
+                if error is None:
+                    found[case_key(case)] = self[case]
+                elif failed is None:
+                    raise error
+                else:
+                    failed[case_key(case)] = error
+                report()
+        self._clear_drafts()
         return found
 
+    def _computed(
+        self, workers: Workers, missing: Sequence[Work], mark: str
+    ) -> Iterator[tuple[Work, Exception | None]]:
+        """Has runs computed, and hands each over as it is there or has failed."""
+        # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
+        # dies would be counted against the runs behind the one that killed it.
+        waiting, running, tries = deque(missing), dict[Result, Work](), Counter[str]()
+        while waiting or running:
+            while waiting and len(running) < workers.slots():
+                case = waiting.popleft()
+                running[workers.submit(self._task(case, mark))] = case
+            if not running:
+                time.sleep(POLL_S)
+            done, _ = wait(running, POLL_S, FIRST_COMPLETED)
+            for future in done:
+                case, key = running[future], case_key(running[future])
+                del running[future]
+                try:
+                    files = future.result()
+                    if files is not None:
+                        bring_home(files, self.path(case), self._keep)
+                except CancelledError:
+                    waiting.append(case)
+                except BrokenExecutor:
+                    raise ClusterError(
+                        "a process that computed a run was killed, perhaps for lack of memory: call again with fewer "
+                        "--jobs, or with --cluster local, which goes on without it"
+                    ) from None
+                except ClusterError:
+                    raise
+                except ImportError as error:
+                    raise ClusterError(f"a worker cannot import annelid: install it there too ({error})") from error
+                except Exception as error:
+                    if isinstance(error, RunFileError | OSError) and tries[key] < workers.retries:
+                        tries[key] += 1
+                        waiting.append(case)
+                    else:
+                        yield case, workers.explained(error)
+                else:
+                    yield case, None
 
-def compute_case(case: Work, folder: Path) -> None:
-    """Runs one case into a folder and writes its outcome; what an earlier, killed attempt left is replaced."""
-    from annelid.simulation.loop import simulate
+    def _task(self, case: Work, mark: str) -> Task:
+        config = case.config.model_dump_json()
+        return Task(self.path(case).name, config, own_code(), str(self.folder.resolve()), mark, self._keep)
 
-    (folder / OUTCOME_NAME).unlink(missing_ok=True)
-    # A run that a guard stops is a finding, not a failure.
-    with suppress(SimulationStopped):
-        if simulate(case.config, folder, progress=False, overwrite=True).status == "interrupted":
-            raise KeyboardInterrupt
-    keep_outcome(folder)
+    def _mark(self) -> str:
+        """Returns the store's mark, by which a worker can tell that it sees the same folder."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / MARK_NAME
+        if not path.exists():
+            path.write_text(uuid.uuid4().hex, encoding="utf-8")
+        return path.read_text(encoding="utf-8")
 
+    def _clear_drafts(self) -> None:
+        """Removes what killed attempts have left of runs that are there now."""
+        for draft in self.folder.glob(DRAFTS):
+            if stored_outcome(run_of_draft(draft), self._keep) is not None:
+                shutil.rmtree(draft, ignore_errors=True)
 
-def keep_outcome(folder: Path) -> Outcome:
-    """Reads the outcome of the run in a folder, and writes it beside the run."""
-    read = outcome(open_run(folder))
-    draft = folder / f".{OUTCOME_NAME}.part"
-    write_outcome(read, draft, code_fingerprint(*READERS))
-    draft.replace(folder / OUTCOME_NAME)
-    return read
+    @contextmanager
+    def _opened(self, jobs: int) -> Iterator[Workers]:
+        """Gives the store's own workers, or as many processes as are asked for."""
+        if self._workers is not None:
+            yield self._workers
+        else:
+            with Processes(jobs) as processes:
+                yield processes
 
 
 def case_key(case: Work) -> str:
     """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
     text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-@cache
-def physics_fingerprint() -> str:
-    """Digest of the code that computes runs, and of the versions of the engine and numpy."""
-    return f"{code_fingerprint(*PHYSICS)} mujoco {version('mujoco-core')} numpy {version('numpy')}"
-
-
-@cache
-def code_fingerprint(*rooms: str) -> str:
-    """Digest of annelid's own code in the given rooms, by default in all."""
-    source = Path(annelid.__file__).parent
-    digest = hashlib.sha256()
-    for room in rooms or (".",):
-        place = source / room
-        for module in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-            digest.update(module.relative_to(source).as_posix().encode() + b"\0" + module.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
-
-
-@contextmanager
-def _single_threaded() -> Iterator[None]:
-    """Has the workers' linear algebra keep to one thread each: the runs are what is parallel."""
-    before = {name: os.environ.get(name) for name in _SINGLE_THREADED}
-    os.environ.update({name: value for name, value in _SINGLE_THREADED.items() if before[name] is None})
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)

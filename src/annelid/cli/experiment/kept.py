@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from annelid.cli.common import workers_for
 from annelid.cli.entry import EXIT_INTERRUPTED, complain
 from annelid.errors import RunFileError
 
@@ -18,13 +19,12 @@ if TYPE_CHECKING:
     from annelid.studies.store import Store
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
 
 
 @contextmanager
 def kept_runs(
-    words: Sequence[str], output: Path, *, quick: bool, jobs: int | None, quiet: bool
+    words: Sequence[str], output: Path, *, quick: bool, jobs: int | None, cluster: str | None = None, quiet: bool
 ) -> Iterator[tuple[Store, StudyProgress | None]]:
     """Opens a folder's store of runs with a progress display; on Ctrl-C tells how to go on.
 
@@ -33,6 +33,7 @@ def kept_runs(
         output: The folder; runs are kept in ``runs`` below it.
         quick: As the command was given.
         jobs: As the command was given.
+        cluster: As the command was given.
         quiet: No progress.
 
     Raises:
@@ -44,12 +45,13 @@ def kept_runs(
 
     if output.exists() and not output.is_dir():
         raise RunFileError(f"{output} is a file: name a folder with -o")
-    store = Store(output / "runs")
+    folder = output / "runs"
     try:
-        with study_progress(quiet=quiet) as progress:
-            yield store, progress
+        with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:
+            yield Store(folder, workers), progress
     except KeyboardInterrupt:
         options = [*(["--quick"] if quick else []), *(["--jobs", str(jobs)] if jobs else [])]
+        options += ["--cluster", cluster] if cluster else []
         again = shlex.join(["annelid", "experiment", *words, "-o", str(output), *options])
-        complain(f"interrupted: finished runs are kept in {store.folder}; go on with: {again}")
+        complain(f"interrupted: finished runs are kept in {folder}; go on with: {again}")
         raise typer.Exit(EXIT_INTERRUPTED) from None

@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
+from annelid.cli.common import ClusterName, Jobs
+from annelid.cli.experiment.kept import Output, Quiet, kept_runs
 
 
 def pipes_command(
     output: Output = Path("pipes"),
     quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,
     jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out which pipes the worm passes, and how fast.
@@ -36,7 +38,7 @@ def pipes_command(
 
     from annelid.studies.pipes import pass_pipes, pipes_picture, pipes_table, trials, write_readings
 
-    with kept_runs(["pipes"], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+    with kept_runs(["pipes"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         found = pass_pipes(store, trials(quick), jobs=jobs, progress=progress)
     if not quiet:
         Console().print(pipes_table(found.readings))

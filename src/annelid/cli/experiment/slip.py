@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
+from annelid.cli.common import ClusterName, Jobs
+from annelid.cli.experiment.kept import Output, Quiet, kept_runs
 
 FOLDER = Path("slip")
 GAIT = "riddle2025-muscles"
@@ -19,6 +20,7 @@ def slip_command(
     preset: Annotated[str, typer.Option(help="Gait that gets the feedback: riddle2025-muscles or crawler.")] = GAIT,
     quick: Annotated[bool, typer.Option("--quick", help="Two frictions only.")] = False,
     jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure what pressure feedback saves of the work lost to friction.
@@ -47,7 +49,8 @@ def slip_command(
     )
     from annelid.view.figures.slip import feedback_figure
 
-    with kept_runs(["slip", "--preset", preset], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+    words = ["slip", "--preset", preset]
+    with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         readings = slip_feedback(store, QUICK if quick else FRICTIONS, preset=preset, jobs=jobs, progress=progress)
     if not quiet:
         Console().print(feedback_table(readings, preset))
@@ -68,6 +71,7 @@ def slip_detector_command(
     output: Output = FOLDER,
     quick: Annotated[bool, typer.Option("--quick", help="Two runs only.")] = False,
     jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
     """Judge the slip detector, which knows stretch and pressure only, by the slip that the simulator knows of.
@@ -95,7 +99,8 @@ def slip_detector_command(
     )
     from annelid.view.figures.slip import detector_figure
 
-    with kept_runs(["slip-detector"], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+    words = ["slip-detector"]
+    with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         detections = slip_detection(store, QUICK if quick else None, jobs=jobs, progress=progress)
     told = scores(detections)
     if not quiet:

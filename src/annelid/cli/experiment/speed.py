@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
+from annelid.cli.common import ClusterName, Jobs
+from annelid.cli.experiment.kept import Output, Quiet, kept_runs
 
 
 def speed_command(
@@ -19,6 +20,7 @@ def speed_command(
     output: Output = Path("speed"),
     quick: Annotated[bool, typer.Option("--quick", help="Two values of each quantity.")] = False,
     jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out how fast gaits crawl over friction and number of segments.
@@ -38,7 +40,8 @@ def speed_command(
 
     from annelid.studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
 
-    with kept_runs(["speed", *(gaits or [])], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+    words = ["speed", *(gaits or [])]
+    with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         readings = crawl(store, points(gaits or GAITS, "quick" if quick else "full"), jobs=jobs, progress=progress)
     if not quiet:
         for quantity in VALUES:

@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
+from annelid.cli.common import ClusterName, Jobs
+from annelid.cli.experiment.kept import Output, Quiet, kept_runs
 
 
 def turning_command(
     output: Output = Path("turning"),
     quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
     jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out on which radius the worm turns.
@@ -34,7 +36,7 @@ def turning_command(
 
     from annelid.studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
 
-    with kept_runs(["turning"], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+    with kept_runs(["turning"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)
     if not quiet:
         Console().print(turning_table(turned.readings))

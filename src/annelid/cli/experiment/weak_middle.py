@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.experiment.kept import Jobs, Output, Quiet, kept_runs
+from annelid.cli.common import ClusterName, Jobs
+from annelid.cli.experiment.kept import Output, Quiet, kept_runs
 
 
 def weak_middle_command(
     output: Output = Path("weak-middle"),
     quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
     jobs: Jobs = None,
+    cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out why the middle of the worm elongates less than its ends.
@@ -50,7 +52,7 @@ def weak_middle_command(
     from annelid.view.figures.weak_middle import weak_middle_figure
 
     found = None
-    with kept_runs(["weak-middle"], output, quick=quick, jobs=jobs, quiet=quiet) as (store, progress):
+    with kept_runs(["weak-middle"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
         if not quick:
             found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)

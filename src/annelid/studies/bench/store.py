@@ -15,7 +15,8 @@ from typing import Any
 
 from annelid.errors import AnnelidError
 from annelid.studies.bench.cases import BenchCase
-from annelid.studies.store import READERS, case_key, code_fingerprint
+from annelid.studies.fingerprint import READERS, code_fingerprint
+from annelid.studies.store import case_key
 from annelid.view.output import whole_file
 
 MEASURING = ("studies/bench/measure.py", "studies/bench/timing.py", *READERS)

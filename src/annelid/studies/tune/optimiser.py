@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from math import exp, floor, log
+from math import floor, log
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from annelid.errors import MissingDependency
 from annelid.morphology import Array
-from annelid.studies.tune.space import Choice, Interval, Variable
+from annelid.studies.space import Choice, Interval, Variable, from_unit, to_unit
 
 if TYPE_CHECKING:
     import optuna
@@ -152,20 +152,6 @@ class Parzen:
         """Takes the scores of the generation that was asked for last, in its order."""
         for trial, score in zip(self._asked, scores, strict=False):
             self._study.tell(trial, score)
-
-
-def to_unit(variable: Interval, value: float) -> float:
-    """Returns where a value lies in its range: 0 at the lower end, 1 at the upper one."""
-    if variable.logarithmic:
-        return log(value / variable.low) / log(variable.high / variable.low)
-    return (value - variable.low) / (variable.high - variable.low)
-
-
-def from_unit(variable: Interval, share: float) -> float | int:
-    """Returns the value at a place of its range, rounded as the variable is; the inverse of `to_unit` but for that."""
-    if variable.logarithmic:
-        return variable.rounded(variable.low * exp(share * log(variable.high / variable.low)))
-    return variable.rounded(variable.low + share * (variable.high - variable.low))
 
 
 def _suggested(trial: optuna.Trial, variable: Variable) -> Any:

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis.gait import gait
-from annelid.errors import AnnelidError
-from annelid.studies.case import Case
+from annelid.errors import ConfigError
+from annelid.studies.case import Case, refusal
 from annelid.studies.progress import StudyProgress
-from annelid.studies.store import Store
+from annelid.studies.space import Variable
+from annelid.studies.store import Store, case_key
 from annelid.studies.tune.judge import Judged, Objective, judge
 from annelid.studies.tune.optimiser import optimiser_of
-from annelid.studies.tune.space import Variable, own_values
+from annelid.studies.tune.space import own_values
 
 START = -1
 """Number of the gait that the search starts from, which is no trial."""
@@ -105,10 +105,16 @@ def search(
     while (done := len(found) - 1) < task.n_trials:
         values = optimiser.ask()[: task.n_trials - done]
         cases = [task.start.but(of_trial) for of_trial in values]
-        errors = _compute(store, cases, jobs, _report(progress, _best_words(task, found), done, task.n_trials))
+        errors: list[Exception | None] = [refusal(case) for case in cases]
+        built = [i for i, error in enumerate(errors) if error is None]
+        failed: dict[str, Exception] = {}
+        report = _report(progress, _best_words(task, found), done, task.n_trials)
+        store.compute([cases[i] for i in built], jobs=jobs, progress=report, failed=failed)
+        for i in built:
+            errors[i] = failed.get(case_key(cases[i]))
         trials = [
-            _trial(case, store, done + i, of_trial, errors.get(i, ""))
-            for i, (case, of_trial) in enumerate(zip(cases, values, strict=True))
+            _trial(case, store, done + i, of_trial, error)
+            for i, (case, of_trial, error) in enumerate(zip(cases, values, errors, strict=True))
         ]
         optimiser.tell([scores(trial, task.objectives) for trial in trials])
         found += trials
@@ -161,30 +167,17 @@ def _dominates(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return one != other and all(a <= b for a, b in zip(one, other, strict=True))
 
 
-def _compute(store: Store, cases: Sequence[Case], jobs: int | None, progress: Any) -> dict[int, str]:
-    """Computes a generation; returns why single cases could not be built, by their places."""
-    try:
-        store.compute(cases, jobs=jobs, progress=progress)
-    except AnnelidError:
-        errors = {}
-        for i, case in enumerate(cases):
-            try:
-                store.compute([case], jobs=1)
-            except AnnelidError as error:
-                errors[i] = str(error)
-        return errors
-    return {}
-
-
 def judged_run(store: Store, case: Case) -> Judged:
     """Judges a run that the store has."""
     outcome = store[case]
-    return judge(outcome, None if outcome.message else gait(store.run(case)))
+    return judge(outcome, None if outcome.message else outcome.gait)
 
 
-def _trial(case: Case, store: Store, number: int, values: Mapping[str, Any], error: str = "") -> Trial:
-    judged = Judged(None, f"cannot be built: {error}") if error else judged_run(store, case)
-    return Trial(number, values, case, judged, store.path(case))
+def _trial(case: Case, store: Store, number: int, values: Mapping[str, Any], error: Exception | None = None) -> Trial:
+    if error is not None:
+        what = "cannot be built" if isinstance(error, ConfigError) else "failed"
+        return Trial(number, values, case, Judged(None, f"{what}: {error}"), Path())
+    return Trial(number, values, case, judged_run(store, case), store.path(case))
 
 
 def _best_words(task: Task, found: Sequence[Trial]) -> str:

@@ -3,66 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments, toml_value
+from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments
 from annelid.errors import ConfigError, suggest
-
-DIGITS = 4
-"""Significant digits of a value, so that a file that states it makes the same run."""
+from annelid.studies.space import Choice, Interval, Variable, is_whole
 
 LOG = "log"
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
 
-
-@dataclass(frozen=True, slots=True)
-class Interval:
-    """A number in a range.
-
-    Attributes:
-        field: Dotted path of the field.
-        low: Least value.
-        high: Largest value.
-        logarithmic: Whether equal ratios count alike, rather than equal differences.
-        whole: Whether it is a whole number.
-    """
-
-    field: str
-    low: float
-    high: float
-    logarithmic: bool = False
-    whole: bool = False
-
-    def __contains__(self, value: Any) -> bool:
-        """Whether a value lies in the range."""
-        return isinstance(value, int | float) and self.low <= value <= self.high
-
-    def rounded(self, value: float) -> float | int:
-        """Rounds a value to `DIGITS` digits, or to a whole number, and keeps it in the range."""
-        if self.whole:
-            return min(max(round(value), int(self.low)), int(self.high))
-        return min(max(float(f"{value:.{DIGITS}g}"), self.low), self.high)
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """One of several values.
-
-    Attributes:
-        field: Dotted path of the field.
-        values: The values: numbers, words, or lists of these.
-    """
-
-    field: str
-    values: tuple[Any, ...]
-
-    def __contains__(self, value: Any) -> bool:
-        """Whether a value is one of them."""
-        return value in self.values
-
-
-Variable = Interval | Choice
 
 _CONTROLLERS: Mapping[str, tuple[str, ...]] = {
     "sns": (
@@ -169,13 +118,11 @@ def _interval(field: str, text: str, present: Any) -> Interval:
         raise ConfigError(f"{field}={text}: the ends of a range must be numbers: {HOW}") from None
     if rest not in ([], [LOG]):
         raise ConfigError(f"{field}={text}: only 'log' may follow the ends of a range: {HOW}")
-    if isinstance(present, bool | str | tuple):
-        raise ConfigError(f"{field} is {toml_value(present)}, which is no number with a range: {HOW}")
     if not low < high:
         raise ConfigError(f"{field}={text}: the lower end must be below the upper end")
     if rest and low <= 0.0:
         raise ConfigError(f"{field}={text}: a logarithmic range needs a lower end above 0")
-    whole = isinstance(present, int)
+    whole = is_whole(field, present)
     if whole and not (low.is_integer() and high.is_integer()):
         raise ConfigError(f"{field}={text}: the ends must be whole numbers, as the field is")
     return Interval(field, low, high, bool(rest), whole)

@@ -1,0 +1,78 @@
+# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
+"""The command `sweep`."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import ClusterName, Jobs
+from annelid.cli.entry import EXIT_INTERRUPTED, complain
+
+
+def sweep_command(
+    study: Annotated[
+        Path | None, typer.Argument(metavar="STUDY.toml", help="What is varied, and how; --example prints one.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("sweep"),
+    cluster: ClusterName = None,
+    jobs: Jobs = None,
+    samples: Annotated[
+        int | None, typer.Option("--samples", min=1, help="Samples to draw.  [default: as the study has it]")
+    ] = None,
+    example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+) -> None:
+    """Vary fields over a grid or in samples, on this machine or on a cluster.
+
+    A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
+    ranges, in every combination or as random, Latin hypercube or Sobol samples.
+
+    Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, a row a run; sweep.png and
+    .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A run
+    that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
+    the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm.
+
+    \b
+    annelid sweep --example > study.toml
+    annelid sweep study.toml
+    annelid sweep study.toml --cluster tcp://10.0.0.1:8786
+    annelid sweep study.toml --samples 512
+    """
+    if example:
+        from importlib.resources import files
+
+        typer.echo((files("annelid.studies.sweep") / "example.toml").read_text(encoding="utf-8"), nl=False)
+        return
+    if study is None:
+        raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
+    from rich.console import Console
+
+    from annelid.config import load_study
+    from annelid.studies.progress import study_progress
+    from annelid.studies.sweep import swept
+    from annelid.studies.sweep.dataset import dataset_of
+    from annelid.studies.sweep.results import results_table, write_results
+
+    loaded = load_study(study)
+    if samples is not None:
+        loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
+    try:
+        with study_progress(quiet=quiet) as progress:
+            done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress)
+    except KeyboardInterrupt:
+        words = ["annelid", "sweep", str(study), "-o", str(output)]
+        words += [] if cluster is None else ["--cluster", cluster]
+        words += [] if jobs is None else ["--jobs", str(jobs)]
+        words += [] if samples is None else ["--samples", str(samples)]
+        complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {shlex.join(words)}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    data = dataset_of(done)
+    written = write_results(done, data)
+    if not quiet:
+        Console().print(results_table(done, data))
+    for path in written:
+        typer.echo(path)

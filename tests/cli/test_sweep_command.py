@@ -1,0 +1,230 @@
+"""The command `sweep`: what it writes and says, and that killing whatever computes it loses and doubles nothing."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+import xarray as xr
+from outcome import Command
+
+from annelid.studies.attempt import DRAFTS, OUTCOME_NAME
+
+SHORT = """
+preset = "riddle2022-planar"
+cluster.kind = "processes"
+set.duration_s = 0.2
+[[vary]]
+field = "body.gain"
+values = [1.0, 1e4]
+[[vary]]
+field = "controller.scheme"
+choices = ["euler", "heun"]
+"""
+
+
+def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
+    Path("study.toml").write_text(SHORT)
+    done = annelid("sweep", "study.toml", "-o", "out", "--jobs", "1")
+    assert done.exit_code == 0, done.err
+    assert done.out.splitlines()[-3:] == [str(Path("out", name)) for name in ("sweep.nc", "sweep.csv", "sweep.png")]
+    assert "4 runs, of which 2 are complete" in done.out
+    assert "2 failed" in done.out
+    assert "overshoot" in done.out
+    data = xr.load_dataset("out/sweep.nc", engine="h5netcdf")
+    assert dict(data.sizes) == {"body.gain": 2, "controller.scheme": 2, "segment": 3}
+    assert data.status.values.tolist() == [["complete"] * 2, ["failed"] * 2]
+    assert all("overshoot" in reason for reason in data.reason.values[1])
+    assert data.elongation_mean_max_m.sel({"body.gain": 1.0}).notnull().all()
+    rows = list(csv.DictReader(Path("out/sweep.csv").read_text().splitlines()))
+    assert [row["status"] for row in rows] == ["complete", "complete", "failed", "failed"]
+    assert [row["controller.scheme"] for row in rows] == ["euler", "heun"] * 2
+    folders = {path.name for path in Path("out/runs").iterdir() if path.is_dir()}
+    assert {row["run"] for row in rows if row["run"]} == folders
+
+
+def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command) -> None:
+    from annelid.config import load_study
+    from annelid.studies.sweep.design import plan_of
+
+    text = annelid("sweep", "--example").out
+    assert text.splitlines()[0].startswith("# A sweep:  annelid sweep study.toml")
+    Path("study.toml").write_text(text)
+    plan = plan_of(load_study("study.toml"))
+    assert len(plan.points) == 12
+    assert all(point.case.config for point in plan.points)
+    fields = {line.split("=")[0].strip("# ") for line in text.splitlines() if "=" in line}
+    assert {"samples", "seed", "repeats", "outputs", "rank", "keep", "address", "walltime"} <= fields
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ((), "name a study"),
+        (("missing.toml",), "cannot read"),
+        (("study.toml", "--cluster", "lokal"), "cluster 'lokal': must be one of processes, local, slurm"),
+        (("study.toml", "--samples", "8"), "has no effect on design = 'grid'"),
+        (("study.toml", "-o", "study.toml"), "study.toml is a file"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence_before_anything_runs(
+    annelid: Command, arguments: tuple[str, ...], says: str
+) -> None:
+    Path("study.toml").write_text(SHORT)
+    done = annelid("sweep", *arguments)
+    assert done.exit_code == 2
+    assert says in " ".join(done.err.split())
+    assert [path.name for path in Path().iterdir()] == ["study.toml"]
+
+
+MANY = """
+preset = "riddle2022-planar"
+design = "sobol"
+samples = 200
+set.duration_s = 0.3
+[[vary]]
+field = "controller.gate_time_constant_ms"
+from = 100.0
+to = 600.0
+[[vary]]
+field = "sensor.tolerance_m"
+from = 0.001
+to = 0.02
+log = true
+"""
+
+
+@contextmanager
+def started(
+    *words: str | Path, folder: Path, env: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A process with its own session, of which nothing is left in the end."""
+    with (folder / f"{Path(words[1]).name}.log").open("ab") as log:
+        environment = {**os.environ, **(env or {})}
+        process = subprocess.Popen(words, cwd=folder, stdout=log, stderr=log, start_new_session=True, env=environment)
+        try:
+            yield process
+        finally:
+            kill_all(process)
+
+
+def kill_all(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def n_done(folder: Path) -> int:
+    return len(list(folder.glob(f"out/runs/[!.]*/{OUTCOME_NAME}")))
+
+
+def wait_for(condition: Callable[[], bool], limit_s: float) -> None:
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.05)
+
+
+@pytest.mark.slow
+def test_two_hundred_runs_outlive_their_worker_their_scheduler_and_their_sweep(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(MANY)
+    tool = str(Path(sys.executable).with_name("dask"))
+    sweep = [sys.executable, "-m", "annelid", "sweep", "study.toml", "-o", "out"]
+    with ExitStack() as stack:
+        scheduler_words = [tool, "scheduler", "--port", "0", "--dashboard-address", ":0", "--scheduler-file", "at.json"]
+        scheduler = stack.enter_context(started(*scheduler_words, folder=tmp_path))
+        wait_for((tmp_path / "at.json").exists, 60)
+        worker = [tool, "worker", "--scheduler-file", "at.json", "--nthreads", "1", "--no-dashboard"]
+        workers = [stack.enter_context(started(*worker, folder=tmp_path)) for _ in range(2)]
+        (tmp_path / "where.toml").write_text('[cluster]\nkind = "scheduler"\naddress = "at.json"\nreconnect_s = 5.0\n')
+        first = stack.enter_context(started(*sweep, "--cluster", "where.toml", folder=tmp_path))
+        wait_for(lambda: n_done(tmp_path) >= 30, 200)
+        # The process that computes, not the one that watches over it and starts another.
+        psutil.Process(workers[0].pid).children(recursive=True)[-1].kill()
+        wait_for(lambda: n_done(tmp_path) >= 80, 200)
+        kill_all(scheduler)
+        assert first.wait(60) == 2
+    log = (tmp_path / "-m.log").read_text()
+    assert "is gone: finished runs are kept" in log
+    assert 80 <= n_done(tmp_path) < 200
+    before = written(tmp_path)
+
+    with started(*sweep, "--jobs", "2", folder=tmp_path) as second:
+        wait_for(lambda: n_done(tmp_path) >= 140, 200)
+        kill_all(second)
+    assert 140 <= n_done(tmp_path) < 200
+    before |= written(tmp_path)
+
+    third = subprocess.run(
+        [*sweep, "--jobs", "2", "--quiet"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert third.returncode == 0, third.stderr
+    data = xr.load_dataset(tmp_path / "out" / "sweep.nc", engine="h5netcdf")
+    assert data.sizes["sample"] == 200
+    assert set(data.status.values) == {"complete"}
+    assert len(set(data.run.values)) == 200
+    assert {path.name for path in (tmp_path / "out" / "runs").iterdir() if path.is_dir()} == set(data.run.values)
+    assert not list((tmp_path / "out" / "runs").glob(DRAFTS))
+    after = written(tmp_path)
+    assert {name: after[name] for name in before} == before, "a finished run was computed again"
+    assert bool(np.isfinite(data.elongation_mean_max_m).all())
+
+
+def written(folder: Path) -> dict[str, int]:
+    """When each finished run's file was last written."""
+    return {
+        path.parent.name: path.with_name("run.nc").stat().st_mtime_ns
+        for path in folder.glob(f"out/runs/[!.]*/{OUTCOME_NAME}")
+    }
+
+
+@pytest.mark.slow
+def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(MANY.replace("0.3", "2000.0").replace("200\n", "4\n"))
+    sweep = [sys.executable, "-m", "annelid", "sweep", "study.toml", "-o", "out", "--jobs", "2"]
+    with started(*sweep, folder=tmp_path) as process:
+        wait_for(lambda: len(list(tmp_path.glob("out/runs/*/run.nc"))) == 2, 60)
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.wait(60) == 130
+    log = (tmp_path / "-m.log").read_text()
+    assert "go on with: annelid sweep study.toml -o out --jobs 2" in log
+    assert "Traceback" not in log
+
+
+SBATCH = """#!/bin/sh
+# Stands for Slurm's own: runs the job here and now.
+for script; do :; done
+sh "$script" >> "$JOBS/job.log" 2>&1 &
+echo $! >> "$JOBS/jobs"
+echo "Submitted batch job $!"
+"""
+SCANCEL = """#!/bin/sh
+kill $1
+"""
+
+
+@pytest.mark.slow
+def test_jobs_of_slurm_compute_a_sweep(tmp_path: Path) -> None:
+    for name, script in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (tmp_path / name).write_text(script)
+        (tmp_path / name).chmod(0o755)
+    (tmp_path / "study.toml").write_text(
+        MANY.replace("samples = 200", "samples = 8") + '[cluster]\nkind = "slurm"\njobs = 2\nmemory = "4GB"\n'
+    )
+    environment = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "JOBS": str(tmp_path)}
+    words = [sys.executable, "-m", "annelid", "sweep", "study.toml", "-o", "out"]
+    with started(*words, folder=tmp_path, env=environment) as process:
+        assert process.wait(240) == 0, (tmp_path / "-m.log").read_text()
+    assert len((tmp_path / "jobs").read_text().split()) >= 2
+    data = xr.load_dataset(tmp_path / "out" / "sweep.nc", engine="h5netcdf")
+    assert data.status.values.tolist() == ["complete"] * 8

@@ -1,0 +1,306 @@
+"""Sweeps: which runs a study has, how samples grow, and what the dataset tells."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import annelid
+from annelid.analysis import Gait, Summary
+from annelid.analysis.balance import EnergyBalance
+from annelid.config import Study, load_study, unit_of
+from annelid.errors import ConfigError
+from annelid.simulation.runfile import FILE_NAME
+from annelid.studies.attempt import attempt
+from annelid.studies.sweep import Sweep, sweeping, swept
+from annelid.studies.sweep.dataset import dataset_of
+from annelid.studies.sweep.design import Plan, flattened, plan_of, unit_samples
+from annelid.studies.sweep.numbers import NUMBERS
+from annelid.studies.sweep.results import failures, results_table, told_numbers, write_results
+from annelid.studies.workers import Result, Workers
+
+GATE, TOLERANCE, SEGMENTS = "controller.gate_time_constant_ms", "sensor.tolerance_m", "body.n_segments"
+RANGES = [{"field": GATE, "from": 100.0, "to": 600.0, "log": True}, {"field": TOLERANCE, "from": 0.001, "to": 0.02}]
+LISTED = [{"field": SEGMENTS, "values": [3, 4]}, {"field": "controller.scheme", "choices": ["euler", "heun"]}]
+
+
+def study(vary: Any = LISTED, **fields: Any) -> Study:
+    return load_study({"preset": "riddle2022-planar", "set": {"duration_s": 0.2}, "vary": vary, **fields})
+
+
+class Here(Workers):
+    """Computes in this process."""
+
+    def slots(self) -> int:
+        return 1
+
+    def submit(self, task: Any) -> Result:
+        future: Result = Future()
+        try:
+            future.set_result(attempt(task))
+        except ConfigError as error:
+            future.set_exception(error)
+        return future
+
+    def close(self, *, drop: bool) -> None:
+        """Nothing to let go."""
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweeping, "workers_of", lambda cluster, jobs: Here())
+
+
+@st.composite
+def grids(draw: st.DrawFn) -> list[dict[str, Any]]:
+    """A few fields of the planar worm, each listed or over a range."""
+    ranges = {GATE: (50.0, 900.0), TOLERANCE: (0.001, 0.05), "body.gain": (0.5, 2.0)}
+    fields = draw(st.lists(st.sampled_from(sorted(ranges)), min_size=1, max_size=3, unique=True))
+    vary: list[dict[str, Any]] = []
+    for field in fields:
+        low, high = ranges[field]
+        if draw(st.booleans()):
+            vary.append({"field": field, "from": low, "to": high, "number": draw(st.integers(2, 5)), "log": True})
+        else:
+            values = draw(st.lists(st.floats(low, high), min_size=1, max_size=4, unique=True))
+            vary.append({"field": field, "values": values})
+    return vary
+
+
+@settings(deadline=None, max_examples=25)
+@given(vary=grids(), repeats=st.integers(1, 3))
+def test_a_grid_has_every_combination_once_at_its_own_place(vary: list[dict[str, Any]], repeats: int) -> None:
+    plan = plan_of(study(vary, repeats=repeats))
+    assert len(plan.points) == np.prod(plan.shape)
+    assert [point.place for point in plan.points] == list(np.ndindex(plan.shape))
+    keys = list(plan.levels)
+    for point in plan.points:
+        for field, value in point.values.items():
+            assert plan.levels[field][point.place[keys.index(field)]] == value
+            assert point.case.changes[field] == value
+        if repeats > 1:
+            assert point.case.changes["seed"] == plan.levels["repeat"][point.place[-1]]
+    assert len({json.dumps(dict(point.case.changes)) for point in plan.points}) == len(plan.points)
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    design=st.sampled_from(["random", "sobol"]),
+    few=st.integers(1, 40),
+    more=st.integers(0, 60),
+    seed=st.integers(0, 99),
+)
+def test_more_samples_leave_the_earlier_ones_as_they_are(design: str, few: int, more: int, seed: int) -> None:
+    def drawn(n: int, of_seed: int) -> Plan:
+        return plan_of(study(RANGES, design=design, samples=n, seed=of_seed))
+
+    first = drawn(few, seed)
+    assert drawn(few + more, seed).samples[:few] == first.samples
+    assert drawn(few, seed + 1).samples != first.samples
+
+
+@settings(deadline=None, max_examples=25)
+@given(design=st.sampled_from(["random", "lhs", "sobol"]), n=st.integers(1, 64), seed=st.integers(0, 99))
+def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int) -> None:
+    vary = [*RANGES, {"field": SEGMENTS, "from": 3, "to": 6}, LISTED[1]]
+    for gate, tolerance, n_segments, scheme in plan_of(study(vary, design=design, samples=n, seed=seed)).samples:
+        assert 100.0 <= gate <= 600.0
+        assert 0.001 <= tolerance <= 0.02
+        assert n_segments in (3, 4, 5, 6)
+        assert isinstance(n_segments, int)
+        assert scheme in ("euler", "heun")
+
+
+@settings(deadline=None, max_examples=15)
+@given(n=st.integers(1, 50), seed=st.integers(0, 99))
+def test_a_latin_hypercube_has_one_sample_in_every_row_and_column(n: int, seed: int) -> None:
+    shares = unit_samples(study(RANGES, design="lhs", samples=n, seed=seed), 2)
+    for column in shares.T:
+        assert sorted(np.floor(column * n).astype(int).tolist()) == list(range(n))
+
+
+def test_whole_numbers_are_drawn_alike_often() -> None:
+    plan = plan_of(study([{"field": SEGMENTS, "from": 3, "to": 6}], design="sobol", samples=64))
+    assert [sample[0] for sample in plan.samples].count(3) == 16
+    assert [sample[0] for sample in plan.samples].count(6) == 16
+
+
+def test_fields_may_be_nested_and_lack_their_units() -> None:
+    nested = load_study(
+        {
+            "preset": "riddle2023-rods",
+            "set": {"arena": {"friction": 0.4}, "controller.kind": "sns-robust", "duration": 0.5},
+            "vary": [{"field": "sensor.tolerance", "values": [0.001]}],
+        }
+    )
+    (point,) = plan_of(nested).points
+    config = point.case.config
+    assert config.arena is not None
+    assert (config.arena.friction, config.controller.kind, config.duration_s) == (0.4, "sns-robust", 0.5)
+    assert list(point.values) == [TOLERANCE]
+    assert config.sensor.tolerance_m == 0.001
+    assert flattened({"a": {"b": {"c": 1}, "d": [2]}}) == {"a.b.c": 1, "a.d": [2]}
+
+
+ONE = [{"field": GATE, "values": [100.0]}]
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"preset": "riddle2022"}, "unknown preset 'riddle2022'"),
+        ({"vary": []}, "vary = .*must have at least 1"),
+        ({"vary": [{"field": GATE}]}, f"vary '{GATE}' says nothing to take"),
+        ({"vary": [{"field": GATE, "values": [1.0], "from": 1.0}]}, "says two things"),
+        ({"vary": [{"field": GATE, "from": 1.0, "number": 3}]}, r"from = 1.0 must be given, and be below to"),
+        ({"vary": [{"field": GATE, "from": 2.0, "to": 1.0, "number": 3}]}, "be below to = 1.0"),
+        ({"vary": [{"field": GATE, "from": 0.0, "to": 1.0, "number": 3, "log": True}]}, "above 0 where log"),
+        ({"vary": [{"field": GATE, "from": 1.0, "to": 2.0}]}, "number must be given in a grid"),
+        ({"vary": [{"field": GATE, "values": [1.0, 1.0]}]}, "none twice"),
+        ({"vary": [{"field": GATE, "values": ["a"]}]}, "vary.0.values.0 = 'a': must be a number"),
+        ({"vary": [{"field": GATE, "values": [1.0], "number": 2}]}, "log and number are of a range"),
+        ({"vary": [{"field": GATE, "form": 1.0}]}, r"unknown field 'vary.0.form': did you mean 'from'\?"),
+        ({"vary": [{"field": "controller.gate_ms", "values": [1.0]}]}, "vary: unknown field .* did you mean"),
+        ({"vary": [*ONE, *ONE]}, "stands twice"),
+        ({"vary": [{"field": "controller.scheme", "from": 1.0, "to": 2.0, "number": 2}]}, "no number with a range"),
+        ({"vary": [{"field": SEGMENTS, "from": 3, "to": 5, "number": 4}]}, "only 3 values to tell apart"),
+        ({"vary": [{"field": SEGMENTS, "from": 3.5, "to": 5, "number": 2}]}, "must be whole numbers"),
+        ({"vary": [{"field": "seed", "values": [1, 2]}], "repeats": 2}, "both set the seed"),
+        ({"set": {"body": {"gian": 1.0}}}, "unknown field 'body.gian'"),
+        ({"design": "halton"}, "design = 'halton': must be one of 'grid'"),
+        ({"design": "sobol"}, "samples must be given for design = 'sobol'"),
+        ({"samples": 4}, "has no effect on design = 'grid'"),
+        ({"design": "lhs", "samples": 4, "vary": [RANGES[0] | {"number": 3}]}, "number = 3 has no effect on design"),
+        ({"repeats": 0}, "repeats = 0: must be at least 1"),
+        ({"repeats": 1_000_000, "vary": LISTED}, "4,000,000 runs: at most 1,000,000"),
+        ({"outputs": ["speed"]}, "outputs: unknown number 'speed': did you mean"),
+        ({"outputs": ["period_s"], "rank": "travel_m"}, "rank = 'travel_m': must be one of the outputs"),
+        ({"rank": "contact_duty"}, "rank = 'contact_duty'"),
+        ({"keep": "all"}, "keep = 'all': must be one of"),
+        ({"cluster": {"kind": "slurm", "jobs": 0}}, "cluster.jobs = 0: must be at least 1"),
+        ({"vary": [{"field": "body.gain", "values": [-1.0, -2.0]}]}, "body.gain = -1.0"),
+    ],
+)
+def test_what_is_no_study_is_refused_in_a_sentence(fields: Mapping[str, Any], words: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=words):
+        swept(load_study({"preset": "riddle2022-planar", "vary": ONE, **fields}), tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("path", "unit"),
+    [
+        ("arena.radius_m", "m"),
+        ("body.rings.speed_limit_m_per_s", "m/s"),
+        ("controller.activation_slope_per_mV", "1/mV"),
+        ("arena.friction", ""),
+        ("body.mesh.n_segments", ""),
+        ("m", ""),
+    ],
+)
+def test_the_unit_is_what_ends_a_fields_name(path: str, unit: str) -> None:
+    assert unit_of(path) == unit
+
+
+def test_every_number_of_summary_gait_and_balance_is_told() -> None:
+    words = {"name", "status", "order", "onsets_s", "energy"}
+    told = set(NUMBERS)
+    for record, prefix in ((Summary, ""), (Gait, ""), (EnergyBalance, "energy_")):
+        own = {field.name for field in dataclasses.fields(record)} - words
+        assert {prefix + name for name in own} <= told
+    assert "gait_period_s" in told
+
+
+REFUSED = [{"field": "body.gain", "values": [1.31, 1e4, -1.0]}, LISTED[0]]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+    """Six runs twice, of which some are refused by the plant, others by the configuration."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweeping, "workers_of", lambda cluster, jobs: Here())
+        wanted = study(REFUSED, repeats=2, rank="ring_length_min_m")
+        return swept(wanted, tmp_path_factory.mktemp("sweep"))
+
+
+def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
+    data = dataset_of(done)
+    assert dict(data.sizes) == {"body.gain": 3, SEGMENTS: 2, "repeat": 2, "segment": 4}
+    assert data["body.gain"].values.tolist() == [1.31, 1e4, -1.0]
+    for name, variable in data.variables.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
+    good = data.sel({"body.gain": 1.31})
+    assert set(good.status.values.ravel()) == {"complete"}
+    assert len(set(good.run.values.ravel())) == good.run.size
+    for run in done.runs:
+        if run.outcome is not None:
+            here = data.isel(dict(zip(done.plan.levels, run.point.place, strict=True)))
+            assert here.ring_length_min_m == run.outcome.summary.ring_length_min_m
+            told = here.elongation_mean_max_m.values
+            assert told[~np.isnan(told)].tolist() == run.outcome.summary.elongation_mean_max_m
+            assert annelid.open_run(done.folder / "runs" / str(here.run.values)).config.seed == here["repeat"]
+    assert data.elongation_mean_max_m.sel({SEGMENTS: 3, "segment": 4}).isnull().all()
+    assert data.attrs["n_failed"] == 8
+
+
+def test_failed_runs_are_listed_with_their_reason(done: Sweep) -> None:
+    data = dataset_of(done)
+    bad = data.isel({"body.gain": [1, 2]})
+    assert set(bad.status.values.ravel()) == {"failed"}
+    assert all("overshoot" in reason for reason in bad.reason.values[0].ravel())
+    assert all("body.gain = -1.0" in reason for reason in bad.reason.values[1].ravel())
+    assert bad.period_s.isnull().all()
+    assert sorted(number for _, numbers in failures(done) for number in numbers) == list(range(4, 12))
+
+
+def test_results_are_written_and_read_back_alike(done: Sweep) -> None:
+    data = dataset_of(done)
+    paths = write_results(done, data)
+    assert [path.name for path in paths] == ["sweep.nc", "sweep.csv", "sweep.png"]
+    read = xr.load_dataset(paths[0], engine="h5netcdf")
+    assert read.sel({"body.gain": 1.31}).ring_length_min_m.equals(data.sel({"body.gain": 1.31}).ring_length_min_m)
+    assert read.status.values.tolist() == data.status.values.tolist()
+    assert load_study(json.loads(read.attrs["study"])) == done.plan.study
+    assert len(paths[1].read_text().splitlines()) == 13
+    assert told_numbers(done, data)[0] == "ring_length_min_m"
+    assert results_table(done, data).row_count == 4
+
+
+def test_a_second_sweep_computes_what_is_missing_only(tmp_path: Path) -> None:
+    def mtimes() -> dict[str, int]:
+        return {path.parent.name: path.stat().st_mtime_ns for path in tmp_path.glob(f"out/runs/*/{FILE_NAME}")}
+
+    sobol = {"preset": "riddle2022-planar", "set": {"duration_s": 0.1}, "vary": RANGES, "design": "sobol"}
+    few = annelid.sweep({**sobol, "samples": 2}, tmp_path / "out")
+    before = mtimes()
+    more = annelid.sweep({**sobol, "samples": 3}, tmp_path / "out")
+    after = mtimes()
+    assert (len(before), len(after)) == (2, 3)
+    assert before.items() <= after.items()
+    assert more.run.values[:2].tolist() == few.run.values.tolist()
+    assert more[GATE].dims == ("sample",)
+    assert (
+        annelid.sweep(load_study({**sobol, "samples": 3}), tmp_path / "out")
+        .drop_vars("real_time_factor")
+        .equals(more.drop_vars("real_time_factor"))
+    )
+
+
+def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
+    data = annelid.sweep(
+        study(ONE, keep="outcomes", outputs=["duration_s", "muscle_work_J"]).model_dump(by_alias=True), tmp_path
+    )
+    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm"}
+    assert not list(tmp_path.glob(f"runs/*/{FILE_NAME}"))
+    assert data.duration_s.values == pytest.approx(0.2)

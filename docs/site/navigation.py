@@ -22,7 +22,7 @@ def entries(nav: list[Any]) -> Iterator[str]:
     for entry in nav:
         if isinstance(entry, dict):
             for section in entry.values():
-                yield from entries(section)
+                yield from entries(section) if isinstance(section, list) else (section,)
         else:
             yield entry
 
@@ -31,7 +31,7 @@ def _filled(nav: list[Any], left: list[str]) -> list[Any]:
     filled: list[Any] = []
     for entry in nav:
         if isinstance(entry, dict):
-            filled.append({name: _filled(section, left) for name, section in entry.items()})
+            filled.append({name: _filled(below, left) if isinstance(below, list) else below for name, below in entry.items()})
         elif "*" in entry:
             # A star stands for a name within a folder, as in a shell.
             filled += [page for page in left if page.count("/") == entry.count("/") and fnmatchcase(page, entry)]

@@ -17,8 +17,8 @@ from annelid.config.checking import UNITS
 
 INTRODUCTION = """# Configuration
 
-Every field of a configuration, by its dotted path, as `--set PATH=VALUE`, a TOML file and
-`annelid.load_config(preset, {path: value})` take it. The unit at the end of a field's name may be left out
+Every field of a configuration. Its path is the section's and its name, as `--set body.mesh.radius_m=0.14`, a TOML file and
+`annelid.load_config(preset, {"body.mesh.radius_m": 0.14})` take it. The unit at the end of a name may be left out
 (`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
 
 The defaults are those of the models. A preset states every field, so its own values stand in their place:
@@ -38,7 +38,7 @@ def page() -> str:
         heading = path or "The run itself"
         lines += ["", f"{'##' if path.count('.') == 0 else '###'} {heading}{f': {kind.default}' if kind else ''}", ""]
         lines += [_prose(section), "", "| field | unit | default | allowed | meaning |", "|---|---|---|---|---|"]
-        lines += [_row(path, name, field) for name, field in section.model_fields.items() if not sections_in(field.annotation)]
+        lines += [_row(name, field) for name, field in section.model_fields.items() if _is_field(field.annotation)]
     levels = (f"| `{name}` | {level.summary} |" for name, level in LEVELS.items())
     lines += ["", "## Levels of fidelity", "", "`--fidelity LEVEL`, or `load_config(preset, fidelity=LEVEL)`.", ""]
     lines += ["| level | what it is |", "|---|---|", *levels]
@@ -64,6 +64,11 @@ def sections_in(annotation: Any) -> list[type[Section]]:
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return [annotation]
     return [section for argument in get_args(annotation) for section in sections_in(argument)]
+
+
+def _is_field(annotation: Any) -> bool:
+    """Tells a field from a section; a list of sections is a field, set as a whole."""
+    return get_origin(annotation) is tuple or not sections_in(annotation)
 
 
 def unit_of(field: str) -> str:
@@ -117,7 +122,7 @@ def _limit(mark: Any) -> str:
     return ""
 
 
-def _row(path: str, name: str, field: FieldInfo) -> str:
+def _row(name: str, field: FieldInfo) -> str:
     takes = allowed(field.annotation, tuple(_marks(field.metadata)))
     default = field.get_default(call_default_factory=True)
     if default is PydanticUndefined:
@@ -125,7 +130,7 @@ def _row(path: str, name: str, field: FieldInfo) -> str:
     else:
         shown = "not set" if default is None else f"`{toml_value(default)}`"
     meaning = "which of this section's kinds" if name == "kind" else field.description or ""
-    cells = (f"`{path}.{name}`" if path else f"`{name}`", unit_of(name), shown, takes, meaning)
+    cells = (f"`{name}`", unit_of(name), shown, takes, meaning)
     return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
 
 

@@ -35,7 +35,8 @@ that reads netCDF opens it too. [How to read a run](../how_to/read_a_run.md) sho
 says at which instant each value is taken.
 
 Every variable carries `units` and `long_name`, from which these tables are made. Signals are recorded every
-`record.signals_interval_s`, whole postures every `record.frames_interval_s`.
+`record.signals_interval_s` at the times `time` (s), whole postures every `record.frames_interval_s` at `frame_time` (s).
+`stretch_rest_length` (segment, sensor; m) has the stretch sensors' lengths at rest.
 """
 
 

@@ -1,4 +1,4 @@
-"""The commands that README and pages tell a reader to type: where they stand, and how they are cut into words."""
+"""What README and pages tell a reader to type: commands, Python and files, in the order in which they stand."""
 
 from __future__ import annotations
 
@@ -12,69 +12,84 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 ROOT = Path(__file__).parent.parent.parent
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
-PROGRAMS = ("annelid", "mkdocs", "pip", "pytest", "python")
+PAGES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+}
+PROGRAMS = ("annelid", "pip", "pytest", "python", "python3")
 SHELLS = ("", "sh", "bash", "shell")
-# A reader replaces what a page calls by a word in capitals, such as RUN or LEVEL.
-SEPARATORS = ("&&", ";", "|", ">")
+BETWEEN_COMMANDS = ("&&", ";", "|", ">")
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One command line.
+    """A command line, cut into words as a shell cuts it, from the program's name on."""
 
-    Attributes:
-        page: Path of the page, relative to the repository.
-        words: The command, cut as a shell cuts it, from the program's name on.
-    """
-
-    page: str
     words: tuple[str, ...]
 
-    @property
-    def line(self) -> str:
-        """The command as one would type it."""
+    def __str__(self) -> str:
         return shlex.join(self.words)
 
 
-def commands_of(page: Path) -> list[Command]:
-    """Returns the commands of a page, in order: of its shell blocks, and those that stand in a sentence."""
-    tokens = MarkdownIt("commonmark").enable("table").parse(page.read_text(encoding="utf-8"))
-    name = str(page.relative_to(ROOT))
-    lines = (line for token in tokens for line in _command_lines(token))
-    return [Command(name, words) for line in lines for words in _cut(line)]
+@dataclass(frozen=True, slots=True)
+class Script:
+    """A block of Python."""
+
+    code: str
 
 
-def files_of(page: Path) -> dict[str, str]:
-    """Returns the files that a page tells a reader to write: fenced blocks with a title, by that title."""
-    tokens = MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
-    titled = ((re.search(r'title="([^"]+)"', token.info), token.content) for token in tokens if token.type == "fence")
-    return {match[1]: text for match, text in titled if match}
+@dataclass(frozen=True, slots=True)
+class Written:
+    """A file that the reader is told to write: a block with a title."""
+
+    name: str
+    text: str
 
 
-def _command_lines(token: Token) -> Iterator[str]:
-    if token.type == "code_block" or (token.type == "fence" and token.info.split(" ")[0] in SHELLS):
-        yield from re.sub(r"\\\n\s*", " ", token.content).splitlines()
+Step = Command | Script | Written
+
+
+def steps_of(page: str) -> list[Step]:
+    """Returns what a page tells its reader to do, in order."""
+    tokens = MarkdownIt("commonmark").enable("table").parse(PAGES[page])
+    return [step for token in tokens for step in _steps(token)]
+
+
+def commands_of(page: str) -> list[Command]:
+    """Returns the commands of a page, those of its blocks and those within sentences, in order."""
+    return [step for step in steps_of(page) if isinstance(step, Command)]
+
+
+def _steps(token: Token) -> Iterator[Step]:
+    language = token.info.split(" ")[0]
+    title = re.search(r'title="([^"]+)"', token.info)
+    if token.type == "fence" and title:
+        yield Written(title[1], token.content)
+    elif token.type == "fence" and language == "python":
+        yield Script(token.content)
+    elif token.type == "code_block" or (token.type == "fence" and language in SHELLS):
+        for line in re.sub(r"\\\n\s*", " ", token.content).splitlines():
+            yield from _commands(line)
     for child in token.children or ():
         if child.type == "code_inline":
-            yield child.content.replace("\n", " ")
+            yield from _commands(child.content.replace("\n", " "))
 
 
-def _cut(line: str) -> Iterator[tuple[str, ...]]:
-    """Cuts a line where a shell starts another command, and leaves out what is none of our programs'."""
-    if not re.match(rf"(\S+=\S+ )*(\S*/)?({'|'.join(PROGRAMS)})( |$)", line.strip()):
+def _commands(line: str) -> Iterator[Command]:
+    """Cuts a line where a shell starts another command; what is none of our programs' is left out."""
+    if not re.match(rf"(\w+=\S+ )*(\S*/)?({'|'.join(PROGRAMS)})( |$)", line.strip()):
         return
     lexer = shlex.shlex(line.strip(), posix=True, punctuation_chars=";|&>")
     lexer.whitespace_split = True
     lexer.commenters = ""
     words: list[str] = []
-    redirected = False
     for word in (*lexer, ";"):
-        if word in SEPARATORS:
-            if words and not redirected and Path(words[0]).name in PROGRAMS:
-                yield (Path(words[0]).name, *words[1:])
-            words, redirected = [], word == ">"
-        elif not (redirected and not words):
+        if word not in BETWEEN_COMMANDS:
             words.append(word)
-        else:
-            redirected = False
+            continue
+        while words and re.fullmatch(r"\w+=.*", words[0]):
+            del words[0]
+        # What follows ">" is a file, and so no program of ours.
+        if words and Path(words[0]).name in PROGRAMS:
+            yield Command((Path(words[0]).name, *words[1:]))
+        words = []

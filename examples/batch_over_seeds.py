@@ -30,7 +30,9 @@ def main(folder: Path, noise_m: float = 0.005, duration_s: float = 8.0, seeds: S
         if period_s is not None:
             periods_s.append(period_s)
     if periods_s:
-        print(f"period {np.mean(periods_s):.3f} s, scatter {1000 * np.std(periods_s):.0f} ms over {len(periods_s)} worms")
+        print(
+            f"period {np.mean(periods_s):.3f} s, scatter {1000 * np.std(periods_s):.0f} ms over {len(periods_s)} worms"
+        )
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
     python examples/compare_with_measured_data.py [picture.png]
 
 The measurement is the authors' (src/annelid/data). A file of yours has the same three columns: cable displacement in
-mm, force in N, time in s. Takes half a minute.
+mm, force in N, time in s. What the simulated loop lacks is friction: docs/calibration.md. Takes half a minute.
 """
 
 from __future__ import annotations

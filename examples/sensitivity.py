@@ -37,8 +37,8 @@ def main(folder: Path, duration_s: float = 6.0) -> None:
         value = base
         for name in field.split("."):
             value = getattr(value, name)
-        for factor in (1 - STEP, 1 + STEP):
-            configs.append(load_config(PRESET, {"duration_s": duration_s, field: factor * value}))
+        changes = ({"duration_s": duration_s, field: factor * value} for factor in (1 - STEP, 1 + STEP))
+        configs += [load_config(PRESET, change) for change in changes]
     results = [summary(run) for run in simulate_batch(configs, folder)]
     table = Table("raised by 1 %", "elongation (%)", "period (%)")
     for field, low, high in zip(FIELDS, results[::2], results[1::2], strict=True):

@@ -14,12 +14,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import yaml
+
 import command_reference
 import configuration_reference
 import examples_page
 import notebooks
 import run_file_reference
-import yaml
 from navigation import expanded
 
 ROOT = Path(__file__).parent.parent.parent

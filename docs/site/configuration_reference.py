@@ -17,13 +17,13 @@ from annelid.config.checking import UNITS
 
 INTRODUCTION = """# Configuration
 
-Every field of a configuration. Its path is the section's and its name, as `--set body.mesh.radius_m=0.14`, a TOML file and
-`annelid.load_config(preset, {"body.mesh.radius_m": 0.14})` take it. The unit at the end of a name may be left out
+Every field of a configuration. Its path is the section's and its name, as `--set body.mesh.radius_m=0.14`, a TOML file
+and `annelid.load_config(preset, {"body.mesh.radius_m": 0.14})` take it. The unit at the end of a name may be left out
 (`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
 
 The defaults are those of the models. A preset states every field, so its own values stand in their place:
-`annelid presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which fields
-it has, and a section whose kind changes starts from that kind's defaults.
+`annelid presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
+fields it has, and a section whose kind changes starts from that kind's defaults.
 """
 LARGEST = 1e15
 """Bound of numbers that have none by their nature; not worth telling."""
@@ -99,7 +99,11 @@ def allowed(annotation: Any, bounds: tuple[Any, ...] = ()) -> str:
         if members[-1] is Ellipsis:
             return f"list, each {allowed(members[0])}"
         words = list(dict.fromkeys(allowed(member) for member in members))
-        return f"list of {len(members)}: {', '.join(words)}" if len(words) > 1 else f"list of {len(members)}, each {words[0]}"
+        return (
+            f"list of {len(members)}: {', '.join(words)}"
+            if len(words) > 1
+            else f"list of {len(members)}, each {words[0]}"
+        )
     name = {float: "number", int: "whole number", bool: "true or false", str: "text"}.get(annotation, "table")
     limits = " and ".join(filter(None, map(_limit, bounds)))
     return f"{name} {limits}".strip() if annotation in (float, int) else name

@@ -17,13 +17,13 @@ def page(folder: Path) -> str:
     lines = [
         "# Examples",
         "",
-        "Short programs in the folder `examples` of the repository, each under 60 lines and run by the tests. Copy one and",
-        "change it.",
+        "Short programs in the folder `examples` of the repository, each under 60 lines and run by the tests. Copy one",
+        "and change it.",
         "",
         "| example | what it is for |",
         "|---|---|",
         *(f"| [{name}](#{name}) | {purpose} |" for name, purpose in purposes.items()),
     ]
     for name, code in examples.items():
-        lines += ["", f"## {name} {{ #{name} }}", "", f"```python title=\"examples/{name}.py\"", code.rstrip(), "```"]
+        lines += ["", f"## {name} {{ #{name} }}", "", f'```python title="examples/{name}.py"', code.rstrip(), "```"]
     return "\n".join(lines) + "\n"

@@ -31,7 +31,9 @@ def _filled(nav: list[Any], left: list[str]) -> list[Any]:
     filled: list[Any] = []
     for entry in nav:
         if isinstance(entry, dict):
-            filled.append({name: _filled(below, left) if isinstance(below, list) else below for name, below in entry.items()})
+            filled.append(
+                {name: _filled(below, left) if isinstance(below, list) else below for name, below in entry.items()}
+            )
         elif "*" in entry:
             # A star stands for a name within a folder, as in a shell.
             filled += [page for page in left if page.count("/") == entry.count("/") and fnmatchcase(page, entry)]

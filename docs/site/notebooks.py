@@ -64,7 +64,9 @@ def executed(text: str) -> Any:
     """Runs a notebook from top to bottom in an empty folder, and returns it with its outputs."""
     notebook = jupytext.reads(text, fmt="md")
     with TemporaryDirectory() as folder:
-        client = NotebookClient(notebook, timeout=TIMEOUT_S, kernel_name="python3", resources={"metadata": {"path": folder}})
+        client = NotebookClient(
+            notebook, timeout=TIMEOUT_S, kernel_name="python3", resources={"metadata": {"path": folder}}
+        )
         return client.execute()
 
 
@@ -98,7 +100,7 @@ def _shown(output: Any, name: str, files: dict[str, bytes]) -> list[str]:
 
 def _text(text: str) -> str:
     lines = "\n".join(line.rstrip() for line in CODES_OF_COLOURS.sub("", text).strip("\n").splitlines())
-    return f'```text {{ .output }}\n{lines}\n```'
+    return f"```text {{ .output }}\n{lines}\n```"
 
 
 def _digest(text: str) -> str:
@@ -107,4 +109,3 @@ def _digest(text: str) -> str:
     for path in sorted(path for path in sources.rglob("*") if path.suffix in (".py", ".toml", ".csv")):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
-

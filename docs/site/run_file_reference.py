@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from configuration_reference import sections_in
-
 from annelid.config import load_config
 from annelid.config.controllers import ControllerSection
 from annelid.protocols import Records, Signal
 from annelid.simulation import build_controller, build_plant
 from annelid.simulation.recorder import loop_signals
+from configuration_reference import sections_in
 
 BODIES = {
     "riddle2023-rods": "rods",
@@ -30,13 +29,13 @@ WITH_ALL_SIGNALS = {
 """What kinds of controllers must be told before they record all that they can."""
 INTRODUCTION = """# The run file
 
-`run.nc` is netCDF-4. `annelid.open_run(path)` opens it, cut to what was written and with its configuration; any program
-that reads netCDF opens it too. [How to read a run](../how_to/read_a_run.md) shows both; [Architecture](../architecture.md#the-run-file)
-says at which instant each value is taken.
+`run.nc` is netCDF-4. `annelid.open_run(path)` opens it, cut to what was written and with its configuration; any
+program that reads netCDF opens it too. [How to read a run](../how_to/read_a_run.md) shows both;
+[Architecture](../architecture.md#the-run-file) says at which instant each value is taken.
 
 Every variable carries `units` and `long_name`, from which these tables are made. Signals are recorded every
-`record.signals_interval_s` at the times `time` (s), whole postures every `record.frames_interval_s` at `frame_time` (s).
-`stretch_rest_length` (segment, sensor; m) has the stretch sensors' lengths at rest.
+`record.signals_interval_s` at the times `time` (s), whole postures every `record.frames_interval_s` at `frame_time`
+(s). `stretch_rest_length` (segment, sensor; m) has the stretch sensors' lengths at rest.
 """
 
 

@@ -2,9 +2,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import build_site
 import notebooks
-import pytest
 
 
 @pytest.fixture(scope="session")

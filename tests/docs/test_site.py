@@ -7,17 +7,17 @@ import re
 import subprocess
 from pathlib import Path
 
-import build_site
-import configuration_reference
-import notebooks
 import pytest
-import run_file_reference
 from doc_commands import PAGES, ROOT
-from navigation import entries, expanded
 from site_pages import broken_links, fetched_from_elsewhere
 
 import annelid
+import build_site
+import configuration_reference
+import notebooks
+import run_file_reference
 from annelid.config import field_paths
+from navigation import entries, expanded
 
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 
@@ -70,7 +70,9 @@ def test_the_reference_has_every_field_of_the_configuration() -> None:
     page = configuration_reference.page()
     for path in field_paths():
         section, _, leaf = path.rpartition(".")
-        headings = [part for part in re.split(r"\n##+ ", page) if re.match(rf"{re.escape(section) or 'The run'}[: \n]", part)]
+        headings = [
+            part for part in re.split(r"\n##+ ", page) if re.match(rf"{re.escape(section) or 'The run'}[: \n]", part)
+        ]
         assert any(f"| `{leaf}` |" in part for part in headings), path
 
 

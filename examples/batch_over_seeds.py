@@ -1,4 +1,4 @@
-"""How much noise can a rhythm bear? Eight worms with the same noise on their sensors, each from another seed.
+"""How much does noise scatter a rhythm? Eight worms with the same noise on their sensors, each from another seed.
 
     python examples/batch_over_seeds.py [noise in mm]
 
@@ -18,7 +18,7 @@ from annelid import load_config, simulate_batch, summary
 from annelid.analysis import rhythm_score
 
 
-def main(folder: Path, noise_m: float = 0.005, duration_s: float = 8.0, seeds: Sequence[int] = range(8)) -> None:
+def main(folder: Path, noise_m: float = 0.025, duration_s: float = 8.0, seeds: Sequence[int] = range(8)) -> None:
     """Runs the batch, scores every worm, and tells the scatter of their periods."""
     config = load_config("riddle2023-rods", {"sensor.noise_m": noise_m, "duration_s": duration_s})
     batch = simulate_batch(config, folder, seeds=seeds)
@@ -37,4 +37,4 @@ def main(folder: Path, noise_m: float = 0.005, duration_s: float = 8.0, seeds: S
 
 if __name__ == "__main__":
     with TemporaryDirectory() as temporary:
-        main(Path(temporary), float(sys.argv[1]) / 1000 if len(sys.argv) > 1 else 0.005)
+        main(Path(temporary), float(sys.argv[1]) / 1000 if len(sys.argv) > 1 else 0.025)

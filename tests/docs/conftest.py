@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -11,9 +12,7 @@ import notebooks
 @pytest.fixture(scope="session")
 def tutorials_run_once(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Outputs of tutorials are kept for these tests only, whatever was built on this machine before."""
-    patch = pytest.MonkeyPatch()
-    patch.setenv(notebooks.CACHE_VARIABLE, str(tmp_path_factory.mktemp("tutorials")))
-    # The cache lasts as long as the session.
+    os.environ[notebooks.CACHE_VARIABLE] = str(tmp_path_factory.mktemp("tutorials"))
 
 
 @pytest.fixture(scope="session")

@@ -69,7 +69,8 @@ def _steps(token: Token) -> Iterator[Step]:
         yield Script(token.content)
     elif token.type == "code_block" or (token.type == "fence" and language in SHELLS):
         for line in re.sub(r"\\\n\s*", " ", token.content).splitlines():
-            yield from _commands(line)
+            # What stands apart from a command says what it does.
+            yield from _commands(re.split(r"\s{2,}", line.strip())[0])
     for child in token.children or ():
         if child.type == "code_inline":
             yield from _commands(child.content.replace("\n", " "))

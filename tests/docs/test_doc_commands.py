@@ -17,33 +17,36 @@ import annelid
 from annelid.cli import app
 from annelid.cli.common import config_of, or_default, overrides_of
 
-MEANT = {"RUN": "run", "NAME": "riddle2023", "LEVEL": "fast", "COMMAND": "run"}
+MEANT = {"RUN": "run", "RUN..": "run", "NAME": "riddle2023", "LEVEL": "fast", "COMMAND": "run"}
 """What stands in a page for something that the reader chooses; RUN is the latest run."""
 
 QUICK = {
-    ("annelid", "run", "--resume"): ("--duration", "0.12", "--quiet", "--no-video"),
+    ("annelid", "run", "--resume"): ("--duration", "0.06", "--quiet", "--no-video"),
     # The chain takes fourteen seconds for one of simulated time.
     ("annelid", "run", "riddle2023"): ("--duration", "0.02", "--quiet", "--no-video"),
-    ("annelid", "run"): ("--duration", "0.1", "--quiet", "--no-video"),
+    ("annelid", "run"): ("--duration", "0.04", "--quiet", "--no-video"),
     ("annelid", "render"): (),
     ("annelid", "plot"): (),
     ("annelid", "show"): (),
     ("annelid", "build"): ("--force",),
     ("annelid", "presets"): (),
     ("annelid", "arenas"): (),
+    ("annelid", "cite"): (),
+    ("annelid", "compare"): (),
     ("annelid", "doctor"): (),
+    ("annelid", "export"): ("--force",),
     ("annelid", "--help"): (),
 }
 """Commands that are executed, and what shortens each; an option that is given twice counts as given last."""
 
-CHANGED_WORDS = {"--time": "0.08"}
+CHANGED_WORDS = {"--time": "0.04"}
 """Values of options that would not fit a shortened run."""
 
 SCRIPTS = (
-    (r'"duration_s": [\d.]+', '"duration_s": 0.1'),
-    (r'("arena\.friction": [\w.]+)}', r'\1, "duration_s": 0.1}'),
-    (r'simulate\("riddle2023-rods"', 'simulate(annelid.load_config("riddle2023-rods", {"duration_s": 0.1})'),
-    (r'(open_run\("long"\)\n.*)"duration_s": 0\.1', r'\1"duration_s": 0.2'),
+    (r'"duration_s": [\d.]+', '"duration_s": 0.04'),
+    (r'("arena\.friction": [\w.]+)}', r'\1, "duration_s": 0.04}'),
+    (r'simulate\("riddle2023-rods"', 'simulate(annelid.load_config("riddle2023-rods", {"duration_s": 0.04})'),
+    (r'(open_run\("long"\)\n.*)"duration_s": 0\.04', r'\1"duration_s": 0.08'),
 )
 """What shortens the Python on a page."""
 
@@ -74,6 +77,8 @@ ELSEWHERE = {
     ("python", "benchmarks/"): "minutes each; their arguments are read here",
     ("python", "docs/site/"): "tests/docs/test_site.py builds the site",
     ("python", "-c"): "arithmetic",
+    ("annelid", "sweep"): "minutes, and workers; the command has tests of its own",
+    ("annelid", "view"): "it opens a browser; the command has tests of its own",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
     ("annelid", "render", "course", "--video", "course.mp4", "--camera", "course"): "docs/turning.md executes it",
 }
@@ -103,7 +108,7 @@ def chosen(command: Command) -> tuple[str, ...]:
 
 def names_only(command: Command) -> bool:
     """Whether it is the bare name of a command that needs an argument, as in a sentence about it."""
-    return command.words in {("annelid", name) for name in ("plot", "render", "show")}
+    return command.words in {("annelid", name) for name in ("compare", "export", "plot", "render", "show")}
 
 
 def parsed(words: Sequence[str]) -> tuple[str, dict[str, Any]]:
@@ -215,7 +220,7 @@ def run_command(command: Command, folder: Path) -> None:
     shorter = rule_of(QUICK, command)
     if shorter is None or rule_of(LONG, command) or rule_of(ELSEWHERE, command) or names_only(command):
         return
-    words = [str(latest_run(folder)) if word == "RUN" else word for word in command.words]
+    words = [str(latest_run(folder)) if word in ("RUN", "RUN..") else word for word in command.words]
     words = [MEANT.get(word, word) for word in words]
     if words[-1] == "--arena":
         return
@@ -231,7 +236,7 @@ def run_command(command: Command, folder: Path) -> None:
 def latest_run(folder: Path) -> Path:
     """The run of this page that was made last; the reader's own where it makes none."""
     if not list(folder.rglob("run.nc")):
-        annelid.simulate(annelid.load_config("riddle2023-rods", {"duration_s": 0.1}), folder / "own", progress=False)
+        annelid.simulate(annelid.load_config("riddle2023-rods", {"duration_s": 0.04}), folder / "own", progress=False)
     return max(folder.rglob("run.nc"), key=lambda path: path.stat().st_mtime).parent
 
 

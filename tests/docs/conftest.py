@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,9 +10,11 @@ import notebooks
 
 
 @pytest.fixture(scope="session")
-def tutorials_run_once(tmp_path_factory: pytest.TempPathFactory) -> None:
+def tutorials_run_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Outputs of tutorials are kept for these tests only, whatever was built on this machine before."""
-    os.environ[notebooks.CACHE_VARIABLE] = str(tmp_path_factory.mktemp("tutorials"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(notebooks.CACHE_VARIABLE, str(tmp_path_factory.mktemp("tutorials")))
+        yield
 
 
 @pytest.fixture(scope="session")

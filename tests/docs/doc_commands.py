@@ -68,7 +68,7 @@ def _steps(token: Token) -> Iterator[Step]:
     elif token.type == "fence" and language == "python":
         yield Script(token.content)
     elif token.type == "code_block" or (token.type == "fence" and language in SHELLS):
-        for line in re.sub(r"\\\n\s*", " ", token.content).splitlines():
+        for line in re.sub(r"\s*\\\n\s*", " ", token.content).splitlines():
             # What stands apart from a command says what it does.
             yield from _commands(re.split(r"\s{2,}", line.strip())[0])
     for child in token.children or ():

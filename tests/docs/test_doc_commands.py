@@ -84,10 +84,17 @@ ELSEWHERE = {
 }
 """Commands that are not executed here, and why."""
 
+SCRIPTS_ELSEWHERE = {
+    "docs/tutorials/": "tests/docs/test_site.py runs the tutorials",
+    "docs/upstream/": "whole reproductions of what the engine does, half a minute each",
+}
+"""Pages whose Python is not executed here, and why."""
+
 READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n'}
 """Files of the reader's own that a page takes for granted."""
 
 done: set[Command] = set()
+"""Commands that have been executed on some page."""
 
 
 def starts_with(words: Sequence[str], start: Sequence[str]) -> bool:
@@ -195,18 +202,21 @@ def test_what_takes_seconds_is_executed(page: str, tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("annelid.view.gallery.draw_all", lambda *_, **__: [])
     for name, text in READERS_FILES.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    steps = steps_of(page)
-    later = {word for step in steps if isinstance(step, Command) for word in step.words[:2]}
     session: dict[str, Any] = {"__name__": "__main__"}
-    stands_alone = not later & {"show", "plot", "render"} and not any(isinstance(step, Script) for step in steps)
+    here: set[Command] = set()
+    steps = steps_of(page)
+    words = {word for step in steps if isinstance(step, Command) for word in step.words}
+    names_its_runs = bool(words & {"-o", "--out"}) or any(word.startswith("runs/") for word in words)
+    stands_alone = not names_its_runs and not any(isinstance(step, Script) for step in steps)
     for step in steps:
         if isinstance(step, Written):
             (tmp_path / step.name).write_text(step.text, encoding="utf-8")
-        elif isinstance(step, Script) and "tutorials" not in page:
+        elif isinstance(step, Script) and not page.startswith(tuple(SCRIPTS_ELSEWHERE)):
             run_script(step.code, session)
-        elif isinstance(step, Command) and not (stands_alone and step in done):
+        elif isinstance(step, Command) and step not in (done if stands_alone else here):
             run_command(step, tmp_path)
             done.add(step)
+            here.add(step)
 
 
 def run_script(code: str, session: dict[str, Any]) -> None:

@@ -17,6 +17,8 @@ import annelid
 from annelid.cli import app
 from annelid.cli.common import config_of, or_default, overrides_of
 
+ANNELID: Any = get_command(app)
+
 MEANT = {"RUN": "run", "RUN..": "run", "NAME": "riddle2023", "LEVEL": "fast", "COMMAND": "run"}
 """What stands in a page for something that the reader chooses; RUN is the latest run."""
 
@@ -120,7 +122,7 @@ def names_only(command: Command) -> bool:
 
 def parsed(words: Sequence[str]) -> tuple[str, dict[str, Any]]:
     """Reads a command line of annelid as its entry point does, without executing it."""
-    command: Any = get_command(app)
+    command: Any = ANNELID
     parent, name, rest = None, "annelid", list(words)
     while getattr(command, "commands", None):
         parent = command.make_context(name, [], parent=parent, resilient_parsing=True)
@@ -136,7 +138,7 @@ def check_annelid(command: Command) -> None:
         return
     if names_only(command) or words[-1] == "--arena":
         # In a sentence on a command or on one of its options.
-        assert words[1] in get_command(app).commands  # type: ignore[attr-defined]
+        assert words[1] in ANNELID.commands
         return
     name, given = parsed(words[1:])
     if "preset" in given and not given.get("resume") and not str(given["preset"]).endswith(".toml"):

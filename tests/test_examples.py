@@ -1,8 +1,9 @@
-"""The examples about going places do what their first lines say, on runs as short as will tell."""
+"""Every example does what its first line says, on runs as short as will tell."""
 
 from __future__ import annotations
 
 import importlib.util
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -19,6 +20,7 @@ def example(name: str) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
@@ -78,3 +80,126 @@ def test_the_best_gate_of_every_friction_is_told(tmp_path: Path, capsys: pytest.
     module.main(tmp_path, {**module.STUDY, "set": {"duration_s": 0.1}, "vary": vary}, "processes")
     assert capsys.readouterr().out == "friction 0.3: none walks\n"
     assert (tmp_path / "sweep.nc").exists()
+
+
+def test_the_body_sets_the_pace_of_a_stretch_controller(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("stretch_controller").main(tmp_path, 0.8)
+    contractions = [int(line.split()[2]) for line in capsys.readouterr().out.splitlines()]
+    assert contractions[0] > contractions[1] > contractions[2] == 1
+
+
+def test_the_baton_is_passed_by_stretch(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("network_by_name").main(tmp_path, 1.0)
+    assert annelid.summary(annelid.open_run(tmp_path)).order[:3] == [1, 2, 3]
+    assert (tmp_path / "network.svg").read_text(encoding="utf-8").count("segment6") >= 1
+    assert "fewer than two cycles" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def short_run(tmp_path_factory: pytest.TempPathFactory) -> annelid.Run:
+    config = annelid.load_config("riddle2023-rods", {"duration_s": 1.0})
+    return annelid.simulate(config, tmp_path_factory.mktemp("short"))
+
+
+def test_a_run_is_read_signal_by_signal(
+    short_run: annelid.Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    example("signals_with_xarray").main(short_run, tmp_path / "signals.csv")
+    lines = (tmp_path / "signals.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "time_s,segment1_m,segment2_m,segment3_m"
+    assert len(lines) == 11
+    assert "belly" in capsys.readouterr().out
+
+
+def test_sensitivity_is_told_for_each_field(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sensitivity = example("sensitivity")
+    monkeypatch.setattr(sensitivity, "FIELDS", ("body.springs.stiffness_N_per_m",))
+    sensitivity.main(tmp_path, 0.6)
+    row = next(line for line in capsys.readouterr().out.splitlines() if "stiffness" in line)
+    assert float(row.split("\u2502")[2]) < 0, "stiffer springs let a segment elongate less"
+
+
+def test_the_load_frame_is_laid_over_the_measured_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    compare = example("compare_with_measured_data")
+    compare.main(tmp_path / "loops.png", compare.read_loop(), displacement_m=0.15, speed_m_per_s=0.04)
+    assert (tmp_path / "loops.png").stat().st_size > 10_000
+    assert 0.5 < float(capsys.readouterr().out.split()[0]) < 10.0
+
+
+def test_two_parts_of_a_run_are_the_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("resume_a_run").main(tmp_path, 0.4)
+    assert "are the whole, bit for bit" in capsys.readouterr().out
+
+
+def test_plain_mujoco_contracts_the_ring(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = example("worm_in_plain_mujoco")
+    plain.write(tmp_path / "worm.xml")
+    plain.main(tmp_path / "worm.xml", 1.0)
+    rings_cm = [float(line.split()[3]) for line in capsys.readouterr().out.splitlines()[1:]]
+    assert min(rings_cm) < 45.0
+    assert rings_cm[-1] > 90.0
+
+
+def test_two_gaits_enter_a_pipe_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("pipe_of_your_own").main(tmp_path, 0.4)
+    assert (tmp_path / "crawler.png").stat().st_size > 10_000
+    assert capsys.readouterr().out.count("inside") == 2
+
+
+def test_a_heading_is_told_as_time_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("turn_to_a_heading").main(tmp_path, 30.0, 2.0)
+    last = capsys.readouterr().out.splitlines()[-2]
+    assert float(last.split()[2]) > 1.0, "to the left"
+
+
+def test_seeds_are_scored_one_by_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example("batch_over_seeds").main(tmp_path, 0.005, 0.4, range(2))
+    assert "seed 1: too short" in capsys.readouterr().out
+
+
+def test_all_controllers_drive_the_rod_worm(capsys: pytest.CaptureFixture[str]) -> None:
+    controllers = example("all_controllers_on_the_rod_worm")
+    controllers.main(0.1)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 1 + len(controllers.CONTROLLERS)
+
+
+def test_frictions_run_side_by_side(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = example("friction_sweep")
+    monkeypatch.setattr(sweep, "SETTINGS", {"duration_s": 0.2, "record.frames_interval_s": 0.2})
+    monkeypatch.setattr(sweep, "FRICTIONS", (0.1, 1.0))
+    sweep.main(tmp_path)
+    assert capsys.readouterr().out.count("complete") == 2
+
+
+def test_one_network_drives_four_bodies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bodies = example("one_network_on_all_bodies")
+    monkeypatch.setattr(bodies, "DURATION_S", 0.3)
+    bodies.main(tmp_path)
+    assert all(name in capsys.readouterr().out or (tmp_path / name).exists() for name in bodies.BODIES)
+
+
+def test_soft_worms_leave_the_rigid_tube(tmp_path: Path) -> None:
+    example("rigid_tube_and_soft_worms").main(tmp_path / "tube.png")
+    assert (tmp_path / "tube.png").stat().st_size > 10_000
+
+
+def test_slip_is_told_for_each_metre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    slip = example("slip_of_two_controllers")
+    monkeypatch.setattr(slip, "DURATION_S", 0.6)
+    name, speed, slip_J_per_m, work_J_per_m, afloat = slip.measure("channel, contact", tmp_path)
+    assert name == "channel, contact"
+    assert speed > 0
+    assert 0 < slip_J_per_m < work_J_per_m
+    assert 0 <= afloat <= 1
+
+
+def test_every_example_is_run_here() -> None:
+    own = Path(__file__).read_text(encoding="utf-8")
+    assert [path.stem for path in sorted(EXAMPLES.glob("*.py")) if f'example("{path.stem}")' not in own] == []

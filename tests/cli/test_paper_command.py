@@ -27,7 +27,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
     calls: Asked = []
 
     def reproduce(
-        folder: Path, effort: Effort, *, only: Sequence[str] | None, jobs: int | None, progress: Any
+        folder: Path, effort: Effort, *, only: Sequence[str] | None, jobs: int | None, workers: None, progress: Any
     ) -> Report:
         calls.append((folder, effort, only, jobs))
         if progress is not None:

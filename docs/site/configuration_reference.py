@@ -1,0 +1,143 @@
+"""The reference of the configuration, made from its models: units, defaults, bounds and meanings of all fields."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt, MinLen
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from annelid.config import LEVELS, RunConfig, Section, toml_value
+from annelid.config.checking import UNITS
+
+INTRODUCTION = """# Configuration
+
+Every field of a configuration. Its path is the section's and its name, as `--set body.mesh.radius_m=0.14`, a TOML file
+and `annelid.load_config(preset, {"body.mesh.radius_m": 0.14})` take it. The unit at the end of a name may be left out
+(`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
+
+The defaults are those of the models. A preset states every field, so its own values stand in their place:
+`annelid presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
+fields it has, and a section whose kind changes starts from that kind's defaults.
+"""
+LARGEST = 1e15
+"""Bound of numbers that have none by their nature; not worth telling."""
+SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", "uS": "µS"}
+
+
+def page() -> str:
+    """Returns the page: a table a section, with every field's unit, default, bounds and meaning."""
+    lines = [INTRODUCTION]
+    for path, section in sections_of(RunConfig, ""):
+        kind = section.model_fields.get("kind")
+        heading = path or "The run itself"
+        lines += ["", f"{'##' if path.count('.') == 0 else '###'} {heading}{f': {kind.default}' if kind else ''}", ""]
+        lines += [_prose(section), "", "| field | unit | default | allowed | meaning |", "|---|---|---|---|---|"]
+        lines += [_row(name, field) for name, field in section.model_fields.items() if _is_field(field.annotation)]
+    levels = (f"| `{name}` | {level.summary} |" for name, level in LEVELS.items())
+    lines += ["", "## Levels of fidelity", "", "`--fidelity LEVEL`, or `load_config(preset, fidelity=LEVEL)`.", ""]
+    lines += ["| level | what it is |", "|---|---|", *levels]
+    return "\n".join(lines) + "\n"
+
+
+def sections_of(model: type[Section], path: str) -> Iterator[tuple[str, type[Section]]]:
+    """Walks the tree of sections: the dotted path of each, with one entry for every kind.
+
+    Args:
+        model: The section to begin with.
+        path: Its path, empty for the whole configuration.
+    """
+    yield path, model
+    for name, field in model.model_fields.items():
+        below = f"{path}.{name}" if path else name
+        for section in sections_in(field.annotation):
+            yield from sections_of(section, below)
+
+
+def sections_in(annotation: Any) -> list[type[Section]]:
+    """Returns the sections that an annotation admits, those of a list of sections too."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    return [section for argument in get_args(annotation) for section in sections_in(argument)]
+
+
+def _is_field(annotation: Any) -> bool:
+    """Tells a field from a section; a list of sections is a field, set as a whole."""
+    return get_origin(annotation) is tuple or not sections_in(annotation)
+
+
+def unit_of(field: str) -> str:
+    """Returns the unit that ends a field's name, for example ``N/m`` of ``stiffness_N_per_m``; empty without one."""
+    words = field.split("_")
+    first = next((i for i in range(1, len(words)) if UNITS.issuperset(words[i:])), len(words))
+    above, _, below = " ".join(SYMBOLS.get(word, word) for word in words[first:]).partition("per ")
+    return f"{above.strip() or 1}/{below}" if below else above
+
+
+def allowed(annotation: Any, bounds: tuple[Any, ...] = ()) -> str:
+    """Says in words what a field takes.
+
+    Args:
+        annotation: Its type.
+        bounds: Marks of its bounds, as pydantic keeps them beside the type.
+    """
+    if get_origin(annotation) is Annotated:
+        inner, *marks = get_args(annotation)
+        return allowed(inner, (*bounds, *_marks(marks)))
+    if get_origin(annotation) in (Union, UnionType):
+        members = [member for member in get_args(annotation) if member is not NoneType]
+        return " or ".join(dict.fromkeys(allowed(member, bounds) for member in members))
+    if get_origin(annotation) is Literal:
+        return ", ".join(f"`{value}`" for value in get_args(annotation))
+    if get_origin(annotation) is tuple:
+        members = get_args(annotation)
+        if members[-1] is Ellipsis:
+            return f"list, each {allowed(members[0])}"
+        words = list(dict.fromkeys(allowed(member) for member in members))
+        return (
+            f"list of {len(members)}: {', '.join(words)}"
+            if len(words) > 1
+            else f"list of {len(members)}, each {words[0]}"
+        )
+    name = {float: "number", int: "whole number", bool: "true or false", str: "text"}.get(annotation, "table")
+    limits = " and ".join(filter(None, map(_limit, bounds)))
+    return f"{name} {limits}".strip() if annotation in (float, int) else name
+
+
+def _marks(marks: Any) -> Iterator[Any]:
+    for mark in marks:
+        if isinstance(mark, FieldInfo):
+            yield from mark.metadata
+        else:
+            yield mark
+
+
+def _limit(mark: Any) -> str:
+    for kind, words, name in ((Gt, ">", "gt"), (Ge, "≥", "ge"), (Lt, "<", "lt"), (Le, "≤", "le")):
+        if isinstance(mark, kind):
+            value = getattr(mark, name)
+            return "" if value == LARGEST else f"{words} {value:g}"
+    assert not isinstance(mark, MinLen) or mark.min_length
+    return ""
+
+
+def _row(name: str, field: FieldInfo) -> str:
+    takes = allowed(field.annotation, tuple(_marks(field.metadata)))
+    default = field.get_default(call_default_factory=True)
+    if default is PydanticUndefined:
+        shown = "must be given"
+    else:
+        shown = "not set" if default is None else f"`{toml_value(default)}`"
+    meaning = "which of this section's kinds" if name == "kind" else field.description or ""
+    cells = (f"`{name}`", unit_of(name), shown, takes, meaning)
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def _prose(section: type[Section]) -> str:
+    """A section's docstring, whose double backticks Markdown would show as they are."""
+    return re.sub(r"``(.+?)``", r"`\1`", inspect.getdoc(section) or "")

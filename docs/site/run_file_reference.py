@@ -1,0 +1,94 @@
+"""The reference of the run file, made from what the worms and their controllers record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from annelid.config import load_config
+from annelid.config.controllers import ControllerSection
+from annelid.protocols import Records, Signal
+from annelid.simulation import build_controller, build_plant
+from annelid.simulation.recorder import loop_signals
+from configuration_reference import sections_in
+
+BODIES = {
+    "riddle2023-rods": "rods",
+    "riddle2023": "chain",
+    "riddle2025": "servos",
+    "riddle2022-planar": "riddle2022",
+    "daltorio2013": "daltorio2013",
+    "boxerbaum2012": "boxerbaum2012",
+}
+"""Presets of all kinds of bodies, and what the page calls these."""
+HALF_RINGS = "riddle2025-3x1"
+WITH_ALL_SIGNALS = {
+    "program": {"contractions": [{"segment": 1, "start_s": 0.0, "stop_s": 1.0}]},
+    "sns-robust": {"let_go_s": 0.35, "descending": {"lift": 0.45}},
+}
+"""What kinds of controllers must be told before they record all that they can."""
+INTRODUCTION = """# The run file
+
+`run.nc` is netCDF-4. `annelid.open_run(path)` opens it, cut to what was written and with its configuration; any
+program that reads netCDF opens it too. [How to read a run](../how_to/read_a_run.md) shows both;
+[Architecture](../architecture.md#the-run-file) says at which instant each value is taken.
+
+Every variable carries `units` and `long_name`, from which these tables are made. Signals are recorded every
+`record.signals_interval_s` at the times `time` (s), whole postures every `record.frames_interval_s` at `frame_time`
+(s). `stretch_rest_length` (segment, sensor; m) has the stretch sensors' lengths at rest.
+"""
+
+
+def page() -> str:
+    """Returns the page: every variable with its dimensions, unit, meaning, and who records it."""
+    bodies: dict[str, list[str]] = {}
+    controllers: dict[str, list[str]] = {}
+    signals: dict[str, Signal] = {}
+    for who, signal in _of_bodies():
+        signals.setdefault(signal.name, signal)
+        bodies.setdefault(signal.name, []).append(who)
+    for who, signal in _of_controllers():
+        signals.setdefault(signal.name, signal)
+        controllers.setdefault(signal.name, []).append(who)
+    loop = {signal.name: signal for signal in loop_signals(3).signals}
+    lines = [INTRODUCTION, "## Every run", *_table(loop, {})]
+    lines += ["", "## Of bodies", *_table({name: signals[name] for name in bodies}, bodies, len(BODIES))]
+    lines += ["", "## Of controllers", *_table({name: signals[name] for name in controllers}, controllers)]
+    return "\n".join(lines) + "\n"
+
+
+def _table(signals: dict[str, Signal], who: dict[str, list[str]], everyone: int = 0) -> list[str]:
+    last = " of |" if who else ""
+    lines = ["", f"| variable | dimensions | unit | what it is |{last}", f"|---|---|---|---|{'---|' if who else ''}"]
+    for name, signal in signals.items():
+        dims = ", ".join(("frame" if signal.every_frame else "time", *signal.dims))
+        whose = "all" if len(who.get(name, ())) == everyone else ", ".join(who.get(name, ()))
+        cells = [f"`{name}`", dims, signal.units, signal.long_name, *([whose] if who else [])]
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def _of_bodies() -> Iterator[tuple[str, Signal]]:
+    for preset, kind in BODIES.items():
+        yield from ((kind, signal) for signal in _signals(build_plant(load_config(preset))))
+
+
+def _of_controllers() -> Iterator[tuple[str, Signal]]:
+    """Controllers of every kind on one body each, then what turning adds."""
+    base = load_config("riddle2023-rods")
+    plant = build_plant(base)
+    for section in sections_in(ControllerSection):
+        kind = section.model_fields["kind"].default
+        controller = {"kind": kind, **WITH_ALL_SIGNALS.get(kind, {})}
+        config = load_config("riddle2023-rods", {"controller": controller})
+        yield from ((kind, signal) for signal in _signals(build_controller(config, plant)))
+    turning = load_config(HALF_RINGS, {"turning.kind": "constant"})
+    halves = build_plant(turning)
+    seen = {signal.name for signal in _signals(build_controller(turning.model_copy(update={"turning": None}), halves))}
+    for signal in _signals(build_controller(turning, halves)):
+        if signal.name not in seen:
+            yield "turning", signal
+
+
+def _signals(part: Any) -> tuple[Signal, ...]:
+    return part.recordable().signals if isinstance(part, Records) else ()

@@ -1,0 +1,56 @@
+"""A nervous system of your own, built by name: six neurons that silence each other hand the wave on by stretch.
+
+    python examples/network_by_name.py [folder]
+
+Writes run.nc and network.svg. Takes a few seconds.
+"""
+
+from __future__ import annotations
+
+import sys
+from itertools import permutations
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import annelid
+from annelid.analysis import rhythm_score
+from annelid.nervous import Network, Neuron, Synapse
+
+RANGE_mV, GAIN_nA_per_m = 20.0, 400.0
+
+
+def baton(n_segments: int) -> Network:
+    """Builds it: all neurons are awake, the one that is up keeps the others down until stretch helps its successor."""
+    network = Network("baton")
+    names = [f"segment{number}" for number in range(1, n_segments + 1)]
+    for name in names:
+        awake = Neuron(capacitance_nF=100.0, bias_nA=RANGE_mV)
+        network.add_neuron(name, awake, initial_mV=RANGE_mV if name == names[0] else 0.0)
+    for source, target in permutations(names, 2):
+        network.add_synapse(source, target, Synapse(conductance_uS=0.6, reversal_mV=-40.0))
+    for name, successor in zip(names, names[1:] + names[:1], strict=True):
+        network.add_input(f"stretch of {name}", successor)
+    return network
+
+
+def main(folder: Path, duration_s: float = 4.0) -> None:
+    """Lets the network drive the worm and scores the rhythm."""
+    stepper = baton(6).compile(timestep_ms=1.0)
+    state = stepper.initial_state()
+
+    def drive(sensation: annelid.Sensation) -> np.ndarray:
+        lengthening_m = (sensation.stretch_m - sensation.rest_stretch_m).mean(axis=1)
+        stepper.advance(state, GAIN_nA_per_m * np.maximum(lengthening_m, 0.0))
+        return np.clip(state.potential[0] / RANGE_mV, 0.0, 1.0)
+
+    config = annelid.load_config("riddle2025-muscles", {"duration_s": duration_s})
+    score = rhythm_score(annelid.simulate(config, folder, controller=drive))
+    print(f"{score.verdict or 'too short'}: {score.reason}")
+    print(baton(6).diagram().save(folder / "network.svg"))
+
+
+if __name__ == "__main__":
+    with TemporaryDirectory() as temporary:
+        main(Path(sys.argv[1] if len(sys.argv) > 1 else temporary))

@@ -1,0 +1,265 @@
+"""Every command of README and pages is one that annelid understands, and those that take seconds are executed."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from doc_commands import PAGES, ROOT, Command, Script, Written, commands_of, steps_of
+from typer.main import get_command
+from typer.testing import CliRunner
+
+import annelid
+from annelid.cli import app
+from annelid.cli.common import config_of, or_default, overrides_of
+
+ANNELID: Any = get_command(app)
+
+MEANT = {"RUN": "run", "RUN..": "run", "NAME": "riddle2023", "LEVEL": "fast", "COMMAND": "run"}
+"""What stands in a page for something that the reader chooses; RUN is the latest run."""
+
+QUICK = {
+    ("annelid", "run", "--resume"): ("--duration", "0.06", "--quiet", "--no-video"),
+    # The chain takes fourteen seconds for one of simulated time.
+    ("annelid", "run", "riddle2023"): ("--duration", "0.02", "--quiet", "--no-video"),
+    ("annelid", "run"): ("--duration", "0.04", "--quiet", "--no-video"),
+    ("annelid", "render"): (),
+    ("annelid", "plot"): (),
+    ("annelid", "show"): (),
+    ("annelid", "build"): ("--force",),
+    ("annelid", "presets"): (),
+    ("annelid", "arenas"): (),
+    ("annelid", "experiment", "load-frame"): (),
+    ("annelid", "cite"): (),
+    ("annelid", "compare"): (),
+    ("annelid", "doctor"): (),
+    ("annelid", "export"): ("--force",),
+    ("annelid", "--help"): (),
+}
+"""Commands that are executed, and what shortens each; an option that is given twice counts as given last."""
+
+CHANGED_WORDS = {"--time": "0.04"}
+"""Values of options that would not fit a shortened run."""
+
+SCRIPTS = (
+    (r'"duration_s": [\d.]+', '"duration_s": 0.04'),
+    (r'("arena\.friction": [\w.]+)}', r'\1, "duration_s": 0.04}'),
+    (r'simulate\("riddle2023-rods"', 'simulate(annelid.load_config("riddle2023-rods", {"duration_s": 0.04})'),
+    (r'(open_run\("long"\)\n.*)"duration_s": 0\.04', r'\1"duration_s": 0.08'),
+)
+"""What shortens the Python on a page."""
+
+LONG = {
+    ("annelid", "run", "--uncertainty"): ("thirteen runs", ("--uncertainty", "2", "--duration", "0.5", "--no-video")),
+    ("annelid", "paper"): ("40 minutes, or 5 with --quick", ("--quick",)),
+    ("annelid", "bench"): ("15 minutes", ("--quick",)),
+    ("annelid", "robustness"): ("hours for 300 points", ("--points", "1")),
+    ("annelid", "tune"): ("an hour", ("--trials", "2", "--duration", "1")),
+    ("annelid", "calibrate"): ("half a minute and more", ()),
+    ("annelid", "limit-cycle"): ("ten seconds of one core", ()),
+    ("annelid", "experiment", "weak-middle"): ("minutes", ("--quick",)),
+    ("annelid", "experiment", "speed"): ("an hour", ("--quick",)),
+    ("annelid", "experiment", "slip"): ("minutes", ("--quick",)),
+    ("annelid", "experiment", "slip-detector"): ("minutes", ("--quick",)),
+    ("annelid", "experiment", "turning"): ("many minutes", ("--quick",)),
+    ("annelid", "experiment", "pipes"): ("an hour", ("--quick",)),
+}
+"""Commands that only the slow tests execute: why, and what shortens them there."""
+
+ELSEWHERE = {
+    ("pip",): "the environment that runs this test was made by such a line",
+    ("python", "-m"): "the same",
+    ("python3", "-m"): "the same",
+    ("pytest",): "these are the tests",
+    ("python", "examples/"): "tests/test_examples.py runs the examples",
+    ("python", "benchmarks/"): "minutes each; their arguments are read here",
+    ("python", "docs/site/"): "tests/docs/test_site.py builds the site",
+    ("python", "-c"): "arithmetic",
+    ("annelid", "sweep"): "minutes, and workers; the command has tests of its own",
+    ("annelid", "view"): "it opens a browser; the command has tests of its own",
+    ("annelid", "run", "tune/best.toml"): "the file is what a search found",
+    ("annelid", "render", "course", "--video", "course.mp4", "--camera", "course"): "docs/turning.md executes it",
+}
+"""Commands that are not executed here, and why."""
+
+SCRIPTS_ELSEWHERE = {
+    "docs/tutorials/": "tests/docs/test_site.py runs the tutorials",
+    "docs/upstream/": "whole reproductions of what the engine does, half a minute each",
+}
+"""Pages whose Python is not executed here, and why."""
+
+READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n'}
+"""Files of the reader's own that a page takes for granted."""
+
+done: set[Command] = set()
+"""Commands that have been executed on some page."""
+
+
+def starts_with(words: Sequence[str], start: Sequence[str]) -> bool:
+    """Whether a command begins so; an option counts wherever it stands, a folder stands for all that is in it."""
+    if start and start[-1].startswith("--") and len(start) > 2:
+        return starts_with(words, start[:-1]) and start[-1] in words
+    pairs = list(zip(start, words, strict=False))
+    return len(words) >= len(start) and all(b.startswith(a) if a.endswith("/") else a == b for a, b in pairs)
+
+
+def rule_of(table: dict[tuple[str, ...], Any], command: Command) -> Any:
+    return next((rule for start, rule in table.items() if starts_with(command.words, start)), None)
+
+
+def chosen(command: Command) -> tuple[str, ...]:
+    return tuple(MEANT.get(word, word) for word in command.words)
+
+
+def names_only(command: Command) -> bool:
+    """Whether it is the bare name of a command that needs an argument, as in a sentence about it."""
+    return command.words in {("annelid", name) for name in ("compare", "export", "plot", "render", "show")}
+
+
+def parsed(words: Sequence[str]) -> tuple[str, dict[str, Any]]:
+    """Reads a command line of annelid as its entry point does, without executing it."""
+    command: Any = ANNELID
+    parent, name, rest = None, "annelid", list(words)
+    while getattr(command, "commands", None):
+        parent = command.make_context(name, [], parent=parent, resilient_parsing=True)
+        name = rest.pop(0)
+        assert name in command.commands, f"there is no command {name!r}"
+        command = command.commands[name]
+    return name, command.make_context(name, rest, parent=parent).params
+
+
+def check_annelid(command: Command) -> None:
+    words = chosen(command)
+    if words[1] == "--help":
+        return
+    if names_only(command) or words[-1] == "--arena":
+        # In a sentence on a command or on one of its options.
+        assert words[1] in ANNELID.commands
+        return
+    name, given = parsed(words[1:])
+    if "preset" in given and not given.get("resume") and not str(given["preset"]).endswith(".toml"):
+        options = {"duration_s": given.get("duration"), "seed": given.get("seed")}
+        source = or_default(given["preset"], given.get("fidelity"))
+        overrides = overrides_of(given.get("assignments"), **options)
+        arena = given.get("arena")
+        if arena is None or not str(arena).endswith(".toml"):
+            config_of(source, overrides, given.get("segments"), given.get("fidelity"), arena)
+    assert name in words
+
+
+def check_program(command: Command) -> None:
+    """Checks that what a command of another program names exists, and that its options do."""
+    program, *words = command.words
+    if program == "pip":
+        extras = re.findall(r"\[(\w+)]", " ".join(words))
+        pyproject = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+        assert all(re.search(rf"^{extra} = \[", pyproject, re.MULTILINE) for extra in extras), command
+        return
+    files = [word for word in words if word.endswith(".py") or word.startswith("tests/")]
+    assert all((ROOT / file).exists() for file in files), command
+    if files and program == "python":
+        source = (ROOT / files[0]).read_text(encoding="utf-8")
+        assert all(f'"{word}"' in source for word in words if word.startswith("--")), command
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_is_understood(page: str) -> None:
+    for command in commands_of(page):
+        if command.words[0] == "annelid":
+            check_annelid(command)
+        else:
+            check_program(command)
+
+
+def test_an_unknown_option_field_or_preset_is_found() -> None:
+    for line in (
+        "annelid run riddle2023-rods --spede 3",
+        "annelid run riddle2024",
+        "annelid run --set arena.frictoin=0.3",
+        "annelid sing",
+        "pytest tests/test_nothing.py",
+        "python benchmarks/growth.py --elephants 2",
+    ):
+        check = check_annelid if line.startswith("annelid") else check_program
+        with pytest.raises((Exception, SystemExit)):
+            check(Command(tuple(line.split())))
+
+
+def test_every_command_is_executed_somewhere() -> None:
+    """Nothing falls between the tables."""
+    for page in PAGES:
+        for command in commands_of(page):
+            known = (rule_of(table, command) for table in (LONG, QUICK, ELSEWHERE))
+            assert any(rule is not None for rule in known), f"{page}: no rule for {command}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_takes_seconds_is_executed(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    # Runs draw nothing here: what they would draw has tests of its own, and takes longer than the run.
+    monkeypatch.setattr("annelid.view.gallery.draw_all", lambda *_, **__: [])
+    for name, text in READERS_FILES.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    session: dict[str, Any] = {"__name__": "__main__"}
+    here: set[Command] = set()
+    steps = steps_of(page)
+    words = {word for step in steps if isinstance(step, Command) for word in step.words}
+    names_its_runs = bool(words & {"-o", "--out"}) or any(word.startswith("runs/") for word in words)
+    stands_alone = not names_its_runs and not any(isinstance(step, Script) for step in steps)
+    for step in steps:
+        if isinstance(step, Written):
+            (tmp_path / step.name).write_text(step.text, encoding="utf-8")
+        elif isinstance(step, Script) and not page.startswith(tuple(SCRIPTS_ELSEWHERE)):
+            run_script(step.code, session)
+        elif isinstance(step, Command) and step not in (done if stands_alone else here):
+            run_command(step, tmp_path)
+            done.add(step)
+            here.add(step)
+
+
+def run_script(code: str, session: dict[str, Any]) -> None:
+    """Runs a block of Python behind those above it on its page."""
+    for pattern, instead in SCRIPTS:
+        code = re.sub(pattern, instead, code)
+    exec(compile(code, "page", "exec"), session)
+
+
+def run_command(command: Command, folder: Path) -> None:
+    shorter = rule_of(QUICK, command)
+    if shorter is None or rule_of(LONG, command) or rule_of(ELSEWHERE, command) or names_only(command):
+        return
+    words = [str(latest_run(folder)) if word in ("RUN", "RUN..") else word for word in command.words]
+    words = [MEANT.get(word, word) for word in words]
+    if words[-1] == "--arena":
+        return
+    for option, value in CHANGED_WORDS.items():
+        if option in words:
+            words[words.index(option) + 1] = value
+    if words[1] == "render" and os.environ.get("MUJOCO_GL") in ("off", "disable"):
+        return
+    answer = CliRunner().invoke(app, [*words[1:], *shorter], prog_name="annelid")
+    assert answer.exit_code == 0 or "OpenGL" in answer.output, f"{command}\n{answer.output}"
+
+
+def latest_run(folder: Path) -> Path:
+    """The run of this page that was made last; the reader's own where it makes none."""
+    if not list(folder.rglob("run.nc")):
+        annelid.simulate(annelid.load_config("riddle2023-rods", {"duration_s": 0.04}), folder / "own", progress=False)
+    return max(folder.rglob("run.nc"), key=lambda path: path.stat().st_mtime).parent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", LONG, ids=" ".join)
+def test_what_takes_long_is_executed_in_short(
+    start: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _, shorter = LONG[start]
+    words = [word for word in start if not word.startswith("--")]
+    output = () if start[1] in ("limit-cycle",) else ("-o", "out")
+    answer = CliRunner().invoke(app, [*words[1:], *shorter, *output], prog_name="annelid")
+    assert answer.exit_code == 0, answer.output

@@ -72,7 +72,8 @@ def _steps(token: Token) -> Iterator[Step]:
             # What stands apart from a command says what it does.
             yield from _commands(re.split(r"\s{2,}", line.strip())[0])
     for child in token.children or ():
-        if child.type == "code_inline":
+        # A program's bare name is no command.
+        if child.type == "code_inline" and " " in child.content.strip():
             yield from _commands(child.content.replace("\n", " "))
 
 

@@ -117,10 +117,11 @@ def _ffmpeg() -> Finding:
 
 
 def _optional_packages() -> dict[str, str]:
-    """Packages that an extra of annelid asks for, each with the first such extra; without those of developers."""
-    packages: dict[str, str] = {}
+    """Packages that an extra of annelid asks for, each with the smallest such extra; without those of developers."""
+    extras: dict[str, list[str]] = {}
     for line in requires("annelid") or []:
         asked = re.match(r"([\w.-]+).*;.*extra == ['\"]([\w-]+)['\"]", line)
         if asked is not None and asked[2] not in _DEVELOPERS_EXTRAS:
-            packages.setdefault(asked[1], asked[2])
-    return packages
+            extras.setdefault(asked[2], []).append(asked[1])
+    smallest_last = sorted(extras, key=lambda extra: len(extras[extra]), reverse=True)
+    return {package: extra for extra in smallest_last for package in extras[extra]}

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
+import subprocess
+import sys
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +82,7 @@ ELSEWHERE = {
     ("python3", "-m"): "the same",
     ("pytest",): "these are the tests",
     ("python", "examples/"): "tests/test_examples.py runs the examples",
-    ("python", "benchmarks/"): "minutes each; their arguments are read here",
+    ("python", "benchmarks/"): "minutes each: `test_a_benchmark_runs` executes them",
     ("python", "docs/site/"): "tests/docs/test_site.py builds the site",
     ("python", "-c"): "arithmetic",
     ("annelid", "sweep"): "minutes, and workers; the command has tests of its own",
@@ -95,12 +99,6 @@ SCRIPTS_ELSEWHERE = {
 }
 """Pages whose Python is not executed here, and why."""
 
-READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n'}
-"""Files of the reader's own that a page takes for granted."""
-
-done: set[Command] = set()
-"""Commands that have been executed on some page."""
-
 
 def starts_with(words: Sequence[str], start: Sequence[str]) -> bool:
     """Whether a command begins so; an option counts wherever it stands, a folder stands for all that is in it."""
@@ -108,6 +106,27 @@ def starts_with(words: Sequence[str], start: Sequence[str]) -> bool:
         return starts_with(words, start[:-1]) and start[-1] in words
     pairs = list(zip(start, words, strict=False))
     return len(words) >= len(start) and all(b.startswith(a) if a.endswith("/") else a == b for a, b in pairs)
+
+
+BENCHMARKS = sorted(
+    {
+        command
+        for page in PAGES
+        for command in commands_of(page)
+        if starts_with(command.words, ("python", "benchmarks/"))
+    },
+    key=str,
+)
+"""Benchmarks that pages name, with their arguments."""
+
+BENCHMARKS_NEED = {"warp_probe": find_spec("mujoco_warp"), "instructions": shutil.which("valgrind")}
+"""What is not installed with the tests."""
+
+READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n'}
+"""Files of the reader's own that a page takes for granted."""
+
+done: set[Command] = set()
+"""Commands that have been executed on some page."""
 
 
 def rule_of(table: dict[tuple[str, ...], Any], command: Command) -> Any:
@@ -269,3 +288,16 @@ def test_what_takes_long_is_executed_in_short(
     output = () if start[1] in ("limit-cycle",) else ("-o", "out")
     answer = CliRunner().invoke(app, [*words[1:], *shorter, *output], prog_name="annelid")
     assert answer.exit_code == 0, answer.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", BENCHMARKS, ids=str)
+def test_a_benchmark_runs(command: Command, tmp_path: Path) -> None:
+    script = ROOT / command.words[1]
+    if not BENCHMARKS_NEED.get(script.stem, True):
+        pytest.skip(f"{script.name} needs a program or package that is not installed")
+    answer = subprocess.run(
+        [sys.executable, script, *command.words[2:]], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 0, answer.stderr
+    assert answer.stdout

@@ -124,4 +124,5 @@ def _optional_packages() -> dict[str, str]:
         if asked is not None and asked[2] not in _DEVELOPERS_EXTRAS:
             extras.setdefault(asked[2], []).append(asked[1])
     smallest_last = sorted(extras, key=lambda extra: len(extras[extra]), reverse=True)
-    return {package: extra for extra in smallest_last for package in extras[extra]}
+    remedies = {package: extra for extra in smallest_last for package in extras[extra]}
+    return dict(sorted(remedies.items(), key=lambda remedy: (remedy[1], remedy[0])))

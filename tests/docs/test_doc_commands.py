@@ -108,15 +108,8 @@ def starts_with(words: Sequence[str], start: Sequence[str]) -> bool:
     return len(words) >= len(start) and all(b.startswith(a) if a.endswith("/") else a == b for a, b in pairs)
 
 
-BENCHMARKS = sorted(
-    {
-        command
-        for page in PAGES
-        for command in commands_of(page)
-        if starts_with(command.words, ("python", "benchmarks/"))
-    },
-    key=str,
-)
+NAMED = {command for page in PAGES for command in commands_of(page)}
+BENCHMARKS = sorted((one for one in NAMED if starts_with(one.words, ("python", "benchmarks/"))), key=str)
 """Benchmarks that pages name, with their arguments."""
 
 BENCHMARKS_NEED = {"warp_probe": find_spec("mujoco_warp"), "instructions": shutil.which("valgrind")}

@@ -12,8 +12,7 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from annelid.config import LEVELS, RunConfig, Section, toml_value
-from annelid.config.checking import UNITS
+from annelid.config import LEVELS, RunConfig, Section, toml_value, unit_of
 
 INTRODUCTION = """# Configuration
 
@@ -27,7 +26,6 @@ fields it has, and a section whose kind changes starts from that kind's defaults
 """
 LARGEST = 1e15
 """Bound of numbers that have none by their nature; not worth telling."""
-SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", "uS": "µS"}
 
 
 def page() -> str:
@@ -69,14 +67,6 @@ def sections_in(annotation: Any) -> list[type[Section]]:
 def _is_field(annotation: Any) -> bool:
     """Tells a field from a section; a list of sections is a field, set as a whole."""
     return get_origin(annotation) is tuple or not sections_in(annotation)
-
-
-def unit_of(field: str) -> str:
-    """Returns the unit that ends a field's name, for example ``N/m`` of ``stiffness_N_per_m``; empty without one."""
-    words = field.split("_")
-    first = next((i for i in range(1, len(words)) if UNITS.issuperset(words[i:])), len(words))
-    above, _, below = " ".join(SYMBOLS.get(word, word) for word in words[first:]).partition("per ")
-    return f"{above.strip() or 1}/{below}" if below else above
 
 
 def allowed(annotation: Any, bounds: tuple[Any, ...] = ()) -> str:

@@ -76,22 +76,6 @@ def test_the_reference_has_every_field_of_the_configuration() -> None:
         assert any(f"| `{leaf}` |" in part for part in headings), path
 
 
-@pytest.mark.parametrize(
-    ("field", "unit"),
-    [
-        ("stiffness_N_per_m", "N/m"),
-        ("joint_damping_Nms_per_rad", "N m s/rad"),
-        ("gravity_m_per_s2", "m/s²"),
-        ("gate_slope_per_mV", "1/mV"),
-        ("armature_kg_m2", "kg m²"),
-        ("n_segments", ""),
-        ("noise_m", "m"),
-    ],
-)
-def test_the_unit_is_read_from_the_end_of_a_field_s_name(field: str, unit: str) -> None:
-    assert configuration_reference.unit_of(field) == unit
-
-
 def test_the_reference_has_every_variable_of_a_run(tmp_path: Path) -> None:
     config = annelid.load_config("riddle2025-3x1", {"turning.kind": "constant", "duration_s": 0.02})
     data = annelid.simulate(config, tmp_path, progress=False).data

@@ -7,19 +7,9 @@ import pytest
 from worms import CHEAP
 
 from annelid.environments import WormEnv, WormVectorEnv
-from annelid.errors import RenderingUnavailable
-from annelid.view.gl import find_backend
+from annelid.view.figures.renderings import rendering_works
 
-
-def a_back_end_works() -> bool:
-    try:
-        find_backend()
-    except RenderingUnavailable:
-        return False
-    return True
-
-
-needs_gl = pytest.mark.skipif(not a_back_end_works(), reason="no OpenGL back-end works on this machine")
+needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
 SMALL = {"render_mode": "rgb_array", "width": 96, "height": 64}
 
 

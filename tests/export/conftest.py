@@ -24,13 +24,6 @@ def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 @pytest.fixture(scope="session")
-def rods_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The first moments of a 3D worm, segment 1 contracting."""
-    config = load_config("riddle2023-rods", {"duration_s": 0.2})
-    return simulate(config, tmp_path_factory.mktemp("rods") / "run", progress=False)
-
-
-@pytest.fixture(scope="session")
 def chain_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """The same as a chain of capsules."""
     config = load_config("riddle2023", {"duration_s": 0.02})

@@ -16,13 +16,6 @@ def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return simulate(config, tmp_path_factory.mktemp("planar") / "run", progress=False)
 
 
-@pytest.fixture(scope="session")
-def rods_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The first moments of a 3D worm, segment 1 contracting."""
-    config = load_config("riddle2023-rods", {"duration_s": 0.2})
-    return simulate(config, tmp_path_factory.mktemp("rods") / "run", progress=False)
-
-
 @pytest.fixture
 def picture(tmp_path: Path) -> Path:
     return tmp_path / "picture.png"

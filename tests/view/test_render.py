@@ -10,25 +10,16 @@ import numpy as np
 import pytest
 
 from annelid.config import load_config
-from annelid.errors import MissingDependency, RenderingUnavailable, RunFileError
+from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 from annelid.view.camera import VIEWS_DEG
-from annelid.view.gl import find_backend
+from annelid.view.figures.renderings import rendering_works
 from annelid.view.planar_scene import rhombi
 from annelid.view.render import render_frame, render_video
 from annelid.view.scene import WormScene
 
-
-def a_back_end_works() -> bool:
-    try:
-        find_backend()
-    except RenderingUnavailable:
-        return False
-    return True
-
-
-needs_gl = pytest.mark.skipif(not a_back_end_works(), reason="no OpenGL back-end works on this machine")
+needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
 
 
 def test_rhombi_touch_tip_to_tip_and_keep_their_sides() -> None:

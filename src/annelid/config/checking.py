@@ -85,6 +85,7 @@ UNITS = frozenset(
     | {"uS", "per"}
 )
 """Parts of the units that end the names of fields."""
+_SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", "uS": "µS"}
 
 
 def whole_path(path: str, tree: Mapping[str, Any]) -> str:
@@ -121,8 +122,8 @@ def unit_of(path: str) -> str:
     """Returns the unit that ends a field's name, as "m/s" for ``.._m_per_s``; empty where there is none."""
     words = path.rsplit(".", 1)[-1].split("_")
     start = next((i for i in range(1, len(words)) if UNITS.issuperset(words[i:])), len(words))
-    unit = " ".join(words[start:])
-    return unit.replace("per ", "1/", 1) if unit.startswith("per ") else unit.replace(" per ", "/")
+    above, _, below = " ".join(_SYMBOLS.get(word, word) for word in words[start:]).partition("per ")
+    return f"{above.strip() or 1}/{below}" if below else above
 
 
 def _field_sections(section: type[BaseModel], field: str) -> list[type[Section]]:

@@ -11,6 +11,7 @@ import os
 import time
 import warnings
 from abc import abstractmethod
+from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING, Any
 
 from annelid.config import cluster as settings
@@ -114,8 +115,8 @@ class DaskWorkers(Workers):
             return 0
         try:
             return len(threads_of(client))
-        # Whatever a scheduler that is going away right now makes of the question: the client notices next.
-        except Exception:
+        # The scheduler is going away right now: the connection breaks, or the client's own loop has ended.
+        except (OSError, RuntimeError, CancelledError):
             return 0
 
     def _greet(self, threads: dict[str, int]) -> None:

@@ -149,8 +149,8 @@ class Store:
                 time.sleep(POLL_S)
             done, _ = wait(running, POLL_S, FIRST_COMPLETED)
             for future in done:
-                case, key = running[future], case_key(running[future])
-                del running[future]
+                case = running.pop(future)
+                key = case_key(case)
                 try:
                     files = future.result()
                     if files is not None:

@@ -44,7 +44,7 @@ class DrawnWorm:
 
         self.model, self.rings = _model_to_draw(config)
         self.posture = mujoco.MjData(self.model)
-        self.upright = _upright(config)
+        self.upright = upright(config)
         self._widths = self.model.tendon_width[self.rings].copy()
 
     def light_for(self, elevation_deg: float) -> None:
@@ -113,7 +113,7 @@ def options() -> mujoco.MjvOption:
     return option
 
 
-def _upright(config: RunConfig) -> NDArray[np.float64]:
+def upright(config: RunConfig) -> NDArray[np.float64]:
     """Returns the rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``."""
     slope = math.radians(config.arena.slope_deg) if isinstance(config.arena, Floor) else 0.0
     c, s = math.cos(slope), math.sin(slope)

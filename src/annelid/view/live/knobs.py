@@ -3,9 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from annelid.config import AdaptiveSns, PhaseChain, PressureSns, RobustSns, RunConfig, SnsController, WormBody
+from annelid.config import (
+    AdaptiveSns,
+    PhaseChain,
+    PressureSns,
+    RobustSns,
+    RunConfig,
+    SnsController,
+    WormBody,
+    field_value,
+)
 
 _LEAST_FRICTION = 0.01
 
@@ -34,9 +42,7 @@ class Knob:
 
     def shown(self, config: RunConfig) -> float:
         """Returns the value that a configuration has, as it is shown."""
-        value: Any = config
-        for name in self.field.split("."):
-            value = getattr(value, name)
+        value = field_value(config, self.field)
         # Without the last bits, which a change of units adds and a slider would print.
         return min(max(float(f"{self.scale * float(value):.10g}"), self.low), self.high)
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Floor, RunConfig
+from annelid.config import RunConfig
 from annelid.morphology import Array
 from annelid.view.live.moments import Moment
 from annelid.view.live.skeleton import Skeleton
@@ -130,12 +129,6 @@ def spring_colors(strain: NDArray[np.floating]) -> Colors:
     stops = (-SPRING_RANGE, 0.0, SPRING_RANGE)
     colors = np.stack([np.interp(strain, stops, channel) for channel in np.transpose(SPRING_COLORS)], axis=-1)
     return _bytes(np.repeat(colors, 2, axis=0)).reshape(-1, 2, 3)
-
-
-def uprighting(config: RunConfig) -> tuple[float, float, float, float]:
-    """Returns the quaternion that turns the model's axes, which lie in a slope, to upright ones, scalar first."""
-    half = math.radians(config.arena.slope_deg) / 2 if isinstance(config.arena, Floor) else 0.0
-    return math.cos(half), 0.0, math.sin(half), 0.0
 
 
 def _segments(vertices: Array) -> Lines:

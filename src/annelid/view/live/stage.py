@@ -20,13 +20,13 @@ from annelid.arena.scenery import (
 from annelid.arena.shapes import shape_of
 from annelid.config import Floor, Pipe, RunConfig
 from annelid.morphology import Array
-from annelid.view.camera import VIEWS_DEG, fitting_distance, picture_axes
-from annelid.view.live.picture import CONTACT_COLOR, Colors, Picture, uprighting
+from annelid.view.camera import FIELD_OF_VIEW_DEG, VIEWS_DEG, fitting_distance, picture_axes
+from annelid.view.drawn_worm import upright
+from annelid.view.live.picture import CONTACT_COLOR, Colors, Picture
 
 if TYPE_CHECKING:
     import viser
 
-FIELD_OF_VIEW_DEG = 30.0
 ASPECT = 1.0
 """Of the canvas beside the panel, for which the camera is placed."""
 ROOM = 1.3
@@ -63,15 +63,16 @@ class Stage:
             strand_colors: Of all elements of the strands.
             first: What is shown first.
         """
+        from viser.transforms import SO3
+
         self._scene = scene = server.scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(hdri=None)
         scene.add_light_ambient("/sky", intensity=2.0)
         scene.add_light_directional("/lamp", intensity=2.0, position=(-3.0, -2.0, 3.0))
-        wxyz = uprighting(config)
-        self.turn = _rotation(wxyz)
+        self.turn = upright(config)
         self.shift_m = np.zeros(3)
-        self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=wxyz)
+        self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=SO3.from_matrix(self.turn).wxyz)
         self._strands = scene.add_line_segments(
             f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_PIXELS, thickness_units="screen"
         )
@@ -227,15 +228,3 @@ def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:
             opacity=RAIL_RGBA[3],
             position=(0.0, side * (arena.rail_gap_m / 2 + 0.002), RAIL_HALF_HEIGHT_M - arena.floor_gap_m),
         )
-
-
-def _rotation(wxyz: tuple[float, float, float, float]) -> Array:
-    """Matrix of a unit quaternion."""
-    w, x, y, z = wxyz
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -1,9 +1,10 @@
-"""How a fast contraction depends on the time step, with the engine's damping of rods and with lateral damping added.
+"""How a fast contraction depends on the time step: the engine's damping of rods, the material's, and the chain's.
 
 The middle ring of the paper's worm is pulled by 2.5 N at once; its length after 0.2 s is printed for four steps, beside
 that of the paper's chain of damped joints. The engine's Rayleigh damping of a curved rod has no part across the plane
 of its rest curvature (``docs/upstream/curved_rod_damping.md``), so that a fast motion there meets only the step's own
-dissipation. Run ``python benchmarks/lateral_damping.py``; it takes about a minute.
+dissipation. The material's time is that of the chain's joints. Run ``python benchmarks/lateral_damping.py``; it takes
+about a minute.
 """
 
 from __future__ import annotations
@@ -14,17 +15,25 @@ import mujoco
 
 from annelid import load_config
 from annelid.body import build_spec, compile_spec
+from annelid.config import WormBody
+from annelid.simulation.damping import MaterialDamping, add_damper_rows
 
 FORCE_N = 2.5
 DURATION_S = 0.2
 RING = "ring_1"
+CHAIN_S = 0.98
+"""Damping over stiffness of the chain's joints, 0.12 N m s/rad over E I by the elements' length, s."""
 STEPS_S = (0.0005, 0.001, 0.005, 0.010)
 ROWS: tuple[tuple[str, str, dict[str, Any]], ...] = (
-    ("rods, the engine's damping", "riddle2023-rods", {"body.mesh.elements_per_side": 3}),
     (
-        "rods, and 0.12 N m s/rad lateral",
+        "rods, the engine's damping",
+        "riddle2023",
+        {"body.formulation.kind": "rods", "body.formulation.edge_time_constant_s": 0.0002},
+    ),
+    (
+        "rods, the material's damping time",
         "riddle2023-rods",
-        {"body.mesh.elements_per_side": 3, "body.formulation.lateral_damping_Nms_per_rad": 0.12},
+        {"body.strands.damping_time_s": CHAIN_S},
     ),
     ("chain of damped joints", "riddle2023", {"body.formulation.pin_time_constant_s": 0.004}),
 )
@@ -38,16 +47,23 @@ def ring_after(preset: str, changes: dict[str, Any], timestep_s: float) -> float
         changes: What is changed in it.
         timestep_s: The engine's time step, s.
     """
-    mesh = {"body.mesh.elements_per_side": 3}
-    spec = build_spec(load_config(preset, mesh | changes))
-    spec.option.timestep = timestep_s
+    mesh = {"body.mesh.elements_per_side": 3, "clock.physics_timestep_s": timestep_s}
+    config = load_config(preset, mesh | changes)
+    assert isinstance(config.body, WormBody)
+    strands = config.body.strands
+    spec = build_spec(config, for_plant=True)
     muscle = spec.actuator(RING)
     muscle.gaintype, muscle.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
     muscle.gainprm = [-FORCE_N, *[0.0] * 9]
+    add_damper_rows(spec)
     model = compile_spec(spec)
     data = mujoco.MjData(model)
     data.actuator(RING).ctrl[0] = 1.0
-    mujoco.mj_step(model, data, round(DURATION_S / timestep_s))
+    dampers = MaterialDamping(model, strands) if strands.material_damping_s else None
+    for _ in range(round(DURATION_S / timestep_s)):
+        if dampers is not None:
+            dampers.renew(data.qpos)
+        mujoco.mj_step(model, data)
     mujoco.mj_forward(model, data)
     return float(data.tendon(RING).length[0])
 
@@ -58,7 +74,7 @@ def main() -> None:
     for label, preset, changes in ROWS:
         lengths = []
         for step in STEPS_S:
-            if preset == "riddle2023" and step > 0.001:
+            if "body.formulation.kind" not in changes and preset == "riddle2023" and step > 0.001:
                 continue
             lengths.append(f"{ring_after(preset, changes, step):10.3f}")
         print(f"{label:34}", *lengths, flush=True)

@@ -29,7 +29,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
     "half the speed in the simulation": ({}, {"haste": 4.0}),
     "half the cable's speed": ({}, {"speed_m_per_s": 0.005}),
     "steps of 10 ms in place of 20": ({"clock.physics_timestep_s": 0.01}, {}),
-    "three elements a side in place of two": ({"body.mesh.elements_per_side": 3}, {}),
+    "four elements a side in place of three": ({"body.mesh.elements_per_side": 4}, {}),
     "four segments in place of three": ({"body.mesh.n_segments": 4}, {}),
 }
 

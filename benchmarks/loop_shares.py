@@ -20,6 +20,7 @@ from annelid.control import SnsController
 from annelid.simulation import loop
 from annelid.simulation.coupling import Coupling
 from annelid.simulation.recorder import Recorder
+from annelid.simulation.watch import Watch
 from annelid.simulation.worm import WormPlant
 
 DURATION_S = 12.0
@@ -36,6 +37,12 @@ PARTS: dict[str, tuple[tuple[type, str], ...]] = {
     ),
     "guards": ((Coupling, "watch"),),
 }
+WITHIN: dict[str, tuple[tuple[type, str], ...]] = {
+    "watch on shape": ((Watch, "look"),),
+    "warnings": ((WormPlant, "doubts"),),
+    "books of work": ((WormPlant, "book"),),
+}
+"""Parts of the parts: what watches the worm's shape, tells what is doubtful, and books force and work."""
 
 
 def stopwatch(spent: list[float], method: Callable[..., Any]) -> Callable[..., Any]:
@@ -61,21 +68,24 @@ def resident_MB() -> float:
 
 def main(preset: str) -> None:
     config = load_config(preset, {"duration_s": DURATION_S})
-    spent: dict[str, list[float]] = {part: [] for part in PARTS}
+    spent: dict[str, list[float]] = {part: [] for part in PARTS | WITHIN}
     whole: list[float] = []
     memory: list[float] = []
     with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
-        for part, methods in PARTS.items():
+        for part, methods in (WITHIN | PARTS).items():
             for owner, name in methods:
                 stack.enter_context(patch.object(owner, name, stopwatch(spent[part], getattr(owner, name))))
         stack.enter_context(patch.object(loop, "_run", stopwatch(whole, loop._run)))
         simulate(config, Path(folder) / "run", progress=lambda *_: memory.append(resident_MB()))
     steps = DURATION_S / config.clock.physics_timestep_s
     total = whole[0]
-    parts = {part: sum(times) for part, times in spent.items()}
+    parts = {part: sum(spent[part]) for part in PARTS}
     parts["loop"] = total - sum(parts.values())
     for part, seconds in parts.items():
         print(f"{part:20} {1e6 * seconds / steps:7.0f} us a step  {seconds / total:6.1%}")
+    for part in WITHIN:
+        seconds = sum(spent[part])
+        print(f"{'  ' + part:24} {1e6 * seconds / steps:3.0f} us a step  {seconds / total:6.1%}, within the above")
     asked = parts["network and control"] + parts["recording"]
     print(f"{'network to recording':20} {1e6 * asked / steps:7.0f} us a step  {asked / total:6.1%}")
     print(f"resident memory from {min(memory):.0f} to {max(memory):.0f} MB while it runs")

@@ -1,12 +1,15 @@
 """When sensors switch and segments contract under the paper's controller: in order, and where order breaks.
 
-Prints, for the paper's robot with pins that hold, every switch of a stretch sensor and every contraction with the
-segments' lengthening, mm: as the preset is, at low friction, with a small tolerance and with a large one
-(docs/robust.md). Run ``python benchmarks/sensor_events.py``; it takes about half a minute.
+Prints, for the paper's robot with rigid crossings, every switch of a stretch sensor and every contraction with the
+segments' lengthening, mm: as the preset is, with small and large tolerances, with stiff strands, and without the
+damping across the bend (docs/robust.md). Run ``python benchmarks/sensor_events.py``; it takes about two minutes.
+With ``--windows`` it measures, under a timed wave, what `annelid.plausibility.tolerance_window_m` estimates: how far
+neighbours lift a segment at rest, and the length at which the releasing and the next segment are equally long.
 """
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from typing import Any
 
@@ -14,14 +17,43 @@ import numpy as np
 
 from annelid import Run, load_config, simulate
 from annelid.analysis import rhythm_score
-from annelid.studies.case import PAPERS_MESH
+from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.plausibility import tolerance_window_m
+from annelid.studies.case import PAPERS_MESH, SHEAR_OVER_YOUNG
+from annelid.studies.robustness import TIMED
+
+SLIPPERY = {"arena.friction": 0.3}
+UNDAMPED_ACROSS = {
+    "body.strands.damping_time_s": None,
+    "body.strands.joint_damping_Nms_per_rad": 0.12,
+    "body.mesh.elements_per_side": 2,
+    "arena.friction_cone": "pyramidal",
+}
+"""The body of the first edition: the engine's own damping, in the plane of the bend alone."""
+
+
+def strands(modulus_GPa: float) -> dict[str, Any]:
+    """Changes to strands of another Young's modulus, GPa."""
+    moduli = {"young": 1e9 * modulus_GPa, "shear": SHEAR_OVER_YOUNG * 1e9 * modulus_GPa}
+    return {f"body.strands.{name}_modulus_Pa": value for name, value in moduli.items()}
+
 
 CASES: dict[str, dict[str, Any]] = {
     "as it is": {},
-    "friction 0.05": {"arena.friction": 0.05},
-    "tolerance 5 mm": {"sensor.tolerance_m": 0.005},
-    "tolerance 30 mm": {"sensor.tolerance_m": 0.03},
+    "tolerance 1 mm": {"sensor.tolerance_m": 0.001},
+    "tolerance 40 mm": {"sensor.tolerance_m": 0.04},
+    "0.8 GPa, friction 0.1": {**strands(0.8), "arena.friction": 0.1},
+    "0.8 GPa, friction 0.1, tolerance 26 mm": {**strands(0.8), "arena.friction": 0.1, "sensor.tolerance_m": 0.026},
+    "undamped across, friction 0.3": {**UNDAMPED_ACROSS, **SLIPPERY},
+    "undamped across, friction 0.3, tolerance 26 mm": {**UNDAMPED_ACROSS, **SLIPPERY, "sensor.tolerance_m": 0.026},
 }
+WINDOWS = [
+    *((modulus, friction, 0.145) for modulus in (0.3, 0.45, 0.8) for friction in (1.0, 0.3, 0.05)),
+    *((1.2, friction, 0.145) for friction in (1.0, 0.3)),
+    *((2.0, friction, 0.145) for friction in (1.0, 0.05)),
+    *((modulus, 0.3, damping) for damping in (0.05, 0.36) for modulus in (0.3, 0.8, 2.0)),
+]
+"""Young's modulus, GPa, friction, and damping time, s."""
 DURATION_S, SHOWN_S = 6.0, 3.7
 
 
@@ -43,7 +75,50 @@ def events(run: Run) -> list[tuple[float, str]]:
     return sorted(found)
 
 
+def window_mm(run: Run) -> tuple[float, float]:
+    """Lift of segments whose turn it is not, and length in passing of those that hand over, from the second cycle."""
+    data = run.data
+    time = data["time"].values
+    length = 1e3 * (data["stretch_length"] - data["stretch_rest_length"]).mean("sensor").values
+    n = length.shape[1]
+    lifts, passings = [], []
+    for turn in range(n, int(time[-1] / DESIGN_INTERVAL_S)):
+        start = turn * DESIGN_INTERVAL_S
+        own = length[:, turn % n]
+        waiting = (time >= start - 1.5 * DESIGN_INTERVAL_S) & (time < start - 1e-9)
+        lifts.append(own[waiting].max())
+        handing_over = (time >= start - 1e-9) & (time < start + 0.6 * DESIGN_INTERVAL_S)
+        passings.append(np.minimum(own, length[:, (turn - 1) % n])[handing_over].max())
+    return max(lifts), min(passings)
+
+
+def print_windows() -> None:
+    for modulus, friction, damping in WINDOWS:
+        settings = {
+            "body.mesh.elements_per_side": 2,
+            "clock.physics_timestep_s": 0.01,
+            "record.signals_interval_s": 0.01,
+            "controller": TIMED,
+            "duration_s": 6.6,
+            "arena.friction": friction,
+            "body.strands.damping_time_s": damping,
+        }
+        config = load_config("riddle2023-rods", {**strands(modulus), **settings})
+        with tempfile.TemporaryDirectory() as folder:
+            measured = window_mm(simulate(config, folder, progress=False, overwrite=True))
+        estimated = tolerance_window_m(config)
+        assert estimated is not None
+        print(
+            f"{modulus:4} GPa, friction {friction:4}, {damping:5} s: {measured[0]:5.1f} to {measured[1]:5.1f} mm, "
+            f"estimated {1e3 * estimated[0]:5.1f} to {1e3 * estimated[1]:5.1f} mm",
+            flush=True,
+        )
+
+
 def main() -> None:
+    if "--windows" in sys.argv[1:]:
+        print_windows()
+        return
     for name, changes in CASES.items():
         settings = {"clock.physics_timestep_s": 0.005, "duration_s": DURATION_S, "record.signals_interval_s": 0.005}
         config = load_config("riddle2023-rods", {**PAPERS_MESH, **settings, **changes})

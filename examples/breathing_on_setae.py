@@ -26,7 +26,7 @@ def travel_m(friction: float, backward_friction: float | None, duration_s: float
     run = annelid.simulate(config, folder, controller=breathe)
     travelled = annelid.summary(run).travel_m
     assert travelled is not None
-    return -travelled
+    return travelled
 
 
 def main(duration_s: float = 6.0) -> None:

@@ -37,7 +37,7 @@ def main(duration_s: float = 6.0) -> None:
         run = annelid.simulate(config, folder, controller=Wave())
         slip = run.data["slip_loss"].values[-1].sum()
         numbers = annelid.summary(run)
-    print(f"{numbers.full_cycles} waves, {100 * -(numbers.travel_m or 0.0):.1f} cm in {duration_s:g} s")
+    print(f"{numbers.full_cycles} waves, {100 * (numbers.travel_m or 0.0):.1f} cm in {duration_s:g} s")
     print(f"{slip:.2f} J lost to slip")
 
 

@@ -31,10 +31,9 @@ def main(folder: Path) -> None:
             table.add_row(f"{friction:g}", result.messages[worm], "", "")
             continue
         run = result[worm]
-        period_s = summary(run).period_s
-        x_m = run.data["center_of_mass"].sel(axis="x")
-        period = "none" if period_s is None else f"{period_s:.2f}"
-        table.add_row(f"{friction:g}", run.status, period, f"{1000 * float(x_m[-1] - x_m[0]):.0f}")
+        numbers = summary(run)
+        period = "none" if numbers.period_s is None else f"{numbers.period_s:.2f}"
+        table.add_row(f"{friction:g}", run.status, period, f"{1000 * (numbers.travel_m or 0.0):.0f}")
     Console().print(table)
     simulated_s = len(FRICTIONS) * SETTINGS["duration_s"]
     print(f"{simulated_s / result.wall_time_s:.1f} worm-seconds a second")

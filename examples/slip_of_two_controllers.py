@@ -30,13 +30,13 @@ CONTROLLERS = CHANNELS | {
 
 
 def measure(name: str, folder: Path) -> tuple[str, float, float, float, float]:
-    """Runs one controller: its name, speed (m/s), slip loss and muscle work (J/m), share of time without foothold."""
+    """Runs one controller: name, forward speed (m/s), slip loss and net muscle work (J/m), share without foothold."""
     clock = {"clock.control_timestep_s": 0.002, "record.signals_interval_s": 0.02, "duration_s": DURATION_S}
     config = load_config("daltorio2013", clock | {"controller": CONTROLLERS[name]})
     data = simulate(config, folder / name, progress=False).data
     steady = data.isel(time=data["time"] >= DURATION_S / 3)
     first, last = steady.isel(time=0), steady.isel(time=-1)
-    way = abs(float((last["center_of_mass"] - first["center_of_mass"]).sel(axis="x")))
+    way = float((first["center_of_mass"] - last["center_of_mass"]).sel(axis="x"))
     slip, work = (float((last[loss] - first[loss]).sum()) for loss in ("slip_loss", "muscle_work"))
     afloat = float((steady["contact_force"].sel(axis="z").max("segment") == 0).mean())
     return name, way / (DURATION_S * 2 / 3), slip / way, work / way, afloat

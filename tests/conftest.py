@@ -2,11 +2,62 @@
 
 from __future__ import annotations
 
+import faulthandler
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from typing import Any
+
 import pytest
 
 from annelid.config import load_config
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Long validations have all the time they need; every other test that hangs is named and ended."""
+    if item.get_closest_marker("slow") is not None:
+        faulthandler.cancel_dump_traceback_later()
+
+
+@pytest.fixture(autouse=True)
+def _interruptions_are_heeded() -> Iterator[None]:
+    """Interruptions reach the tests and what they start, also under nohup and in a shell's background jobs."""
+    if (
+        signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+        or threading.current_thread() is not threading.main_thread()
+    ):
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+class InThisProcess(Executor):
+    """Stands for a pool of processes, each of which would take seconds to start."""
+
+    def __init__(self, *_: object) -> None:
+        """Starts nothing."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Calls it here and now."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture(scope="module")
+def runs_in_this_process() -> Iterator[None]:
+    """Studies compute their runs here; what is special to processes is tested with the workers."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("annelid.studies.workers.ProcessPoolExecutor", InThisProcess)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -12,26 +12,33 @@ import pytest
 import annelid
 
 SOURCE = Path(annelid.__file__).parent
-BASE = {"errors", "protocols", "clock"}
+BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles"}
 MAY_IMPORT = {
-    "errors": set(),
+    "errors": {"text"},
     "protocols": set(),
     "clock": set(),
+    "text": set(),
+    "terminal": {"text"},
+    "textfiles": {"errors", "text"},
+    "engine": {"errors"},
     "morphology": set(),
-    "nervous": {"errors"},
-    "config": {"errors"},
+    "plausibility": {"config", "morphology"} | BASE,
+    "nervous": {"errors", "text", "textfiles"},
+    "config": {"errors", "text", "textfiles"},
     "references": {"config"},
     "arena": {"config"} | BASE,
-    "body": {"config", "morphology", "arena"} | BASE,
+    "body": {"config", "morphology", "arena", "engine"} | BASE,
     "control": {"config", "nervous"} | BASE,
     "planar": {"config", "morphology"} | BASE,
-    "simulation": {"config", "morphology", "arena", "body", "control", "planar", "nervous"} | BASE,
+    "simulation": {"config", "morphology", "plausibility", "arena", "body", "control", "planar", "nervous"} | BASE,
     "analysis": {"config", "morphology", "arena", "control", "simulation"} | BASE,
-    "view": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
+    "view": {"config", "engine", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
     "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "view"} | BASE,
-    "studies": {"config", "morphology", "nervous", "body", "simulation", "analysis", "view"} | BASE,
+    "studies": {"config", "morphology", "plausibility", "nervous", "body", "simulation", "analysis", "view"} | BASE,
     "export": {"config", "references", "body", "simulation", "analysis", "view", "studies"} | BASE,
-    "cli": {"config", "references", "body", "simulation", "analysis", "view", "studies", "export"} | BASE,
+    "cli": {"config", "plausibility"}
+    | {"references", "body", "simulation", "analysis", "view", "studies", "export"}
+    | BASE,
 }
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}
@@ -79,7 +86,7 @@ def test_every_room_has_its_rule() -> None:
 
 def loaded_by(statement: str) -> set[str]:
     code = f"import sys; {statement}; print(' '.join(sys.modules))"
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     return set(answer.stdout.split())
 
 

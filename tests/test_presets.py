@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from math import pi
 
+import numpy as np
 import pytest
 
 from annelid.body import mesh_of
-from annelid.config import WormBody, fields_of, load_config
+from annelid.config import Rods, WormBody, fields_of, load_config
+from annelid.studies.case import Case
+from annelid.studies.examinations.pins import DAMPING_TIME_S, tie_stiffness_N_per_m
 
 PUBLISHED = {
     "duration_s": 5.0,
@@ -108,6 +111,20 @@ def test_the_planar_worm_is_the_published_one(path: str) -> None:
 
 def test_the_peak_force_is_the_compiler_s_of_the_paper_s_time() -> None:
     assert value_at("riddle2023", "body.rings.peak_force_N") == pytest.approx(550_000 / 4678, abs=0.01)
+
+
+def test_the_sprung_rods_ties_and_damping_are_near_the_chain_s() -> None:
+    """Calibrated near what the chain's pin constraints and joints have, 24 N/m and 0.12 N m s/rad."""
+    sprung = Case("riddle2023-fast")
+    assert tie_stiffness_N_per_m(sprung) == pytest.approx(tie_stiffness_N_per_m(Case("riddle2023")), rel=0.15)
+    body = sprung.config.body
+    assert isinstance(body, WormBody)
+    assert isinstance(body.formulation, Rods)
+    assert body.formulation.pin_damping_Ns_per_m == pytest.approx(DAMPING_TIME_S * tie_stiffness_N_per_m(sprung))
+    element_m = float(np.linalg.norm(np.diff(mesh_of(body.mesh).vertices_m[0], axis=0), axis=1).mean())
+    joint = body.strands.joint_damping(body.strands.young_modulus_Pa * pi * body.strands.radius_m**4 / 4 / element_m)
+    assert 0.06 < joint < 0.12
+    assert body.formulation.lateral_damping_Nms_per_rad == 0.0
 
 
 ROBOTS = {

@@ -12,12 +12,16 @@ The names below are loaded on first use, so that ``import annelid`` is quick and
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+# typing takes longer to load than all else here.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from annelid.analysis import gait, summary
     from annelid.config import RunConfig, load_config, preset_names
     from annelid.nervous import Network
+    from annelid.plausibility import Finding, check
     from annelid.protocols import Controller, Plant, Sensation
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
     from annelid.simulation.batch import BatchResult, simulate_batch
@@ -28,6 +32,7 @@ __version__ = "0.1.0"
 _HOME = {
     "BatchResult": "simulation.batch",
     "Controller": "protocols",
+    "Finding": "plausibility",
     "Network": "nervous",
     "Plant": "protocols",
     "Run": "simulation",
@@ -35,6 +40,7 @@ _HOME = {
     "Sensation": "protocols",
     "build_controller": "simulation",
     "build_plant": "simulation",
+    "check": "plausibility",
     "gait": "analysis",
     "load_config": "config",
     "open_run": "simulation",
@@ -48,6 +54,7 @@ _HOME = {
 __all__ = [
     "BatchResult",
     "Controller",
+    "Finding",
     "Network",
     "Plant",
     "Run",
@@ -56,6 +63,7 @@ __all__ = [
     "__version__",
     "build_controller",
     "build_plant",
+    "check",
     "gait",
     "load_config",
     "open_run",

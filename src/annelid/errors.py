@@ -4,14 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from math import isfinite
+from numbers import Real
+
+from annelid.text import printable
+
+MOST_SHOWN = 80
+"""Characters of a value in an error sentence."""
+MOST_LISTED = 300
+"""Characters of the valid names in an error sentence."""
 
 
 class AnnelidError(Exception):
     """Base of every error that annelid raises on purpose; its text is one readable sentence."""
 
+    def __str__(self) -> str:
+        # Names from files of others must not command the terminal that shows them.
+        return printable(super().__str__())
+
 
 class ConfigError(AnnelidError):
     """A configuration names an unknown preset or field, or gives a field a value it cannot have."""
+
+
+class UnreadableText(ConfigError, ValueError):
+    """A text file cannot be read, or is not what it should be; also a ValueError, as parsers raise."""
 
 
 class RunFileError(AnnelidError):
@@ -24,6 +41,10 @@ class RenderingUnavailable(AnnelidError):
 
 class MissingDependency(AnnelidError):
     """An optional package is needed; the text names the line that installs it."""
+
+
+class MixedEngine(AnnelidError, ImportError):
+    """Two versions of the engine are installed over each other; the text names the line that repairs it."""
 
 
 class ClusterError(AnnelidError):
@@ -66,6 +87,27 @@ def require_at_least(least: float, **values: float) -> None:
             raise ConfigError(f"{name} must be at least {least:g}, not {value}")
 
 
+def require_finite(**values: object) -> None:
+    """Refuses numbers that are infinite or not a number, as `require_positive` does those that are not positive."""
+    for name, value in values.items():
+        if isinstance(value, Real) and not isfinite(value):
+            raise ConfigError(f"{name} must be a finite number, not {shown(value)}")
+
+
+def shortened(text: str, most: int = MOST_SHOWN) -> str:
+    """Returns a text as an error sentence can hold it: its beginning and its end where it is long."""
+    return text if len(text) <= most else f"{text[: most // 2]} .. {text[-most // 4 :]}"
+
+
+def shown(value: object) -> str:
+    """Returns a value as Python writes it, shortened where that is long."""
+    try:
+        return shortened(repr(value))
+    except (ValueError, RecursionError):
+        # Python writes no whole number of more than 4,300 digits.
+        return "a value too long to be written"
+
+
 def suggest(name: str, valid: Iterable[str]) -> str:
     """Completes an error sentence with the nearest valid name and the list of all.
 
@@ -77,8 +119,21 @@ def suggest(name: str, valid: Iterable[str]) -> str:
         For example ``"did you mean 'riddle2023'? Valid: riddle2022-planar, riddle2023"``.
     """
     names = sorted(valid)
+    name = name[:MOST_SHOWN]
     nearest = get_close_matches(name, names, n=1, cutoff=0.5) or get_close_matches(
         name.rsplit(".", 1)[-1], names, n=1, cutoff=0.5
     )
-    hint = f"did you mean {nearest[0]!r}? " if nearest else ""
-    return f"{hint}Valid: {', '.join(names)}"
+    hint = f"did you mean {shortened(nearest[0])!r}? " if nearest else ""
+    return f"{hint}Valid: {listed(names)}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Joins names by commas, as many as an error sentence can hold."""
+    every = list(names)
+    words, length = [], 0
+    for name in map(shortened, every):
+        length += len(name) + 2
+        if length > MOST_LISTED:
+            return f"{', '.join(words)} and {len(every) - len(words):,} more"
+        words.append(name)
+    return ", ".join(words)

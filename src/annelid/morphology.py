@@ -1,6 +1,7 @@
 """Geometry of the helical mesh: strands, crossings, rhombi, rings and springs, as numpy arrays.
 
-Numbers only: no engine, no configuration. The body axis is x; lengths are in metres, angles in radians.
+Numbers only: no engine, no configuration. The body axis is x, whichever way a worm leads at the start; lengths are in
+metres, angles in radians.
 
 A strand turns at the rate ``w`` (rad/m) about the axis. Clockwise strand ``i`` lies at the angle
 ``w x + i D`` and counter-clockwise strand ``j`` at ``c - w x - j D``, with ``D = 4 pi / n_helices`` and
@@ -14,13 +15,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import floor, pi
+from math import asin, cos, floor, hypot, pi, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+
+def heading_turn(heading_deg: float) -> Array:
+    """Returns the rotation of a worm that leads towards -x to one of another heading, ``(3, 3)``.
+
+    Args:
+        heading_deg: Angle about the vertical, positive to the worm's left; exact for quarter turns.
+    """
+    quarter, rest = divmod(heading_deg, 90.0)
+    c, s = cos(radians(rest)), sin(radians(rest))
+    c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)
@@ -112,6 +125,54 @@ class MeshGeometry:
         """Length of every ring at rest (a closed polygon), shape ``(n_segments,)``."""
         corners = self.crossings_m[self.rings]
         return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).sum(axis=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Rhombus:
+    """One rhombus of the mesh at rest, in closed form: two crossings of a ring, and the two of an axial spring.
+
+    Attributes:
+        n_per_plane: Rhombi round the body, as many as crossings of a ring.
+        across_m: Distance of neighbouring crossings of a ring.
+        along_m: Distance of the crossings that an axial spring joins, two planes apart.
+        side_m: Length of a strand from one crossing to the next, along its straight elements.
+        bend_rad: Angle by which a strand turns about the body axis in one element.
+    """
+
+    n_per_plane: int
+    across_m: float
+    along_m: float
+    side_m: float
+    bend_rad: float
+
+    @property
+    def ring_length_m(self) -> float:
+        """Length of a ring at rest."""
+        return self.n_per_plane * self.across_m
+
+    @property
+    def longest_m(self) -> float:
+        """Distance along the axis at which the strands are straight: no spring of inextensible strands is longer."""
+        return 2.0 * self.side_m
+
+    @property
+    def opening_rad(self) -> float:
+        """Half the angle at which the two strands of a crossing meet, seen along the ring; pi/2 for flat rings."""
+        return asin(min(1.0, self.across_m / hypot(self.across_m, self.along_m)))
+
+
+def rhombus(n_helices: int, radius_m: float, angular_rate_rad_per_m: float, elements_per_side: int) -> Rhombus:
+    """Returns the rhombus of the mesh that `helical_mesh` generates from the same numbers."""
+    half = n_helices // 2
+    spacing, turn = pi / half / angular_rate_rad_per_m, pi / half
+    element = hypot(spacing / elements_per_side, 2.0 * radius_m * sin(turn / elements_per_side / 2.0))
+    return Rhombus(
+        n_per_plane=half,
+        across_m=2.0 * radius_m * sin(turn),
+        along_m=2.0 * spacing,
+        side_m=elements_per_side * element,
+        bend_rad=turn / elements_per_side,
+    )
 
 
 def helical_mesh(

@@ -184,6 +184,15 @@ class Stateful(Protocol):
 
 
 @runtime_checkable
+class Doubtful(Protocol):
+    """The capability of telling what is doubtful about a run without being fatal."""
+
+    def doubts(self) -> tuple[str, ...]:
+        """Returns a sentence for everything doubtful since time zero."""
+        ...
+
+
+@runtime_checkable
 class Watched(Protocol):
     """The capability of telling that the numbers have run away."""
 

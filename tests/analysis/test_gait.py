@@ -82,7 +82,11 @@ def test_slip_contact_and_costs_in_closed_form() -> None:
     read = gait(run_of(data))
     assert read.slip_ratio == pytest.approx(0.1, rel=1e-3)
     assert read.contact_duty == pytest.approx([1.0, 0.5, 0.0], abs=0.01)
-    assert read.cost_of_transport == pytest.approx(3.0 / (MASS_KG * 9.81 * 0.01), rel=2e-3)
+    weight = MASS_KG * 9.81 * 0.01
+    assert read.cost_of_transport == pytest.approx(3.5 / weight, rel=2e-3), "work taken up is not regained"
+    assert read.cost_of_transport_net == pytest.approx(3.0 / weight, rel=2e-3)
+    data["positive_work"] = data["muscle_work"] * 2.0
+    assert gait(run_of(data)).cost_of_transport == pytest.approx(6.0 / weight, rel=2e-3), "a file's own sum comes first"
     assert read.energy is None, "work alone is no balance"
 
 
@@ -201,7 +205,14 @@ def test_numbers_are_none_and_never_nan() -> None:
     data.attrs.clear()
     read = gait(run_of(data))
     assert read.speed_m_per_s == pytest.approx(0.01)
-    for field in ("speed_body_lengths_per_s", "slip_ratio", "cost_of_transport", "cost_of_transport_cables", "energy"):
+    for field in (
+        "speed_body_lengths_per_s",
+        "slip_ratio",
+        "cost_of_transport",
+        "cost_of_transport_net",
+        "cost_of_transport_cables",
+        "energy",
+    ):
         assert getattr(read, field) is None
     text = json.dumps(read.to_dict(), allow_nan=False)
     assert set(json.loads(text)) == {field.name for field in fields(Gait)}

@@ -367,12 +367,12 @@ def test_five_seconds_of_the_paper_s_worm_are_ordered(tmp_path: Path) -> None:
 
 
 def test_sensors_that_never_switch_off_silence_the_worm(tmp_path: Path) -> None:
-    """At a tolerance of 3 cm segment 2 is felt at rest while it contracts, so it lets go and none takes over."""
-    finer = {"body.mesh.elements_per_side": 3, "clock.physics_timestep_s": 0.005, "record.signals_interval_s": 0.005}
-    config = load_config("riddle2023-rods", {"sensor.tolerance_m": 0.03, "duration_s": 3.0, **finer})
+    """At a tolerance of 5 cm segment 2 is felt at rest while it contracts, so it lets go and none takes over."""
+    coarse = {"body.mesh.elements_per_side": 2}
+    config = load_config("riddle2023-rods", {"sensor.tolerance_m": 0.05, "duration_s": 3.0, **coarse})
     found = rhythm_score(simulate(config, tmp_path, progress=False))
     assert (found.verdict, found.order) == ("silent", (1, 2))
-    assert found.reason == "no contraction begins after 0.74 s"
+    assert found.reason == "no contraction begins after 0.75 s"
 
 
 def lengthened(peaks_m: list[float]) -> RhythmScore:

@@ -46,13 +46,16 @@ def test_numbers_of_a_written_down_run() -> None:
     assert numbers.real_time_factor == pytest.approx(0.5)
     assert numbers.elongation_mean_max_m == pytest.approx(PEAKS_M)
     assert numbers.elongation_first_helix_pp_m == pytest.approx([FIRST_HELIX_EXCESS * p for p in PEAKS_M])
+    others = (6 - FIRST_HELIX_EXCESS) / 5
+    assert numbers.elongation_most_pp_m == numbers.elongation_first_helix_pp_m
+    assert numbers.elongation_least_pp_m == pytest.approx([others * p for p in PEAKS_M])
     assert numbers.middle_deficit == pytest.approx(0.5)
     assert numbers.middle_deficit_mean == pytest.approx(0.5)
     assert numbers.end_difference == pytest.approx(0.25)
     assert numbers.contraction_force_median_N == HOLDING_FORCE_N
     assert numbers.segment_force_median_N == [HOLDING_FORCE_N] * 3
     assert numbers.segment_force_peak_N == [HOLDING_FORCE_N] * 3
-    assert numbers.travel_m == pytest.approx(-0.06)
+    assert numbers.travel_m == pytest.approx(0.06), "it leads towards -x, so forwards is positive"
     assert numbers.travel_path_m == pytest.approx(0.06)
     assert numbers.ring_length_min_m == pytest.approx(0.36)
     assert numbers.edge_strain_max == pytest.approx(0.001)

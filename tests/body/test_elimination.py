@@ -17,7 +17,11 @@ from annelid.config import load_config
 from annelid.morphology import Array, Indices
 
 SHORT = {"body.mesh.elements_per_side": 1}
-LONG = {"body.mesh.n_segments": 12, "body.mesh.elements_per_side": 3}
+LONG = {
+    "body.mesh.n_segments": 12,
+    "body.mesh.elements_per_side": 3,
+    "body.formulation.solver_tolerance": 1e-12,
+}
 
 
 def fill(pairs: Indices, order: Indices) -> int:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, mesh_of
-from annelid.body.rods import rayleigh_damping_s
-from annelid.config import Mesh, Strands, load_config
+from annelid.config import Mesh, load_config
 from annelid.morphology import helical_mesh
 
 Read = Callable[[mujoco.MjModel], Any]
@@ -46,10 +45,19 @@ def joint_damping(model: mujoco.MjModel) -> np.ndarray:
     return np.unique(damping[damping > 0])
 
 
+def damping_over_stiffness(model: mujoco.MjModel) -> set[float]:
+    joints = elastic_joints(model)
+    stiffness = model.jnt_stiffness.reshape(model.njnt, -1)[joints, 0]
+    damping = model.dof_damping.reshape(model.nv, -1)[model.jnt_dofadr[joints], 0]
+    return set(np.round(damping / stiffness, 12))
+
+
 BOTH: list[tuple[dict[str, Any], Read, Any]] = [
     ({"clock.physics_timestep_s": 0.004}, lambda m: m.opt.timestep, 0.004),
     ({"arena.gravity_m_per_s2": 1.62}, lambda m: m.opt.gravity.tolist(), [0, 0, -1.62]),
     ({"arena.friction": 0.37}, lambda m: set(m.geom_friction[[*touching(m), m.geom("floor").id], 0]), {0.37}),
+    ({"arena.friction_cone": "elliptic"}, lambda m: m.opt.cone, mujoco.mjtCone.mjCONE_ELLIPTIC),
+    ({}, lambda m: m.opt.cone, mujoco.mjtCone.mjCONE_PYRAMIDAL),
     ({"arena.floor_gap_m": 0.02}, lambda m: m.geom("floor").pos[2], -0.02),
     ({"arena.contact_time_constant_s": 0.013}, lambda m: set(m.geom_solref[touching(m), 0]), {0.013}),
     (
@@ -93,6 +101,12 @@ RODS: list[tuple[dict[str, Any], Read, Any]] = [
     ({"body.strands.radius_m": 0.003}, lambda m: set(m.flex_radius) | set(m.geom_size[touching(m), 0]), {0.003}),
     ({"body.mesh.elements_per_side": 2}, lambda m: set(m.flex_elemnum), {14 * 2 + 2 * 2}),
     ({"body.mesh.elements_per_end": 1}, lambda m: set(m.flex_elemnum), {14 * 3 + 2}),
+    ({"body.strands.damping_time_s": 0.2}, lambda m: set(m.flex_damping), {0.2}),
+    (
+        {"body.strands.loss_factor": 0.4, "body.strands.loss_frequency_Hz": 0.5},
+        lambda m: set(m.flex_damping),
+        {0.4 / pi},
+    ),
 ]
 CHAINS: list[tuple[dict[str, Any], Read, Any]] = [
     ({}, lambda m: m.opt.solver, mujoco.mjtSolver.mjSOL_PGS),
@@ -112,6 +126,11 @@ CHAINS: list[tuple[dict[str, Any], Read, Any]] = [
     ({"body.formulation.joint": "ball"}, lambda m: len(elastic_joints(m)), 12 * 47),
     ({"body.formulation.joint": "hinges"}, lambda m: len(elastic_joints(m)), 12 * 47 * 3),
     ({"body.strands.joint_damping_Nms_per_rad": 0.3}, lambda m: joint_damping(m).tolist(), [0.3]),
+    (
+        {"body.strands.damping_time_s": 0.2},
+        damping_over_stiffness,
+        {0.2},
+    ),
 ]
 
 
@@ -146,9 +165,10 @@ def test_an_option_of_the_chain_reaches_the_engine(case: Any) -> None:
 
 
 def test_rods_get_the_same_damping_per_joint_as_the_chain() -> None:
-    strands = Strands(joint_damping_Nms_per_rad=0.12)
+    model = compiled({"body.strands.joint_damping_Nms_per_rad": 0.12})
     bending = 0.3e9 * pi * 0.002**4 / 4
-    assert rayleigh_damping_s(strands, 0.03) * bending / 0.03 == pytest.approx(0.12)
+    elements = model.flexedge_length0.reshape(model.nflex, -1).mean(axis=1)
+    assert model.flex_damping * bending / elements == pytest.approx(0.12)
 
 
 def test_the_chain_s_joints_resist_with_the_rod_s_stiffness_over_their_length() -> None:

@@ -119,12 +119,26 @@ def test_a_level_of_fidelity_resolves_the_worm_as_asked(annelid: Command) -> Non
     run = ("run", "--fidelity", "accurate", "--duration", "0.02", "--no-video", "--out", "accurate")
     done = annelid(*run)
     assert done.exit_code == 0, done.err
+    assert "--fidelity without a preset takes riddle2023-rods" in done.sentence()
     config = open_run(Path("accurate")).config
     assert config.name == "riddle2023-rods"
     assert config == load_config("riddle2023-rods", {"duration_s": 0.02}, fidelity="accurate")
-    done = annelid("run", "--fidelity", "paper", "--duration", "0.01", "--no-video", "--out", "paper")
+    refused = annelid("run", "--fidelity", "paper", "--no-video", "--out", "paper")
+    assert "annelid run riddle2023" in refused.sentence()
+    assert not Path("paper").exists()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_the_first_run_is_the_worm_with_soft_pins_and_says_what_it_compares_with(annelid: Command) -> None:
+    done = annelid("run", "--duration", "0.02", "--no-video", "--out", "first")
     assert done.exit_code == 0, done.err
-    assert open_run(Path("paper")).config == load_config("riddle2023", {"duration_s": 0.01})
+    assert open_run(Path("first")).config == load_config("riddle2023-fast", {"duration_s": 0.02})
+    words = " ".join(done.out.split())
+    assert "reference" in words
+    assert "deviation" in words
+    assert "this run differs from riddle2023-fast in duration_s" in words
+    longer = annelid("build", "--segments", "4", "-o", "four.xml")
+    assert "--segments without a preset takes riddle2023-rods" in longer.sentence()
 
 
 def test_presets_lists_prints_and_explains(annelid: Command) -> None:
@@ -155,7 +169,9 @@ def test_every_command_teaches_by_example(annelid: Command, command: str) -> Non
 
 def test_help_and_version_come_from_the_module_as_well() -> None:
     for option, says in (("--help", "annelid run"), ("--version", "annelid 0.")):
-        done = subprocess.run([sys.executable, "-m", "annelid", option], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-m", "annelid", option], capture_output=True, text=True, check=False, timeout=120
+        )
         assert done.returncode == 0
         assert says in done.stdout
 
@@ -188,3 +204,17 @@ def test_friction_that_depends_on_the_direction_is_not_written_as_another(anneli
     refused = annelid("build", "riddle2023-rods", "--arena", "setae")
     assert refused.exit_code == 2
     assert "arena.backward_friction = 1.0 cannot be written" in refused.err
+
+
+def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
+    assert annelid("check").out.strip() == "nothing found"
+    assert annelid("check", "riddle2022-planar").exit_code == 0
+    thin = annelid("check", "wang", "--set", "body.mesh.radius=0.05")
+    assert thin.exit_code == 2
+    assert thin.out.startswith("error: body.rings.length_range_m = [0.62, 0.96]: a ring is 0.3 m long at rest")
+    told = json.loads(annelid("check", "wang", "--set", "sensor.tolerance=0.05", "--json").out)
+    assert [finding["severity"] for finding in told] == ["warning"]
+    refused = annelid("run", "wang", "--set", "body.mesh.radius=0.05", "--out", "thin")
+    assert refused.exit_code == 2
+    assert "set [0.195, 0.3]" in refused.sentence()
+    assert not Path("thin").exists()

@@ -25,7 +25,6 @@ def test_load_frame_writes_a_table_and_its_picture(annelid: Command) -> None:
     [
         (("experiment", "load-frame", "riddle2022-planar"), "no ring cable"),
         (("experiment", "load-frame", "--displacement", "2000"), "four fifths"),
-        (("experiment", "load-frame", "--cable-friction", "-1"), "must be a finite number"),
         (("experiment", "load-frame", "--data", "none.csv"), "cannot read none.csv"),
         (("calibrate", "--free", "yuong_modulus"), "did you mean 'young_modulus'"),
         (("calibrate", "--data", "none.csv"), "cannot read none.csv"),
@@ -83,7 +82,7 @@ def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, comm
     Path("taken").write_text("mine", encoding="utf-8")
     done = annelid("experiment", command, "-o", "taken", "--quiet")
     assert done.exit_code != 0
-    assert "taken is a file: name a folder with -o" in done.sentence()
+    assert "taken is a file: name a folder" in done.sentence()
     assert Path("taken").read_text(encoding="utf-8") == "mine"
 
 

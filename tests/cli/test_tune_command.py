@@ -7,6 +7,8 @@ from outcome import Command
 
 from annelid.config import load_config
 
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
+
 
 @pytest.mark.parametrize(
     ("arguments", "says"),

@@ -11,11 +11,14 @@ from outcome import Command
 from annelid.simulation.runfile import open_run
 from annelid.studies import uncertainty as package
 
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
+
+RODS = "riddle2023-rods"
 TINY = ("--duration", "0.1", "--no-video", "--jobs", "1")
 
 
 def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command) -> None:
-    command = ("run", "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")
+    command = ("run", RODS, "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")
     done = annelid(*command)
     assert done.exit_code == 0, done.err
     assert "drawn worms kept an ordered rhythm" in done.out
@@ -60,12 +63,12 @@ def test_an_interrupted_study_names_the_command_that_goes_on(annelid: Command, m
     ("arguments", "says"),
     [
         (("riddle2022-planar",), "body.kind = 'riddle2022' has no calibrated parameters"),
-        (("--vary", "floor_frction=0.1"), "did you mean 'floor_friction'"),
-        (("--vary", "floor_friction=much"), "the relative error must be a number"),
-        (("--vary", "floor_friction=true"), "the relative error must be a number"),
-        (("--vary", "floor_friction"), "not of the form field=value"),
-        (("--vary", "spring_rate=2"), "below 1"),
-        (("--uncertainty-from", "none.json"), "cannot read none.json"),
+        ((RODS, "--vary", "floor_frction=0.1"), "did you mean 'floor_friction'"),
+        ((RODS, "--vary", "floor_friction=much"), "the relative error must be a number"),
+        ((RODS, "--vary", "floor_friction=true"), "the relative error must be a number"),
+        ((RODS, "--vary", "floor_friction"), "not of the form field=value"),
+        ((RODS, "--vary", "spring_rate=2"), "below 1"),
+        ((RODS, "--uncertainty-from", "none.json"), "cannot read none.json"),
     ],
 )
 def test_bad_input_ends_in_one_sentence_and_leaves_nothing(

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import urllib.parse
 import urllib.request
 from pathlib import Path
 
@@ -76,7 +77,7 @@ def test_a_machine_without_a_display_says_so(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_without_viser_the_line_that_installs_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
-    for name in ("server", "show", "page"):
+    for name in ("guard", "server", "show", "page"):
         monkeypatch.delitem(sys.modules, f"annelid.view.live.{name}", raising=False)
     assert "pip install 'annelid[view]'" in refusal("--no-open")
 
@@ -90,8 +91,11 @@ def test_it_serves_this_machine_only_and_ends_on_ctrl_c() -> None:
             address = view.stdout.readline().split()[0]
             with urllib.request.urlopen(address, timeout=60) as answer:
                 assert b"<html" in answer.read(2000)
-            port = int(address.rsplit(":", 1)[1])
-            other = subprocess.run(["hostname", "-I"], capture_output=True, text=True, check=False).stdout.split()
+            port = urllib.parse.urlsplit(address).port
+            assert port is not None
+            other = subprocess.run(
+                ["hostname", "-I"], capture_output=True, text=True, check=False, timeout=120
+            ).stdout.split()
             for own_address in other[:1]:
                 with pytest.raises(ConnectionRefusedError):
                     socket.create_connection((own_address, port), timeout=2).close()

@@ -180,7 +180,7 @@ def test_a_section_of_another_kind_keeps_nothing_of_the_preset_s(tmp_path: Path)
 def test_it_is_listed_saved_and_not_laid_beside_the_paper() -> None:
     config = load_config("riddle2023-rods", programmed(ONE))
     assert RunConfig.model_validate_json(config.model_dump_json()) == config
-    assert any("{segment = 1, start_s = 0, stop_s = 0.6, activation = 1}" in line for line in field_lines(config))
+    assert any("{segment = 1, start_s = 0.0, stop_s = 0.6, activation = 1.0}" in line for line in field_lines(config))
     assert published(load_config("riddle2023-rods")) != {}
     assert published(config) == {}
 
@@ -231,7 +231,7 @@ def rods(duration_s: float) -> RunConfig:
 def test_a_worm_of_rods_contracts_its_ring_and_can_be_continued(tmp_path: Path) -> None:
     whole = simulate(rods(0.4), tmp_path / "3", progress=False)
     rings = whole.data["ring_length"].values.reshape(-1, 3, 2).sum(axis=2)
-    assert rings[-1, 1] < 0.8 * rings[0, 1]
+    assert rings[-1, 1] < 0.85 * rings[0, 1]
     before = whole.data["time"].values <= 0.05
     assert before.sum() > 1
     assert np.abs(rings[before] / rings[0] - 1).max() < 0.02

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 import annelid
 from annelid.cli import app
-from annelid.cli.common import config_of, or_default, overrides_of
+from annelid.cli.common import config_of, overrides_of
 
 ANNELID: Any = get_command(app)
 
@@ -34,6 +34,7 @@ QUICK = {
     ("annelid", "render"): (),
     ("annelid", "plot"): (),
     ("annelid", "show"): (),
+    ("annelid", "check"): (),
     ("annelid", "build"): ("--force",),
     ("annelid", "presets"): (),
     ("annelid", "arenas"): (),
@@ -61,7 +62,7 @@ SCRIPTS = (
 
 LONG = {
     ("annelid", "run", "--uncertainty"): ("thirteen runs", ("--uncertainty", "2", "--duration", "0.5", "--no-video")),
-    ("annelid", "paper"): ("40 minutes, or 5 with --quick", ("--quick",)),
+    ("annelid", "paper"): ("40 minutes, or 4 with --quick", ("--quick",)),
     ("annelid", "bench"): ("15 minutes", ("--quick",)),
     ("annelid", "robustness"): ("hours for 300 points", ("--points", "1")),
     ("annelid", "tune"): ("an hour", ("--trials", "2", "--duration", "1")),
@@ -160,11 +161,11 @@ def check_annelid(command: Command) -> None:
     name, given = parsed(words[1:])
     if "preset" in given and not given.get("resume") and not str(given["preset"]).endswith(".toml"):
         options = {"duration_s": given.get("duration"), "seed": given.get("seed")}
-        source = or_default(given["preset"], given.get("fidelity"))
         overrides = overrides_of(given.get("assignments"), **options)
         arena = given.get("arena")
         if arena is None or not str(arena).endswith(".toml"):
-            config_of(source, overrides, given.get("segments"), given.get("fidelity"), arena)
+            segments, fidelity = given.get("segments"), given.get("fidelity")
+            config_of(given["preset"], overrides, segments, fidelity, arena, given.get("uncertainty"))
     assert name in words
 
 
@@ -290,7 +291,12 @@ def test_a_benchmark_runs(command: Command, tmp_path: Path) -> None:
     if not BENCHMARKS_NEED.get(script.stem, True):
         pytest.skip(f"{script.name} needs a program or package that is not installed")
     answer = subprocess.run(
-        [sys.executable, script, *command.words[2:]], cwd=tmp_path, capture_output=True, text=True, check=False
+        [sys.executable, script, *command.words[2:]],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=1200,
     )
     assert answer.returncode == 0, answer.stderr
     assert answer.stdout

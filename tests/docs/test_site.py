@@ -20,10 +20,17 @@ from annelid.config import field_paths
 from navigation import entries, expanded
 
 TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+LONG = ("paper_to_robot", "sweeps")
+"""Tutorials of a quarter of a minute, which only the slow tests run."""
 
 
-@pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda path: path.stem)
-def test_a_tutorial_runs_from_top_to_bottom(tutorial: Path, tutorials_run_once: None) -> None:
+@pytest.mark.parametrize(
+    "tutorial",
+    [pytest.param(each, id=each.stem, marks=[pytest.mark.slow] * (each.stem in LONG)) for each in TUTORIALS],
+)
+def test_a_tutorial_runs_from_top_to_bottom(tutorial: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Whatever was built on this machine before.
+    monkeypatch.setenv(notebooks.CACHE_VARIABLE, str(tmp_path))
     shown = notebooks.run(tutorial.read_text(encoding="utf-8"), tutorial.stem)
     assert "```text { .output }" in shown.markdown
     assert "Traceback" not in shown.markdown

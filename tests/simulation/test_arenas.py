@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import cos, radians, sin
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -25,6 +26,10 @@ RESTLESS = ("floor", "setae", "slope", "rails", "steps", "rough", "pipe", "pipe.
 
 def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
     return load_config(preset, {name.replace("__", "."): value for name, value in changes.items()}, arena=arena)
+
+
+QUICK: dict[str, Any] = {"body__strands__damping_time_s": None, "body__strands__joint_damping_Nms_per_rad": 0.02}
+"""Damped little, so that a worm soon comes to rest."""
 
 
 def settled(plant: WormPlant, duration_s: float, activation: Array | None = None) -> WormPlant:
@@ -52,7 +57,7 @@ def skin_places(plant: WormPlant) -> Array:
 
 @pytest.mark.parametrize("arena", RESTLESS)
 def test_a_worm_at_rest_is_carried_by_its_arena(arena: str) -> None:
-    made = config(arena, body__strands__joint_damping_Nms_per_rad=0.02)
+    made = config(arena, **QUICK)
     plant = settled(reset(made), 1.2)
     assert plant.alarm() is None
     total = plant.feel().contact_force_N.sum(axis=0)
@@ -70,9 +75,8 @@ def test_a_part_of_the_skin_has_one_contact_at_most(arena: str) -> None:
 
 def test_planes_that_move_act_on_a_level_floor_as_the_engine_s_own_plane_does() -> None:
     """Setae whose two frictions differ in the last digit only; what has come to rest does not approach its planes."""
-    quick = {"body__strands__joint_damping_Nms_per_rad": 0.02}
-    still = settled(reset(config("floor", **quick)), 2.0)
-    moving = settled(reset(config("floor", arena__backward_friction=1.0 + 1e-12, **quick)), 2.0)
+    still = settled(reset(config("floor", **QUICK)), 2.0)
+    moving = settled(reset(config("floor", arena__backward_friction=1.0 + 1e-12, **QUICK)), 2.0)
     assert still.ground is None
     assert moving.ground is not None
     weight = still.total_mass_kg * 9.81
@@ -81,7 +85,7 @@ def test_planes_that_move_act_on_a_level_floor_as_the_engine_s_own_plane_does() 
 
 
 def test_the_chain_touches_a_pipe_with_its_vertices() -> None:
-    plant = settled(reset(config("pipe", "riddle2023")), 0.15)
+    plant = settled(reset(config("pipe", "riddle2023")), 0.02)
     assert plant.model.npair == plant.geometry.n_strands * plant.geometry.vertices_m.shape[1]
     at_rest = WormPlant(config("pipe", "riddle2023"))
     at_rest.reset(0)
@@ -107,7 +111,7 @@ def sliding(slope_deg: float) -> tuple[Array, WormPlant]:
         arena__friction=0.2,
         arena__backward_friction=1.0,
         arena__floor_gap_m=0.0,
-        body__strands__joint_damping_Nms_per_rad=0.02,
+        **QUICK,
     )
     plant = reset(made)
     places = []
@@ -157,7 +161,7 @@ def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
         worm.reset(0)
     every = alone[0].steps_to_move()
     felt: list[Sensation] = []
-    for _ in range(25):
+    for _ in range(10):
         felt = [stride(worm, pull, every) for worm in bodies.worms]
         for plant, ours in zip(alone, felt, strict=True):
             theirs = plant.stride(pull, every)
@@ -181,9 +185,9 @@ def test_worms_in_pipes_of_different_shapes_make_one_batch() -> None:
 
 @pytest.mark.parametrize("arena", ["pipe.taper", "setae"])
 def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path, arena: str) -> None:
-    whole = simulate(config(arena, duration_s=0.6), tmp_path / "whole", progress=False)
-    simulate(config(arena, duration_s=0.3), tmp_path / "first", progress=False)
-    rest = simulate(config(arena, duration_s=0.6), tmp_path / "rest", resume=tmp_path / "first", progress=False)
+    whole = simulate(config(arena, duration_s=0.2), tmp_path / "whole", progress=False)
+    simulate(config(arena, duration_s=0.1), tmp_path / "first", progress=False)
+    rest = simulate(config(arena, duration_s=0.2), tmp_path / "rest", resume=tmp_path / "first", progress=False)
     ours, theirs = rest.data, whole.data.isel(time=whole.data["time"] >= rest.data["time"][0])
     for name in ("ring_length", "contact_force", "center_of_mass"):
         assert np.array_equal(ours[name].values, theirs[name].values), name

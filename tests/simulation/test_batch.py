@@ -80,7 +80,7 @@ def assert_the_same(alone: Path, batched: Path) -> None:
     for name, (dims, described, values) in expected.items():
         dims_batched, described_batched, values_batched = actual[name]
         assert (dims, described) == (dims_batched, described_batched), name
-        if name != "wall_time":
+        if name not in ("wall_time", "cpu_time"):
             assert np.array_equal(bits(values), bits(values_batched)), name
 
 
@@ -105,11 +105,16 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+LONG = ("physics finer than control", "separate pins", "chain with direct pins, RK4")
+
+
+@pytest.mark.parametrize(
+    "variant", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in VARIANTS]
+)
 def test_each_worm_is_bit_for_bit_the_worm_that_runs_alone(variant: str, tmp_path: Path) -> None:
-    configs = [config(**VARIANTS[variant], **own) for own in DIFFERENT]
+    configs = [config(**VARIANTS[variant], **own) for own in DIFFERENT[1:]]
     result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)
-    assert result.statuses == ("complete",) * 3
+    assert result.statuses == ("complete",) * 2
     for one, folder in zip(configs, result.folders, strict=True):
         simulate(one, tmp_path / "alone", progress=False, overwrite=True)
         assert_the_same(tmp_path / "alone", folder)
@@ -118,11 +123,11 @@ def test_each_worm_is_bit_for_bit_the_worm_that_runs_alone(variant: str, tmp_pat
 
 
 def test_the_number_of_threads_and_of_worms_changes_nothing(tmp_path: Path) -> None:
-    configs = [config(**own) for own in DIFFERENT] * 2
+    configs = [config(**own) for own in DIFFERENT[1:]] * 2
     one = simulate_batch(configs, tmp_path / "one", threads=1, progress=False)
-    three = simulate_batch(configs[:3], tmp_path / "three", threads=3, progress=False)
+    three = simulate_batch(configs[:2], tmp_path / "three", threads=3, progress=False)
     for number, folder in enumerate(one.folders):
-        assert_the_same(folder, three.folders[number % 3])
+        assert_the_same(folder, three.folders[number % 2])
     assert not np.array_equal(one[0].data["qpos"], one[1].data["qpos"]), "they must differ from one another"
 
 
@@ -197,9 +202,9 @@ def test_ctrl_c_ends_all_worms_and_each_can_be_continued_bit_for_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("annelid.simulation.batch.loop.PROGRESS_INTERVAL_S", 0.0)
-    configs = [config(**own) for own in DIFFERENT]
+    configs = [config(**own) for own in DIFFERENT[1:]]
     result = simulate_batch(configs, tmp_path / "batch", progress=interrupt_at(0.1))
-    assert result.statuses == ("interrupted",) * 3
+    assert result.statuses == ("interrupted",) * 2
     assert result.failed == []
     for i, one in enumerate(configs):
         whole = simulate(one, tmp_path / f"alone-{i}", progress=False).data

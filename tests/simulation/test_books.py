@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.config import ServoRings, load_config
+from annelid.config import Rings, ServoRings, load_config
 from annelid.simulation.books import Bookkeeper
 from annelid.simulation.worm import WormPlant
 
@@ -134,7 +134,7 @@ def test_the_books_close_with_the_matrices_of_the_engine_s_integrator(rings: dic
 
 SPRING_MASS = """
 <mujoco>
-  <option integrator="discrete" solver="Newton" timestep="0.01" gravity="0 0 0"/>
+  <option integrator="discrete" solver="Newton" timestep="{step_s}" gravity="0 0 0"/>
   <worldbody>
     <site name="wall"/>
     <body pos="1 0 0"><joint type="slide" axis="1 0 0"/><geom size="0.1" mass="2"/><site name="mass"/></body>
@@ -144,17 +144,21 @@ SPRING_MASS = """
       <site site="wall"/><site site="mass"/>
     </spatial>
   </tendon>
-  <actuator>
-    <general name="ring_0" tendon="cable" dyntype="integrator" biastype="affine" gainprm="200" biasprm="0 -200 -10"
-      forcerange="-30 0" ctrlrange="-1 1" actrange="0.5 1"/>
-  </actuator>
+  <actuator><general name="ring_0" tendon="cable" {actuator}/></actuator>
 </mujoco>
 """
+SERVO = (
+    'dyntype="integrator" biastype="affine" gainprm="200" biasprm="0 -200 -10" '
+    'forcerange="-30 0" ctrlrange="-1 1" actrange="0.5 1"'
+)
+RINGS = Rings()
+LAW = "0.75 1.05 117.57 200 0.58 1.6 1.5 1.3 1.2"
+MUSCLE = f'gaintype="muscle" biastype="muscle" lengthrange="0.5 1.1" gainprm="{LAW}" biasprm="{LAW}"'
 
 
 def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
     """All is linear: of the muscle's work, the integrator takes (m dv^2 + k dx^2) / 2 and the damping of the change."""
-    model = mujoco.MjModel.from_xml_string(SPRING_MASS)
+    model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=0.01, actuator=SERVO))
     data = mujoco.MjData(model)
     data.act[:] = 1.0
     bookkeeper = Bookkeeper(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
@@ -164,7 +168,9 @@ def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
     for _ in range(80):
         x, v = float(data.qpos[0]), float(data.qvel[0])
         mujoco.mj_step(model, data)
-        books += bookkeeper.step({name: getattr(data, name) for name in bookkeeper.outputs}, data.ctrl)
+        tension, entries = bookkeeper.step({name: getattr(data, name) for name in bookkeeper.outputs}, data.ctrl)
+        books += entries
+        assert tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
         dx, dv = float(data.qpos[0]) - x, float(data.qvel[0]) - v
         expected += 0.5 * mass * dv**2 + 0.5 * rate * dx**2 + damping * dv * dx
         held = 0.5 * mass * data.qvel[0] ** 2 + 0.5 * rate * (data.qpos[0] + 0.1) ** 2 - 0.5 * rate * 0.1**2
@@ -173,6 +179,59 @@ def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
     assert data.qpos[0] < -0.1
     assert books.muscle_work[0] > 0.05
     assert books.damping_loss > 0.001
+
+
+def pulled(data: mujoco.MjData, before_m_per_s: float) -> float:
+    """What drew the mass of `SPRING_MASS` in during a step, N, by Newton's second law: all but spring and damper."""
+    speed, spring_m = float(data.qvel[0]), float(data.qpos[0]) + 0.1
+    return -2.0 * (speed - before_m_per_s) / data.model.opt.timestep - 80.0 * spring_m - 1.5 * speed
+
+
+@pytest.mark.parametrize("step_s", [0.02, 0.005, 0.0005])
+def test_the_tension_of_a_muscle_that_sets_in_at_once_is_what_draws_its_load(step_s: float) -> None:
+    model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=step_s, actuator=MUSCLE))
+    data, bookkeeper = mujoco.MjData(model), Bookkeeper(model, RINGS)
+    data.ctrl[:] = 1.0
+    for step in range(round(0.2 / step_s)):
+        before = float(data.qvel[0])
+        mujoco.mj_step(model, data)
+        engine = {name: getattr(data, name) for name in bookkeeper.outputs}
+        tension, _ = bookkeeper.step(engine, data.ctrl)
+        assert tension[0] == pytest.approx(pulled(data, before), rel=1e-6)
+        if step == 0:
+            assert 0.0 < tension[0] < -data.actuator_force[0], "the load yields within the step"
+    assert data.qpos[0] < -0.1
+
+
+def test_what_pulls_at_the_start_of_a_contraction_is_the_same_at_long_and_short_steps() -> None:
+    """The force before the step is 117 N at any step; work is what pulled times the shortening of the drawn path."""
+    peaks = []
+    for step_s in (0.02, 0.005, 0.002):
+        plant = worm(step_s)
+        before, work = plant.posture.ring_length, 0.0
+        recorded, engine = [], []
+        for _ in range(round(0.1 / step_s)):
+            felt = plant.step(np.array([1.0, 0.0, 0.0]))
+            recorded.append(float(felt.muscle_force_N[0]))
+            engine.append(-float(plant.data.actuator_force[0]))
+            work += float(felt.muscle_force_N[0] * (before - felt.ring_length_m)[0])
+            before = felt.ring_length_m
+        assert max(engine) > 110.0
+        peaks.append(max(recorded))
+        assert work == pytest.approx(plant.books.muscle_work[0], rel=2e-3)
+        assert np.array_equal(plant.read(False)["muscle_force"], plant.feel().muscle_force_N)
+    assert all(4.0 < peak < 10.0 for peak in peaks), peaks
+
+
+def test_positive_work_is_that_of_the_steps_in_which_a_muscle_shortens() -> None:
+    plant = worm(0.005)
+    expected, last = np.zeros(3), plant.books.muscle_work
+    for step in range(80):
+        plant.step(np.array([1.0, 0.0, 0.3]) if step < 40 else np.array([0.3, 1.0, 0.0]))
+        expected += np.maximum(plant.books.muscle_work - last, 0.0)
+        last = plant.books.muscle_work
+    assert plant.books.positive_work == pytest.approx(expected, abs=1e-12)
+    assert (plant.books.positive_work - last).max() > 1e-3, "a muscle must have been lengthened while it pulled"
 
 
 def test_a_chain_under_euler_lacks_only_the_square_of_its_changes_of_velocity() -> None:

@@ -30,7 +30,7 @@ def start(out: Path, duration_s: float, pause_s: float) -> subprocess.Popen[str]
     )
     deadline = time.monotonic() + 60
     while not (out / "run.nc").exists():
-        assert child.poll() is None, child.communicate()
+        assert child.poll() is None, child.communicate(timeout=120)
         assert time.monotonic() < deadline
         time.sleep(0.01)
     return child
@@ -47,7 +47,7 @@ def test_a_killed_run_keeps_all_but_its_last_second_and_can_be_continued(tmp_pat
     time.sleep(0.7)
     child.send_signal(signal.SIGKILL)
     killed = time.monotonic()
-    child.communicate()
+    child.communicate(timeout=120)
 
     with xarray.open_dataset(tmp_path / "run" / "run.nc", engine="h5netcdf") as plain:
         n = int(plain["samples_written"])
@@ -123,5 +123,13 @@ def test_a_run_in_another_thread_needs_no_signals(tmp_path: Path) -> None:
         kwargs={"plant": ToyPlant(), "controller": ToyController()},
     )
     thread.start()
-    thread.join()
+    thread.join(60)
     assert open_run(tmp_path).status == "complete"
+
+
+@pytest.mark.slow
+def test_these_tests_pass_where_interruptions_are_ignored() -> None:
+    """As under nohup, or in the background of a script."""
+    words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__, "-k", "interrupted"]
+    ignored = subprocess.Popen(words, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+    assert ignored.wait(timeout=300) == 0

@@ -30,7 +30,14 @@ def test_no_modulation_is_the_plain_run_bit_for_bit(tmp_path: Path) -> None:
     assert np.all(turning.data["half_scale"] == 1.0)
 
 
-@pytest.mark.parametrize("turning", [LEFT, TOUCH, HEADING], ids=["constant", "touch", "heading"])
+@pytest.mark.parametrize(
+    "turning",
+    [
+        pytest.param(LEFT, id="constant", marks=pytest.mark.slow),
+        pytest.param(TOUCH, id="touch"),
+        pytest.param(HEADING, id="heading"),
+    ],
+)
 def test_a_continued_run_is_the_whole_run_bit_for_bit(turning: dict[str, Any], tmp_path: Path) -> None:
     whole = simulate(small_config(**turning), tmp_path / "whole", progress=False)
     simulate(small_config(**turning, duration_s=0.2), tmp_path / "first", progress=False)

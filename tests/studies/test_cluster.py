@@ -7,15 +7,18 @@ import multiprocessing
 import os
 import signal
 import sys
+import time
 from collections import Counter
-from concurrent.futures import Future
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Future, process
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from annelid.config.cluster import Local, Pool, Scheduler, Slurm, find_cluster
+from annelid.config.cluster import Pool, Scheduler, Slurm, find_cluster
 from annelid.errors import ClusterError, ConfigError, MissingDependency, RunKilled
 from annelid.simulation.runfile import FILE_NAME
 from annelid.studies.attempt import (
@@ -24,15 +27,15 @@ from annelid.studies.attempt import (
     Files,
     Task,
     attempt,
-    bring_home,
+    fetch_results,
     new_draft,
     own_code,
     publish,
 )
 from annelid.studies.case import PLANAR, Case
-from annelid.studies.cluster import LocalWorkers, SchedulerWorkers, slurm_cluster, threads_of, workers_of
+from annelid.studies.cluster import SchedulerWorkers, slurm_cluster, workers_of
 from annelid.studies.store import Store, case_key
-from annelid.studies.workers import Result, Workers
+from annelid.studies.workers import Processes, Result, Workers
 
 
 def planar(seed: int = 0, duration_s: float = 0.1) -> Case:
@@ -143,7 +146,9 @@ def test_a_run_that_two_workers_compute_is_there_once(tmp_path: Path) -> None:
     first = (store.path(planar()) / FILE_NAME).stat().st_mtime_ns
     attempt(task)
     attempt(replace(task, mark="another machine's"))
-    bring_home({OUTCOME_NAME: b"{}", FILE_NAME: b""}, store.path(planar()), "runs")
+    files = attempt(replace(task, mark="another machine's"))
+    assert files is not None
+    fetch_results(files, store.path(planar()), planar().config, "runs")
     assert (store.path(planar()) / FILE_NAME).stat().st_mtime_ns == first
     assert folders(store) == [store.path(planar())]
 
@@ -182,16 +187,15 @@ def test_failures_are_told_and_the_others_computed(tmp_path: Path) -> None:
     assert "overshoot" in str(failed[case_key(IMPOSSIBLE)])
 
 
-class OneDeadly(LocalWorkers):
-    """Workers that the run of seed 5 kills whenever one takes it up."""
-
-    def submit(self, task: Task) -> Result:
-        if json.loads(task.config)["seed"] == 5 and self._client is not None:
-            return self._client.get_executor(pure=False).submit(os._exit, 1)
-        return super().submit(task)
+def die_at_seed_5(task: Task) -> Files | None:
+    """Attempts a run, but is killed by that of seed 5."""
+    if json.loads(task.config)["seed"] == 5:
+        os._exit(1)
+    return attempt(task)
 
 
-def test_killed_workers_lose_and_double_nothing(tmp_path: Path) -> None:
+def test_killed_workers_lose_and_double_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.studies.workers.attempt", die_at_seed_5)
     cases = [*(planar(seed) for seed in range(12)), IMPOSSIBLE]
     failed: dict[str, Exception] = {}
     killed: list[int] = []
@@ -203,7 +207,7 @@ def test_killed_workers_lose_and_double_nothing(tmp_path: Path) -> None:
             os.kill(victim, signal.SIGKILL)
             killed.append(victim)
 
-    with OneDeadly(2, retries=1) as workers:
+    with Processes(2, retries=1) as workers:
         store = Store(tmp_path, workers)
         outcomes = store.compute(cases, progress=kill_one, failed=failed)
     assert killed
@@ -212,46 +216,91 @@ def test_killed_workers_lose_and_double_nothing(tmp_path: Path) -> None:
     assert "died 2 times" in str(failed[case_key(planar(5))])
     assert {case_key(case) for case in cases} == set(outcomes) | set(failed)
     assert {path.name for path in folders(store)} == {outcome.path.name for outcome in outcomes.values()}
-    # The second call needs no Dask: what is there is found, and what was killed is computed.
-    assert len(Store(tmp_path).compute(cases[:-1], jobs=1)) == 12
+    # In the second call what is there is found, and what was killed is computed.
+    monkeypatch.undo()
+    assert len(Store(tmp_path, Here([])).compute(cases[:-1])) == 12
 
 
-def test_workers_of_dask_are_processes_of_one_thread_without_a_dashboard() -> None:
-    with LocalWorkers(1, retries=0) as workers:
-        assert workers.slots() == 1
-        client = workers._client
-        assert client is not None
-        environment: Any = client.run(lambda: dict(os.environ))
-        assert {of_one["OMP_NUM_THREADS"] for of_one in environment.values()} == {"1"}
-        assert {of_one["OPENBLAS_NUM_THREADS"] for of_one in environment.values()} == {"1"}
-        assert list(threads_of(client).values()) == [1]
-        assert client.scheduler_info()["services"].get("dashboard") != 8787
+def thread_settings(task: Task) -> Any:
+    return {name: os.environ[name] for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+
+
+def test_a_process_computes_on_one_thread_and_is_replaced_when_killed_idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.studies.workers.attempt", thread_settings)
+    any_task: Any = None
+    with Processes(1, retries=0) as workers:
+        assert set(workers.submit(any_task).result(30).values()) == {"1"}  # type: ignore[union-attr]
+        (child,) = [one for one in multiprocessing.active_children() if one.pid is not None]
+        child.kill()
+        child.join(30)
+        # A run that comes before the pool has noticed is tried again by the store, not by its workers.
+        wait_until(lambda: workers._processes[0].pool._broken, 20.0)
+        assert set(workers.submit(any_task).result(30).values()) == {"1"}  # type: ignore[union-attr]
+
+
+def test_a_run_handed_over_while_its_process_dies_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.studies.workers.attempt", thread_settings)
+    any_task: Any = None
+    with Processes(1, retries=0) as workers:
+        workers.submit(any_task).result(30)
+        pool, make = workers._processes[0].pool, process._WorkItem
+
+        def killed_meanwhile(*arguments: Any) -> Any:
+            """Stands between the pool's look whether it is broken and its note of the call."""
+            monkeypatch.setattr(process, "_WorkItem", make)
+            for child in multiprocessing.active_children():
+                child.kill()
+            # Newer versions of Python keep the pool from finding out in between.
+            with suppress(AssertionError):
+                wait_until(lambda: pool._broken, 2.0)
+            time.sleep(0.2)
+            return make(*arguments)
+
+        monkeypatch.setattr(process, "_WorkItem", killed_meanwhile)
+        # It ends, either way.
+        assert isinstance(workers.submit(any_task).exception(30), BrokenExecutor | None)
+
+
+def wait_until(condition: Callable[[], object], limit_s: float) -> None:
+    end = time.monotonic() + limit_s
+    while not condition():
+        assert time.monotonic() < end, f"it did not happen within {limit_s:g} s"
+        time.sleep(0.01)
 
 
 def test_without_a_scheduler_one_sentence_says_so() -> None:
     workers = SchedulerWorkers(Scheduler(address="tcp://127.0.0.1:9", reconnect_s=0.5))
     with pytest.raises(ClusterError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
         workers.slots()
-    with pytest.raises(ConfigError, match="no such scheduler file"):
+    with pytest.raises(ConfigError, match=r"cannot read the scheduler file nowhere\.json"):
         SchedulerWorkers(Scheduler(address="nowhere.json")).slots()
 
 
-@pytest.mark.parametrize("text", ["local", "slurm", "tcp://127.0.0.1:9"])
+@pytest.fixture
+def with_sbatch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine where jobs of Slurm could be submitted, but are not."""
+    monkeypatch.setattr("annelid.studies.cluster.SBATCH", "true")
+
+
+@pytest.mark.usefixtures("with_sbatch")
+@pytest.mark.parametrize("text", ["slurm", "tcp://127.0.0.1:9"])
 def test_without_dask_the_line_that_installs_it_is_told(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingDependency, match=r"pip install 'annelid\[sweep\]'"):
         workers_of(find_cluster(text)).slots()
 
 
+@pytest.mark.usefixtures("with_sbatch")
 def test_without_dask_jobqueue_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "dask_jobqueue.slurm", None)
     with pytest.raises(MissingDependency, match=r"pip install 'annelid\[slurm\]'"):
         workers_of(Slurm()).slots()
 
 
+@pytest.mark.usefixtures("with_sbatch")
 @pytest.mark.parametrize("text", ["processes", "local", "slurm", "tcp://10.0.0.1:8786", "scheduler.json"])
 def test_a_word_names_a_cluster(text: str) -> None:
-    kinds = {"processes": Pool, "local": Local, "slurm": Slurm}
+    kinds = {"processes": Pool, "local": Pool, "slurm": Slurm}
     assert isinstance(find_cluster(text), kinds.get(text, Scheduler))
     assert isinstance(workers_of(find_cluster(text), 1), Workers)
 

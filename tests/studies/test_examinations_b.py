@@ -27,6 +27,8 @@ from annelid.studies.examinations.side_by_side import TIGHT
 from annelid.studies.examinations.timestep import EARLY_S, HARD, TIMESTEP, Start, read_start, velocity_limit
 from annelid.studies.store import Store, case_key
 
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
+
 EXAMINATIONS = (NOISE, TIMESTEP, DISCRETIZATION, GATE)
 WALK = RhythmScore("ordered", "", (1, 2, 3), 2.6, 0.0, 1.0, 1, 1, 1.0, 4.0)
 LIMP = replace(WALK, regularity=0.6)

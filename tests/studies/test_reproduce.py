@@ -10,9 +10,10 @@ from annelid.errors import ConfigError
 from annelid.studies import paper
 from annelid.studies.case import PLANAR, RODS, Case, one_after_the_other
 from annelid.studies.claims import claim_cases
-from annelid.studies.claims.evidence import nearness
 from annelid.studies.examination import Effort, Examination, Findings, Results, Table
 from annelid.studies.examinations import EXAMINATIONS
+
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 SHORT = Case(PLANAR, {"duration_s": 0.2})
 SLOWER = Case(PLANAR, {"duration_s": 0.2, "controller.gate_time_constant_ms": 250})
@@ -103,19 +104,3 @@ def test_the_open_loop_protocol_holds_each_segment_in_turn() -> None:
     assert config.duration_s == 2.0
     spans = [(c.segment, c.start_s, c.stop_s) for c in config.controller.contractions]  # type: ignore[union-attr]
     assert spans == [(1, 0.0, 0.5), (2, 0.75, 1.25), (3, 1.5, 2.0)]
-
-
-@pytest.mark.parametrize(
-    ("ours", "theirs", "expected"),
-    [
-        (2.5, 2.5, ("holds", "")),
-        (2.51, 2.5, ("holds", "")),
-        (2.6, 2.5, ("holds within", "4.0 %")),
-        (2.4, 2.5, ("holds within", "4.0 %")),
-        (2.8, 2.5, ("does not hold", "")),
-    ],
-)
-def test_a_number_holds_within_a_stated_margin_up_to_a_tenth(
-    ours: float, theirs: float, expected: tuple[str, str]
-) -> None:
-    assert nearness(ours, theirs) == expected

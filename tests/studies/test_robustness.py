@@ -10,9 +10,13 @@ import numpy as np
 import pytest
 
 from annelid.analysis.score import RhythmScore
+from annelid.config import TimedWave
 from annelid.errors import ConfigError, RunFileError
+from annelid.plausibility import tolerance_window_m
 from annelid.studies import robustness as study
 from annelid.studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, shares_table, wilson
+
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
 
@@ -41,15 +45,26 @@ def test_the_sample_is_a_latin_hypercube() -> None:
     assert len({p.seed for p in sample}) == n
 
 
-def test_a_point_becomes_a_run_under_either_controller() -> None:
+def test_a_point_becomes_a_run_under_every_controller() -> None:
     point = replace(points()[3], n_segments=5)
     configs = [point.case(kind).config for kind in CONTROLLERS]
-    assert [config.controller.kind for config in configs] == list(CONTROLLERS)
+    assert [config.controller.kind for config in configs] == ["sns", "sns", "sns-robust", "timed"]
+    low_m, high_m = tolerance_window_m(configs[0]) or (0.0, 0.0)
+    assert [config.sensor.tolerance_m for config in configs[:2]] == [
+        0.015,
+        pytest.approx((low_m + high_m) / 2, abs=1e-4),
+    ]
     for config in configs:
         assert config.body.n_segments == 5
         assert config.sensor.noise_m == point.noise_m
         assert config.duration_s >= 2 * 0.875 + 2.2 * 5 * 0.875
         assert config.seed == point.seed
+
+
+def test_the_timed_wave_contracts_segments_in_the_papers_turns() -> None:
+    wave = points()[0].case("timed").config.controller
+    assert isinstance(wave, TimedWave)
+    assert (wave.rise_s, wave.hold_s, wave.fall_s, wave.interval_s) == (0.0, 0.875, 0.0, 0.875)
 
 
 def test_the_robust_network_starts_in_every_way_equally_often() -> None:
@@ -120,14 +135,15 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path) -> None:
     ours = study.robustness(tmp_path, 1, controllers=["sns-robust"], jobs=1)
     assert [one.controller for one in ours] == ["sns-robust"]
-    both = study.robustness(tmp_path, 1, jobs=1)
+    pair = ["sns", "sns-robust"]
+    both = study.robustness(tmp_path, 1, controllers=pair, jobs=1)
     assert both[1:] == ours
     runs = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")}
     assert len(runs) == 2
-    assert study.robustness(tmp_path, 1, jobs=1) == both
+    assert study.robustness(tmp_path, 1, controllers=pair, jobs=1) == both
     assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == runs
     content = json.loads((tmp_path / "robustness.json").read_text())
-    assert [one["controller"] for one in content["judged"]] == list(CONTROLLERS)
+    assert [one["controller"] for one in content["judged"]] == pair
     assert content["shares"]["sns"]["in_time"] == 0
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from annelid.errors import ConfigError
-from annelid.simulation.runfile import FILE_NAME
+from annelid.simulation.runfile import FILE_NAME, open_run
 from annelid.studies import store as module
 from annelid.studies import workers
 from annelid.studies.attempt import OUTCOME_NAME, compute_run, keep_outcome
@@ -122,7 +122,7 @@ def test_a_run_that_a_guard_stops_is_an_outcome(tmp_path: Path) -> None:
     case = Case(RODS, {"duration_s": 0.3, "guard.edge_strain": 1e-6})
     folder = tmp_path / "stopped"
     compute_run(case.config, folder)
-    stopped = keep_outcome(folder)
+    stopped = keep_outcome(open_run(folder))
     assert stopped.message
     assert json.loads((folder / OUTCOME_NAME).read_text())["message"] == stopped.message
 
@@ -165,7 +165,7 @@ def test_ctrl_c_keeps_finished_runs(tmp_path: Path) -> None:
     finally:
         if study.poll() is None:
             os.killpg(study.pid, signal.SIGKILL)
-            study.wait()
+            study.wait(60)
     assert short in store
     assert [path.parent for path in store.folder.glob(f"*/{OUTCOME_NAME}")] == [store.path(short)]
 

@@ -30,6 +30,8 @@ from annelid.studies.tune.results import write_gait, write_results, write_trials
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front, search
 from annelid.studies.tune.space import default_variables, parse_variable, variables_of
 
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
+
 PRESET = "riddle2023-rods"
 GATE, TOLERANCE = "controller.gate_time_constant_ms", "sensor.tolerance_m"
 CONFIG = load_config(PRESET)
@@ -41,7 +43,7 @@ def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycl
         period_s=2.0,
         speed_m_per_s=speed,
         speed_body_lengths_per_s=speed / 0.75,
-        cost_of_transport_cables=cost,
+        cost_of_transport=cost,
         slip_ratio=slip,
     )
 

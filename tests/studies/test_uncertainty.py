@@ -42,6 +42,8 @@ from annelid.studies.uncertainty.readings import readings
 from annelid.studies.uncertainty.report import as_json, headline, remarks, with_error, write_uncertainty
 from annelid.studies.uncertainty.study import Variant, combine, finer_steps, more_elements, plan
 
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
+
 SHORT = {"duration_s": 0.1, "record.signals_interval_s": 0.02}
 NOTHING: dict[str, float] = {"young_modulus": 0.0, "dry_friction": 0.0, "cable_friction": 0.0}
 
@@ -253,9 +255,9 @@ def test_a_damaged_fit_is_refused(damage: Any, says: str, tmp_path: Path) -> Non
 def test_a_missing_or_garbled_fit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read"):
         read_spread(tmp_path / "none.json")
-    for text in ("{", "[]", "3"):
+    for text, says in (("{", "not valid JSON"), ("[]", r"no calibration\.json"), ("3", r"no calibration\.json")):
         (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(ConfigError, match=r"no calibration\.json"):
+        with pytest.raises(ConfigError, match=says):
             read_spread(tmp_path / "bad.json")
 
 
@@ -369,7 +371,7 @@ def test_finer_steps_fit_the_control_step(control_ms: int, ratio: int, faster: b
 
 
 def test_elements_end_where_the_mesh_does() -> None:
-    assert more_elements(load_config(RODS)) == [3, 4]
+    assert more_elements(load_config(RODS)) == [4, 5]
     assert more_elements(load_config(RODS, {"body.mesh.elements_per_side": 31})) == [32]
     assert more_elements(load_config("riddle2023")) == [4, 5]
 
@@ -420,7 +422,7 @@ def test_runs_that_were_stopped_have_no_part_in_the_errors(tiny: Uncertainty) ->
 
 
 @pytest.fixture(scope="module")
-def tiny(tmp_path_factory: pytest.TempPathFactory) -> Uncertainty:
+def tiny(runs_in_this_process: None, tmp_path_factory: pytest.TempPathFactory) -> Uncertainty:
     """The first moments of a worm with two others drawn about it."""
     return uncertainty(load_config(RODS, SHORT), 2, tmp_path_factory.mktemp("tiny") / "run", jobs=1)
 
@@ -465,7 +467,7 @@ def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> Non
     assert png_path.read_bytes().startswith(b"\x89PNG")
     assert "0 of 2 drawn worms kept an ordered rhythm (2 too short to tell)" in headline(tiny)
     words = "\n".join(remarks(tiny))
-    assert "20 ms against 10 and 5 ms; elements a side: 2 against 3 and 4" in words
+    assert "20 ms against 10 and 5 ms; elements a side: 3 against 4 and 5" in words
     assert f"dry_friction, spring_rest_length, viscous_friction ({ABSENT})" in words
 
 

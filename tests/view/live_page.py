@@ -50,7 +50,7 @@ def open_show(source: RunConfig | Run) -> Iterator[Show]:
             yield show
         finally:
             show.end()
-            loop.join()
+            loop.join(60)
 
 
 def pixels(page: Page) -> np.ndarray:

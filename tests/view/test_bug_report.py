@@ -66,8 +66,8 @@ def test_the_commit_of_a_checkout_is_told_and_nothing_of_an_installed_package(
     assert "commit" not in bug_report([])
     git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
     for command in (["init", "-q"], ["add", "."], ["commit", "-qm", "first"]):
-        subprocess.run([*git, *command], check=True)
-    head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout
+        subprocess.run([*git, *command], check=True, timeout=120)
+    head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True, timeout=120).stdout
     assert f"(commit {head[:12]})" in bug_report([])
     (source / "__init__.py").write_text("1")
     assert f"(commit {head[:12]}, modified)" in bug_report([])

@@ -28,7 +28,7 @@ def test_the_table_shows_numbers_differences_and_dashes(planar_run: Run, rods_ru
     assert "3.000 s" in rows["simulated time"]
     assert "0.200 s" in rows["simulated time"]
     assert any("(-93.3 %)" in line for line in lines)
-    assert rows["travel, centre of mass"].split()[4] == "-"
+    assert rows["travel forwards, centre of mass"].split()[5] == "-"
     assert "largest pin gap" not in rows, "no run has one"
 
 

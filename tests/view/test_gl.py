@@ -51,7 +51,7 @@ def test_importing_the_views_imports_neither_gl_nor_matplotlib() -> None:
         "heavy = {'mujoco', 'OpenGL', 'glfw', 'matplotlib', 'torch'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
 
 

@@ -141,6 +141,30 @@ def test_a_click_pokes_the_worm(live: tuple[Show, Page]) -> None:
     assert force @ away > 0.8 * np.linalg.norm(force) * np.linalg.norm(away)
 
 
+def test_without_the_token_the_browser_gets_one_sentence(live: tuple[Show, Page], browser: Browser) -> None:
+    show, _ = live
+    page = browser.new_page()
+    answer = page.goto(show.address.rsplit("/", 2)[0])
+    assert answer is not None
+    assert answer.status == 403
+    assert page.get_by_text("opens only under the whole address").count() == 1
+    page.close()
+
+
+def test_another_page_gets_no_websocket_even_with_the_token(live: tuple[Show, Page], browser: Browser) -> None:
+    show, _ = live
+    page = browser.new_page()
+    page.route("http://stranger.test/", lambda route: route.fulfill(body="a page", content_type="text/html"))
+    page.goto("http://stranger.test/")
+    opened = """address => new Promise(tell => {
+        const socket = new WebSocket(address, ["viser-v1.1.1"]);
+        socket.onopen = () => tell("open");
+        socket.onerror = () => tell("refused");
+    })"""
+    assert page.evaluate(opened, show.address.replace("http", "ws").rstrip("/")) == "refused"
+    page.close()
+
+
 def test_a_run_is_played_the_same_way(browser: Browser, short_run: Run) -> None:
     with open_show(short_run) as show:
         page = browser.new_page(viewport=VIEW)  # type: ignore[arg-type]

@@ -264,16 +264,6 @@ def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
         reel_of(rods_run, n + 1)
 
 
-def test_the_server_opens_no_tunnel_to_the_internet() -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-    from annelid.view.live.server import Server
-
-    server = Server()
-    assert server.get_host() == "127.0.0.1"
-    assert server.request_share_url() is None
-    server.stop()
-
-
 @pytest.mark.parametrize(
     ("arena", "overrides", "nodes"),
     [

@@ -303,4 +303,4 @@ def test_figure_9_shows_robot_model_and_every_series(tmp_path: Path) -> None:
     svg = png.with_suffix(".svg").read_text(encoding="utf-8")
     for number in ("6.15", "3.82", "4.78", "5.98", "4.20", "2.55", "4.02", "4.03", "4.29", "3.30", "0.62", "0.76"):
         assert f"<!-- {number} -->" in svg
-    assert "not the time series" in robot_lengths.CAPTION
+    assert "numbers are given of these maxima only" in robot_lengths.CAPTION

@@ -11,6 +11,7 @@ import pytest
 
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
+from annelid.view import plots
 from annelid.view.plots import figure7
 from annelid.view.style import activation_color, segment_colors
 
@@ -32,6 +33,23 @@ def test_figure7_of_a_3d_worm_shows_six_sensors(rods_run: Run, picture: Path) ->
     assert figure7(rods_run, picture).stat().st_size > 10_000
 
 
+def test_published_elongations_end_at_lines_that_are_named(rods_run: Run, picture: Path) -> None:
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+    axes = Figure().subplots()
+    plots._lengths(axes, rods_run, segment_colors(3))
+    first_helix = 100.0 * rods_run.data["stretch_length"].values[:, :, 0]
+    named = {text.get_text(): float(text.xy[1]) for text in axes.texts if isinstance(text, Annotation)}
+    expected = first_helix.min(axis=0) + np.array([4.20, 2.55, 4.02])
+    assert [named[f"paper, {segment}"] for segment in (1, 2, 3)] == pytest.approx(expected)
+    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in axes.lines[-3:]) == pytest.approx(sorted(expected))
+    other = replace(rods_run, config=rods_run.config.model_copy(update={"name": "mine"}))
+    axes = Figure().subplots()
+    plots._lengths(axes, other, segment_colors(3))
+    assert not axes.texts
+
+
 def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, picture: Path) -> None:
     program = (
         "import sys, matplotlib\n"
@@ -44,7 +62,7 @@ def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, pic
         "assert 'matplotlib.pyplot' not in sys.modules\n"
         "assert settings() == before\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
 
 

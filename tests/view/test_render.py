@@ -197,11 +197,11 @@ def test_a_video_on_a_full_disk_is_one_sentence_without_ffmpegs_own(planar_run: 
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
         "from annelid.cli import main\n"
-        f"sys.argv = ['annelid', 'render', {str(planar_run.path)!r}, '--video', 'v.mp4']\n"
+        f"sys.argv = ['annelid', 'render', {str(planar_run.path)!r}, '--video', 'v.mp4', '--fps', '4']\n"
         "main()\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
     )
     assert done.returncode == 2
     assert done.stderr.startswith("annelid: cannot write v.mp4: ffmpeg")

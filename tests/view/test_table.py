@@ -4,11 +4,18 @@ from dataclasses import replace
 from io import StringIO
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from rich.console import Console
 
+from annelid.analysis.paper import formulation, published
 from annelid.analysis.summary import Summary, summary
+from annelid.config import load_config
 from annelid.simulation.runfile import Run
-from annelid.view.table import summary_table
+from annelid.view.table import closing_sentence, legend, summary_rows, summary_table
+
+FAST = load_config("riddle2023-fast")
+RODS = load_config("riddle2023-rods")
 
 
 def printed(run: Run, numbers: Summary, width: int) -> list[str]:
@@ -33,3 +40,92 @@ def test_no_number_is_minus_zero(rods_run: Run) -> None:
     assert "-0.0 mm" not in text
     assert "0.0 mm" in text
     assert "-2.0 mm" in text
+
+
+def cells(numbers: Summary, preset: str, label: str) -> tuple[str, ...]:
+    return next(row for row in summary_rows(numbers, load_config(preset)) if row[0].startswith(label))[1:]
+
+
+@given(
+    factors=st.lists(st.floats(0.9, 1.1), min_size=3, max_size=3), period=st.floats(0.98, 1.02), swapped=st.booleans()
+)
+def test_a_reproduction_is_claimed_if_and_only_if_order_period_and_each_elongation_agree(
+    factors: list[float], period: float, swapped: bool
+) -> None:
+    paper = formulation()
+    assert paper.elongation_mean_max_m is not None
+    assert paper.period_s is not None
+    numbers = replace(
+        paper,
+        order=paper.order[::-1] if swapped else paper.order,
+        period_s=period * paper.period_s,
+        elongation_mean_max_m=[
+            factor * (one or 0.0) for factor, one in zip(factors, paper.elongation_mean_max_m, strict=True)
+        ],
+    )
+    apart = [abs(factor - 1.0) for factor in factors]
+    if any(abs(one - 0.05) < 1e-9 for one in apart) or abs(abs(period - 1.0) - 0.01) < 1e-9:
+        return
+    agrees = not swapped and abs(period - 1.0) < 0.01 and max(apart) < 0.05
+    sentence = closing_sentence(numbers, FAST)
+    assert ("does not reproduce" not in sentence) == agrees
+    assert ("reproduces order, period and elongation" in sentence) == agrees
+    assert ("order 3-2-1" in sentence) == swapped
+    for segment, one in enumerate(apart, start=1):
+        assert (f"elongation of segment {segment} " in sentence) == (one > 0.05)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"arena.friction": 0.3}, {"controller.gate_time_constant_ms": 200.0}, {"duration_s": 6.0}]
+)
+def test_a_changed_worm_reproduces_nothing(changes: dict[str, float]) -> None:
+    sentence = closing_sentence(formulation(), load_config("riddle2023-fast", changes))
+    assert "reproduce" not in sentence
+    assert next(iter(changes)) in sentence
+
+
+def test_what_only_records_or_names_is_no_change() -> None:
+    config = load_config("riddle2023-fast", {"record.signals_interval_s": 0.02, "seed": 3, "guard.height_m": 2.0})
+    assert closing_sentence(formulation(), config) == closing_sentence(formulation(), FAST)
+    noisy = load_config("riddle2023-fast", {"sensor.noise_m": 0.001, "seed": 3})
+    assert "seed" in closing_sentence(formulation(), noisy)
+
+
+def test_a_run_that_was_cut_short_and_other_worms_claim_nothing() -> None:
+    assert closing_sentence(replace(formulation(), status="interrupted"), FAST) == ""
+    for preset in ("riddle2023", "riddle2023-rods", "riddle2022-planar", "crawler"):
+        assert "reproduces" not in closing_sentence(formulation(), load_config(preset))
+
+
+@given(factor=st.floats(0.5, 2.0))
+def test_a_deviation_is_ours_over_the_reference_less_one(factor: float) -> None:
+    paper = formulation()
+    assert paper.period_s is not None
+    _, reference, apart = cells(replace(paper, period_s=factor * paper.period_s), "riddle2023-fast", "period")
+    assert reference == f"{paper.period_s:.3f} s"
+    assert float(apart.removesuffix(" %")) == pytest.approx(100 * (factor - 1), abs=0.051, rel=0.06)
+
+
+def test_published_figures_of_one_sensor_stand_beside_the_range_over_all() -> None:
+    theirs = published(FAST)["elongation_first_helix_pp_m"].value
+    assert isinstance(theirs, tuple)
+    below = replace(formulation(), elongation_least_pp_m=[0.9 * one for one in theirs])
+    for label in ("elongation, first helix, pp", "least of its sensors", "most of its sensors"):
+        assert cells(below, "riddle2023-fast", label)[1] == "4.20 / 2.55 / 4.02 cm [P]"
+    # One sensor of theirs is no measure of the least of ours.
+    assert cells(below, "riddle2023-fast", "least")[2] == ""
+
+
+def test_rigid_crossings_are_explained_in_the_table_that_compares_them() -> None:
+    paper = formulation()
+    assert paper.elongation_mean_max_m is not None
+    twice = replace(paper, elongation_mean_max_m=[2.1 * (one or 0.0) for one in paper.elongation_mean_max_m])
+    assert "crossings are rigid, and a segment elongates 2.1 times as far" in legend(twice, RODS)
+    assert "rigid" not in legend(twice, FAST)
+    assert "soft pins" in " ".join(printed_of(twice))
+
+
+def printed_of(numbers: Summary) -> list[str]:
+    text = StringIO()
+    Console(file=text, width=200).print(summary_table(numbers, RODS))
+    return text.getvalue().splitlines()

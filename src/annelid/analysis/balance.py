@@ -19,7 +19,7 @@ class EnergyBalance:
     have (a planar one no weight) is None and counts as nothing.
 
     Attributes:
-        muscle_work_J: Work that the ring muscles did on the body.
+        muscle_work_J: Net work that the ring muscles did on the body.
         kinetic_J: Gain of kinetic energy.
         elastic_J: Gain of the energy of strands and springs.
         potential_J: Gain of the energy of the weight.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Number = float | Sequence[float | None] | None
 """One number, one a segment, or None for what a run does not have."""
 
-NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s")
+NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
 UNLIKE = ("name", "summary")
 """Fields of the configuration that change nothing in a run."""
 

@@ -10,17 +10,22 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True, slots=True)
 class Elongation:
-    """Elongation of every segment during a run, in two readings.
+    """Elongation of every segment during a run, in several readings.
 
     The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak of the spring on
-    the first helix, so that reading stands beside the plainer one, the mean of a segment's sensors.
+    the first helix, so that reading stands beside the plainer one, the mean of a segment's sensors, and the range
+    over all of them.
 
     Attributes:
         first_helix_pp_m: Largest minus smallest length of the first helix's spring, m, ``(n_segments,)``.
+        least_pp_m: The same of the sensor with which it is least, m, same shape.
+        most_pp_m: The same of the sensor with which it is most, m, same shape.
         mean_max_m: Largest mean length of the segment's sensors above their rest length, m, same shape.
     """
 
     first_helix_pp_m: NDArray[np.float64]
+    least_pp_m: NDArray[np.float64]
+    most_pp_m: NDArray[np.float64]
     mean_max_m: NDArray[np.float64]
 
 
@@ -32,13 +37,15 @@ def elongation(stretch_m: ArrayLike, rest_m: ArrayLike) -> Elongation:
         rest_m: Their lengths at rest, m, shape ``(n_segments, n_sensors)``.
 
     Returns:
-        Both readings.
+        All readings.
     """
     stretch = np.asarray(stretch_m, dtype=float)
     rest = np.asarray(rest_m, dtype=float)
-    first_helix = stretch[:, :, 0]
+    peak_to_peak = np.ptp(stretch, axis=0)
     return Elongation(
-        first_helix_pp_m=first_helix.max(axis=0) - first_helix.min(axis=0),
+        first_helix_pp_m=peak_to_peak[:, 0],
+        least_pp_m=peak_to_peak.min(axis=1),
+        most_pp_m=peak_to_peak.max(axis=1),
         mean_max_m=stretch.mean(axis=2).max(axis=0) - rest.mean(axis=1),
     )
 

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from annelid.analysis.balance import EnergyBalance, energy_balance
 from annelid.analysis.circle import fitted_circle
+from annelid.analysis.forces import net_work, positive_work
 from annelid.analysis.rhythm import rhythm, segment_activation
+from annelid.analysis.travel import first_heading
 from annelid.config import WormBody
 
 if TYPE_CHECKING:
@@ -24,8 +26,6 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
 Array = NDArray[np.float64]
-FORWARDS = np.array([-1.0, 0.0])
-"""Where segment 1 leads a worm that has not turned, seen from above: x, y."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +43,9 @@ class Gait:
         stride_body_lengths: The same over the length of the body at rest.
         contact_duty: Per segment: share of the time in which it touches the ground.
         slip_ratio: Way that segments slide on the ground, their mean, over the way of the centre of mass.
-        backward_ratio: Way of the centre of mass away from the front over that towards it.
-        cost_of_transport: Work of the muscles over weight and way.
+        backward_ratio: Way of the centre of mass away from the front over that towards it; it is no measure of slip.
+        cost_of_transport: Positive work of the muscles over weight and way: what a muscle takes up is not regained.
+        cost_of_transport_net: The same with what they take up subtracted.
         cost_of_transport_cables: Force times half of every change of length, over weight and way.
         lateral_drift: Way sideways per way towards the front, positive to the left.
         heading_change_rad: Change of the heading from the first cycle to the last, positive to the left, rad.
@@ -64,6 +65,7 @@ class Gait:
     slip_ratio: float | None = None
     backward_ratio: float | None = None
     cost_of_transport: float | None = None
+    cost_of_transport_net: float | None = None
     cost_of_transport_cables: float | None = None
     lateral_drift: float | None = None
     heading_change_rad: float | None = None
@@ -109,7 +111,8 @@ def gait(run: Run) -> Gait:
         contact_duty=_duty(data),
         slip_ratio=_ratio(_slid(data), way),
         backward_ratio=_backward_ratio(run, data),
-        cost_of_transport=_ratio(_work(data), _product(weight_N, way)),
+        cost_of_transport=_ratio(_total(positive_work(data)), _product(weight_N, way)),
+        cost_of_transport_net=_ratio(_total(net_work(data)), _product(weight_N, way)),
         cost_of_transport_cables=_ratio(_cable_work(data), _product(weight_N, way)),
         lateral_drift=_ratio(float(left.sum()), forwards),
         heading_change_rad=float(angles[-1] - angles[0]) if isinstance(run.config.body, WormBody) else None,
@@ -141,7 +144,7 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     places = np.array([np.interp(marks, time, along) for along in centre.T])
     steps = np.diff(places.T, axis=0)
     if not isinstance(run.config.body, WormBody) or run.data.sizes.get("frame", 0) < 2:
-        return steps, np.broadcast_to(FORWARDS, steps.shape)
+        return steps, np.broadcast_to(first_heading(run), steps.shape)
     # The mesh comes with the engine, which the numbers of a planar worm do without.
     from annelid.analysis.track import track_of
 
@@ -171,11 +174,8 @@ def _backward_ratio(run: Run, data: xr.Dataset) -> float | None:
     return _ratio(float(-ahead[ahead < 0].sum()), float(ahead[ahead > 0].sum()))
 
 
-def _work(data: xr.Dataset) -> float | None:
-    if "muscle_work" not in data:
-        return None
-    work = data["muscle_work"].values.sum(axis=1)
-    return float(work[-1] - work[0])
+def _total(work_J: Array | None) -> float | None:
+    return None if work_J is None else float(work_J.sum())
 
 
 def _cable_work(data: xr.Dataset) -> float | None:

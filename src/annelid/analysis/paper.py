@@ -1,23 +1,40 @@
-"""The published numbers that a run of the same worm is laid beside."""
+"""The numbers that a run of the same worm is laid beside: published ones, and those of the paper's own formulation."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 
+from annelid.analysis.comparison import differing_fields, relative_difference
 from annelid.analysis.robot import ROBOT_ELONGATION_M
-from annelid.config import PlanarBody, RunConfig, SnsController
+from annelid.analysis.summary import Summary
+from annelid.config import PlanarBody, Rods, RunConfig, SnsController, WormBody, load_config, preset_names
+from annelid.textfiles import parse_json
 
 PAPER_2023 = "Riddle et al. 2023"
 PAPER_2022 = "Riddle et al. 2022"
+FORMULATION = "riddle2023"
+"""The preset that rebuilds the paper's worm in the paper's own formulation."""
+
+PERIOD_WITHIN, ELONGATION_WITHIN = 0.01, 0.05
+"""Relative differences up to which a run agrees with the paper's formulation."""
+
+_IN_ITS_RUN = ("period_s", "elongation_mean_max_m", "middle_deficit_mean", "ring_length_min_m", "pin_gap_max_m")
+SPREAD = ("elongation_least_pp_m", "elongation_most_pp_m")
+"""The range over a segment's sensors, in which one published sensor may lie."""
+# What says how a run is recorded and guarded, and what it is called.
+_BESIDE_THE_WORM = ("name", "summary", "record.", "guard.")
 
 
 @dataclass(frozen=True, slots=True)
 class Published:
-    """One published number.
+    """One number to compare with.
 
     Attributes:
         value: In the unit of the summary's field: one number, one number a segment, or words.
-        paper: Where it was published.
+        paper: Where it was published; `FORMULATION` for one of our run of that preset.
         place: Where in it.
     """
 
@@ -36,7 +53,7 @@ def published(config: RunConfig) -> dict[str, Published]:
     """
     if not isinstance(config.controller, SnsController):
         return {}
-    if config.name.startswith("riddle2023") and config.body.n_segments == 3:
+    if _is_of_2023(config):
         return dict(_RIDDLE_2023)
     if config.name == "wang" and config.body.n_segments == len(ROBOT_ELONGATION_M):
         return dict(_ROBOT)
@@ -53,6 +70,115 @@ def published(config: RunConfig) -> dict[str, Published]:
                 "order": Published("1-2-3..", PAPER_2022, "Fig. 4"),
             }
     return {}
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How a run compares with the paper's formulation.
+
+    Attributes:
+        order: Whether the segments contract in the same order.
+        period: Relative difference of the period; None where either has none.
+        elongation: Relative difference of the largest mean elongation, segment by segment; None where it is not known.
+    """
+
+    order: bool
+    period: float | None
+    elongation: tuple[float | None, ...]
+
+    @property
+    def period_agrees(self) -> bool:
+        """Whether the period is within `PERIOD_WITHIN`."""
+        return self.period is not None and abs(self.period) <= PERIOD_WITHIN
+
+    @property
+    def elongation_agrees(self) -> tuple[bool, ...]:
+        """Whether the elongation of each segment is within `ELONGATION_WITHIN`."""
+        return tuple(share is not None and abs(share) <= ELONGATION_WITHIN for share in self.elongation)
+
+    def __bool__(self) -> bool:
+        """Whether order, period and every elongation agree."""
+        return self.order and self.period_agrees and all(self.elongation_agrees)
+
+
+@cache
+def formulation() -> Summary:
+    """Returns the numbers of the paper's own formulation, from our run of the preset `FORMULATION`."""
+    text = (resources.files("annelid") / "data" / f"{FORMULATION}.json").read_text(encoding="utf-8")
+    numbers = parse_json(text, f"{FORMULATION}.json")
+    return Summary(**{field: value for field, value in numbers.items() if field in Summary.__slots__})
+
+
+def references(config: RunConfig) -> dict[str, Published]:
+    """Returns what the numbers of a run are laid beside, keyed by the fields of `Summary`.
+
+    These are the published numbers; beside worms of rods that stand for the paper's, also those of the paper's own
+    formulation. Published elongations of a single sensor stand beside the range over all sensors as well.
+    """
+    beside = published(config)
+    single = beside.get("elongation_first_helix_pp_m")
+    if single is not None:
+        beside |= dict.fromkeys(SPREAD, single)
+    if stands_for_the_papers(config):
+        numbers = formulation()
+        place = f"annelid run {FORMULATION}"
+        beside |= {field: Published(_plain(getattr(numbers, field)), FORMULATION, place) for field in _IN_ITS_RUN}
+    return beside
+
+
+def stands_for_the_papers(config: RunConfig) -> bool:
+    """Tells whether a worm is of rods and of the paper's kind, to be compared with the paper's own formulation."""
+    body = config.body
+    return _is_of_2023(config) and isinstance(body, WormBody) and isinstance(body.formulation, Rods)
+
+
+def has_rigid_crossings(config: RunConfig) -> bool:
+    """Tells whether a worm's strands share a vertex at each crossing."""
+    body = config.body
+    return isinstance(body, WormBody) and isinstance(body.formulation, Rods) and body.formulation.pins == "shared"
+
+
+def changed_fields(config: RunConfig) -> list[str]:
+    """Returns the fields in which a run differs from the preset that it is named after; none where there is none.
+
+    What is recorded and when the guard stops the run do not count, nor does the seed where nothing is drawn. A section
+    of another kind counts as its kind.
+    """
+    if config.name not in preset_names():
+        return []
+    fields, _ = differing_fields([load_config(config.name), config])
+    uncounted = (*_BESIDE_THE_WORM, *(() if config.sensor.noise_m else ("seed",)))
+    changed = [field for field in fields if not field.startswith(uncounted)]
+    others = tuple(field.removesuffix("kind") for field in changed if field.endswith(".kind"))
+    return [field for field in changed if field.endswith(".kind") or not field.startswith(others)]
+
+
+def agreement(numbers: Summary) -> Agreement:
+    """Compares a run of three segments with the paper's own formulation.
+
+    Args:
+        numbers: The run's numbers.
+    """
+    theirs = formulation()
+    apart = relative_difference(theirs.elongation_mean_max_m, numbers.elongation_mean_max_m)
+    period = relative_difference(theirs.period_s, numbers.period_s)
+    assert not isinstance(period, Sequence)
+    return Agreement(
+        order=numbers.order == theirs.order,
+        period=period,
+        elongation=tuple(apart) if isinstance(apart, Sequence) else (None,) * theirs.n_segments,
+    )
+
+
+def _plain(value: float | list[float | None] | None) -> float | tuple[float, ...]:
+    """A number of the formulation's run as `Published` has it."""
+    assert value is not None
+    return tuple(one for one in value if one is not None) if isinstance(value, list) else value
+
+
+def _is_of_2023(config: RunConfig) -> bool:
+    named = config.name.startswith(FORMULATION) and config.body.n_segments == 3
+    return named and isinstance(config.controller, SnsController)
 
 
 _RIDDLE_2023 = {

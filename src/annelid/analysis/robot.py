@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 ROBOT_ELONGATION_M = (0.0615, 0.0382, 0.0478, 0.0598)
 """Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m: each the mean of the left
-and the right stretch sensor. Riddle et al. 2023, section 4, from data of Wang; the readings over time are unpublished.
+and the right stretch sensor. Riddle et al. 2023, section 4, from data of Wang. Its Fig. 9 shows the readings over
+time as a graph; numbers are given of these maxima only.
 """
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.gait import cycle_marks
+from annelid.analysis.travel import way_ahead
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -20,7 +21,7 @@ class SlipCost:
     Attributes:
         cycles: Number of whole cycles.
         period_s: Mean duration of a cycle, s.
-        speed_m_per_s: Way of the centre of mass towards -x, where the front leads, over time, m/s.
+        speed_m_per_s: Way of the centre of mass towards where the worm leads at first, over time, m/s.
         loss_W: Work lost to friction over time, W.
         loss_J_per_m: The same over the way, J/m; infinite for a worm that got nowhere or backwards.
     """
@@ -47,8 +48,8 @@ def slip_cost(run: Run) -> SlipCost | None:
     time = data["time"].values
     first, last = np.searchsorted(time, marks[[0, -1]])
     duration = float(time[last] - time[first])
-    front = data["center_of_mass"].sel(axis="x").values
-    way = float(front[first] - front[last])
+    ahead = way_ahead(run)
+    way = float(ahead[last] - ahead[first])
     loss = data["slip_loss"].values.sum(axis=1)
     lost = float(loss[last] - loss[first])
     cycles = len(marks) - 1

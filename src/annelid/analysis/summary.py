@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.elongation import elongation, end_difference, middle_deficit
-from annelid.analysis.forces import contraction_forces, muscle_work
+from annelid.analysis.elongation import Elongation, elongation, end_difference, middle_deficit
+from annelid.analysis.forces import contraction_forces, net_work, positive_work
 from annelid.analysis.rhythm import Rhythm, rhythm, segment_activation
-from annelid.analysis.travel import net_travel, path_travel
+from annelid.analysis.travel import net_travel, path_travel, way_ahead
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,19 +39,24 @@ class Summary:
         period_std_s: Standard deviation of those intervals, s.
         elongation_first_helix_pp_m: Per segment: peak to peak of the spring on the first helix, m.
         elongation_mean_max_m: Per segment: largest mean of its sensors above rest, m.
+        elongation_least_pp_m: Per segment: peak to peak of the sensor with which it is least, m; None where a segment
+            has one sensor only.
+        elongation_most_pp_m: The same of the sensor with which it is most, m.
         middle_deficit: Interior segments below the first, first reading, a fraction.
         middle_deficit_mean: The same for the second reading.
         end_difference: Last segment below the first, first reading, a fraction.
         contraction_force_median_N: Median muscle force while contracted, N.
-        contraction_force_peak_N: Largest muscle force while contracted, N.
+        contraction_force_peak_N: Largest recorded muscle force while contracted, N.
         segment_force_median_N: Per segment: median force of its muscles while contracted, N.
         segment_force_peak_N: Per segment: largest force of its muscles while contracted, N.
-        muscle_work_J: Per segment: work of its muscles, J; where the worm keeps no books, force over shortening.
-        travel_m: Displacement of the centre of mass along x, m.
-        travel_path_m: Its way forth and back along x, m.
+        positive_work_J: Per segment: work of its muscles while it was positive, J; none of it is regained.
+        muscle_work_J: Per segment: net work of its muscles, J; where no work is summed, force over shortening.
+        travel_m: Displacement of the centre of mass towards where the worm leads at first, negative backwards, m.
+        travel_path_m: Its way forth and back along that direction, m.
         ring_length_min_m: Shortest ring during the run, m (planar worm: height of a rhombus).
         edge_strain_max: Largest strain of any edge of a rod.
         pin_gap_max_m: Largest distance between two pinned strands, m.
+        warnings: What is doubtful about the run, a sentence each.
     """
 
     name: str
@@ -74,12 +79,20 @@ class Summary:
     contraction_force_peak_N: float | None
     segment_force_median_N: list[float | None] | None
     segment_force_peak_N: list[float | None] | None
+    positive_work_J: list[float | None] | None
     muscle_work_J: list[float | None] | None
     travel_m: float | None
     travel_path_m: float | None
     ring_length_min_m: float | None
     edge_strain_max: float | None
     pin_gap_max_m: float | None
+    elongation_least_pp_m: list[float | None] | None = None
+    elongation_most_pp_m: list[float | None] | None = None
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Takes the warnings as JSON has them, too."""
+        object.__setattr__(self, "warnings", tuple(self.warnings or ()))
 
     def to_dict(self) -> dict[str, Any]:
         """Returns plain lists, numbers, strings and None, ready for JSON."""
@@ -102,10 +115,12 @@ def summary(run: Run) -> Summary:
     data = run.data
     n_segments = run.config.body.n_segments
     beat = _rhythm(data, n_segments)
-    first_helix, mean = _elongations(data)
+    read = _elongation(data)
+    first_helix, mean = (read.first_helix_pp_m, read.mean_max_m) if read else (None, None)
+    spread = read if read and data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
     pulling = np.concatenate([np.empty(0), *forces])
-    position = data["center_of_mass"].sel(axis="x").values if "center_of_mass" in data else np.empty(0)
+    ahead = way_ahead(run) if "center_of_mass" in data else np.empty(0)
     return Summary(
         name=run.config.name,
         status=run.status,
@@ -127,12 +142,16 @@ def summary(run: Run) -> Summary:
         contraction_force_peak_N=_number(pulling.max()) if pulling.size else None,
         segment_force_median_N=_of_each(forces, np.median),
         segment_force_peak_N=_of_each(forces, np.max),
-        muscle_work_J=_work(data, n_segments),
-        travel_m=_number(net_travel(position)),
-        travel_path_m=_number(path_travel(position)),
+        positive_work_J=_by_segment(positive_work(data), n_segments),
+        muscle_work_J=_by_segment(net_work(data), n_segments),
+        travel_m=_number(net_travel(ahead)),
+        travel_path_m=_number(path_travel(ahead)),
         ring_length_min_m=_shortest_ring(data, n_segments),
         edge_strain_max=_largest(data, "edge_strain"),
         pin_gap_max_m=_largest(data, "pin_gap"),
+        elongation_least_pp_m=_numbers(spread.least_pp_m) if spread else None,
+        elongation_most_pp_m=_numbers(spread.most_pp_m) if spread else None,
+        warnings=run.warnings,
     )
 
 
@@ -142,11 +161,10 @@ def _rhythm(data: xr.Dataset, n_segments: int) -> Rhythm:
     return rhythm(data["time"].values, segment_activation(data["activation"].values, n_segments))
 
 
-def _elongations(data: xr.Dataset) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _elongation(data: xr.Dataset) -> Elongation | None:
     if "stretch_length" not in data or not data.sizes.get("time"):
-        return None, None
-    read = elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
-    return read.first_helix_pp_m, read.mean_max_m
+        return None
+    return elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
 
 
 def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[np.ndarray]:
@@ -162,14 +180,8 @@ def _of_each(forces: list[np.ndarray], number: Callable[[np.ndarray], Any]) -> l
     return [_number(number(of_segment)) if of_segment.size else None for of_segment in forces] or None
 
 
-def _work(data: xr.Dataset, n_segments: int) -> list[float | None] | None:
-    if "muscle_work" in data and data.sizes.get("time"):
-        booked = data["muscle_work"].values
-        return _numbers((booked[-1] - booked[0]).reshape(n_segments, -1).sum(axis=1))
-    if "muscle_force" not in data or "ring_length" not in data or not data.sizes.get("time"):
-        return None
-    work = muscle_work(data["muscle_force"].values, data["ring_length"].values)
-    return _numbers(work.reshape(n_segments, -1).sum(axis=1))
+def _by_segment(of_muscles: np.ndarray | None, n_segments: int) -> list[float | None] | None:
+    return None if of_muscles is None else _numbers(of_muscles.reshape(n_segments, -1).sum(axis=1))
 
 
 def _shortest_ring(data: xr.Dataset, n_segments: int) -> float | None:

@@ -5,6 +5,11 @@ build the mesh with a site at every crossing; springs and ring muscles between t
 for both. `elimination` orders the engine's factor along the tube.
 """
 
-from annelid.body.assemble import build_spec, compile_spec, mesh_of
+from annelid.engine import refuse_mixed_engine
+
+# Every use of the engine begins here, and a mixed one fails in ways that tell nothing.
+refuse_mixed_engine()
+
+from annelid.body.assemble import build_spec, compile_spec, mesh_of  # noqa: E402
 
 __all__ = ["build_spec", "compile_spec", "mesh_of"]

@@ -12,6 +12,7 @@ from annelid.arena.gravity import gravity_of
 from annelid.arena.scenery import add_scenery, add_walls
 from annelid.body.actuation import add_ring_actuators, add_springs
 from annelid.body.chain import add_chains
+from annelid.body.damping import drop_dampers
 from annelid.body.elimination import order_elimination
 from annelid.body.friction import add_joint_friction
 from annelid.body.rods import add_rods
@@ -21,6 +22,16 @@ from annelid.morphology import MeshGeometry, helical_mesh
 
 MOST_ORDERED_BODIES = 8192
 """Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
+
+
+_SHORT = "lengthen body.mesh.rear_overhang_m and body.mesh.radius_m, or lessen body.mesh.elements_per_side"
+_REMEDIES = {
+    "mass and inertia of moving bodies": "a part is too light, so raise body.strands.linear_density_kg_per_m, "
+    f"body.strands.radius_m, body.pins.mass_kg or body.pins.radius_m, or it is too short: {_SHORT}",
+    "degenerate": f"a part is too short: {_SHORT}",
+    "too close": f"a part is too short: {_SHORT}",
+}
+"""What the engine may say of a body whose every number is in its range, and the fields that it means."""
 
 
 def mesh_of(mesh: Mesh) -> MeshGeometry:
@@ -38,7 +49,7 @@ def mesh_of(mesh: Mesh) -> MeshGeometry:
     )
 
 
-def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSpec:
+def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     """Builds the MuJoCo spec of a 3D worm in its arena.
 
     Names in the spec: sites ``crossing_<i>``, tendons ``spring_<k>`` and ``ring_<s>`` (or ``ring_<s>_left``
@@ -46,9 +57,10 @@ def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSp
 
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
-        moving_planes: Where the engine has no one plane for the ground, add planes that are laid under the skin before
-            every step (`annelid.simulation.ground`), and nothing to see; else all that is seen, and panels that hold
-            the worm in plain MuJoCo.
+        for_plant: For a plant of annelid, which prepares every step: dampers whose coefficients follow the posture
+            (`annelid.simulation.damping`), and where the engine has no one plane for the ground planes that are laid
+            under the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: no
+            dampers, all that is seen, and panels that hold the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.
@@ -59,19 +71,22 @@ def build_spec(config: RunConfig, *, moving_planes: bool = False) -> mujoco.MjSp
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
-    laid = moving_planes and has_moving_planes(arena)
+    laid = for_plant and has_moving_planes(arena)
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
     spec.compiler.degree = False
     spec.option.timestep = config.clock.physics_timestep_s
     spec.option.gravity = gravity_of(arena)
+    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{arena.friction_cone.upper()}")
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
     if isinstance(body.formulation, Chain):
         add_chains(spec, geometry, body, body.formulation, arena, vertices_touch=laid)
     else:
         add_rods(spec, geometry, body, body.formulation, arena)
+    if not for_plant:
+        drop_dampers(spec)
     add_springs(spec, geometry, body.springs)
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:
@@ -91,9 +106,16 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         spec: What `build_spec` returned, with anything added to it.
 
     Raises:
-        ValueError: The engine refuses the model.
+        ConfigError: The engine refuses the model.
     """
-    model = spec.compile()
+    try:
+        model = spec.compile()
+    except ValueError as error:
+        reason = str(error).splitlines()[0].removeprefix("Error: ")
+        for words, remedy in _REMEDIES.items():
+            if words in reason:
+                raise ConfigError(f"the engine refuses this body ({reason}): {remedy}") from None
+        raise ConfigError(f"the engine refuses this body: {reason}") from None
     order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:

@@ -134,8 +134,7 @@ class _Rigidity(NamedTuple):
 
 
 def _rigidity(strands: Strands) -> _Rigidity:
-    fourth = strands.radius_m**4
-    return _Rigidity(strands.young_modulus_Pa * pi * fourth / 4, strands.shear_modulus_Pa * pi * fourth / 2)
+    return _Rigidity(strands.bending_rigidity_Nm2, strands.shear_modulus_Pa * pi * strands.radius_m**4 / 2)
 
 
 def _add_joint(
@@ -149,12 +148,19 @@ def _add_joint(
     """Joins two elements at a vertex; the joint stands for half of each."""
     before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
     length = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
-    common = {
-        "damping": [strands.joint_damping_Nms_per_rad, 0.0, 0.0],
-        "armature": formulation.armature_kg_m2,
-    }
+
+    def add(kind: mujoco.mjtJoint, rate: float, **axis: Array) -> None:
+        stiffness = rate / length
+        link.add_joint(
+            type=kind,
+            stiffness=[stiffness, 0.0, 0.0],
+            damping=[strands.joint_damping(stiffness), 0.0, 0.0],
+            armature=formulation.armature_kg_m2,
+            **axis,
+        )
+
     if formulation.joint == "ball":
-        link.add_joint(type=mujoco.mjtJoint.mjJNT_BALL, stiffness=[rigidity.bending / length, 0.0, 0.0], **common)
+        add(mujoco.mjtJoint.mjJNT_BALL, rigidity.bending)
         return
     tangent = before / np.linalg.norm(before) + after / np.linalg.norm(after)
     tangent /= np.linalg.norm(tangent)
@@ -165,7 +171,7 @@ def _add_joint(
         (np.cross(tangent, normal), rigidity.bending),
         (tangent, rigidity.torsion),
     ):
-        link.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, stiffness=[rate / length, 0.0, 0.0], **common)
+        add(mujoco.mjtJoint.mjJNT_HINGE, rate, axis=axis)
 
 
 def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain) -> None:

@@ -6,23 +6,23 @@ bending and torsion, kept inextensible by edge constraints. A rod's twist needs 
 name; without the hinges the model compiles and is far too floppy.
 
 Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by a spring
-and a dashpot in N/m and N s/m. Lateral damping resists bending across the plane of a strand's rest curvature, which
-the engine leaves undamped: its Rayleigh damping of a curved vertex acts on the size of the curvature alone. Both are
-constraint rows, whose static stiffness and damping follow from their reference and regularisation
-(MuJoCo's documentation, "Constraint model") and which the Newton solver takes at little cost.
+and a dashpot in N/m and N s/m, constraint rows whose static stiffness and damping follow from their reference and
+regularisation (MuJoCo's documentation, "Constraint model"). A material's damping time is completed by
+`annelid.body.damping`, since the engine damps a curved vertex in the plane of its bend alone. Lateral damping by a
+number per joint is older: its rows are fixed in the world, so it brakes a rotating worm and fits a straight one only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import pi
 
 import mujoco
 import numpy as np
 
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
+from annelid.body.damping import add_dampers, add_holder, twist_name
 from annelid.config import Arena, Rods, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
@@ -241,13 +241,14 @@ def add_rod(
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     n_edges = len(lengths)
+    joint = strands.bending_rigidity_Nm2 / float(lengths.mean())
     flex = spec.add_flex(
         name=name,
         dim=1,
         radius=strands.radius_m,
         young=strands.young_modulus_Pa,
         shear=strands.shear_modulus_Pa,
-        damping=rayleigh_damping_s(strands, float(lengths.mean())),
+        damping=strands.joint_damping(joint) / joint,
         rgba=rgba,
         selfcollide=0,
         contype=0,
@@ -260,16 +261,9 @@ def add_rod(
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
     with _built_apart(spec, f"{name}_") as part:
         for edge in range(1 if clamped else 0, n_edges):
-            hinge = "twist" if edge == n_edges - 1 else f"twist_{edge}"
+            hinge = twist_name(name, edge, n_edges).removeprefix(f"{name}_")
             inertia = 0.5 * strands.linear_density_kg_per_m * lengths[edge] * strands.radius_m**2
-            holder = part.worldbody.add_body(
-                name=hinge,
-                mass=TWIST_MASS_KG,
-                ipos=[0.0, 0.0, 0.0],
-                iquat=[1.0, 0.0, 0.0, 0.0],
-                inertia=[inertia] * 3,
-                explicitinertial=True,
-            )
+            holder = add_holder(part, hinge, TWIST_MASS_KG, inertia)
             holder.add_joint(name=hinge, type=mujoco.mjtJoint.mjJNT_HINGE, axis=AXES[0])
     spec.add_equality(
         name=name,
@@ -279,7 +273,9 @@ def add_rod(
         solref=[formulation.edge_time_constant_s, 1.0],
         solimp=EDGE_IMPEDANCE,
     )
-    if formulation.lateral_damping_Nms_per_rad > 0:
+    if strands.material_damping_s is not None:
+        add_dampers(spec, name, vertices_m, bodies, strands, clamped=clamped)
+    elif formulation.lateral_damping_Nms_per_rad > 0:
         for vertex in range(1, n_edges):
             _add_lateral_damper(spec, name, vertices_m, bodies, vertex, formulation.lateral_damping_Nms_per_rad)
 
@@ -322,9 +318,3 @@ def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float) -> Array:
     """Shares each element's mass between its two vertices, kg, shape ``(n_vertices,)``."""
     half = 0.5 * linear_density_kg_per_m * np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     return np.append(half, 0.0) + np.insert(half, 0, 0.0)
-
-
-def rayleigh_damping_s(strands: Strands, element_length_m: float) -> float:
-    """Rayleigh time that gives each joint the wanted viscous damping: damping / (E I / element length), s."""
-    bending_stiffness = strands.young_modulus_Pa * pi * strands.radius_m**4 / 4 / element_length_m
-    return strands.joint_damping_Nms_per_rad / bending_stiffness

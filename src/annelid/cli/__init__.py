@@ -4,7 +4,7 @@ from annelid.cli.bench import bench_command
 from annelid.cli.calibrate import calibrate_command
 from annelid.cli.cite import cite
 from annelid.cli.compare import compare_command
-from annelid.cli.entry import app, main
+from annelid.cli.entry import Command, app, main
 from annelid.cli.experiment import experiment
 from annelid.cli.export import export_command
 from annelid.cli.limit_cycle import limit_cycle_command
@@ -15,13 +15,14 @@ from annelid.cli.run import run_command
 from annelid.cli.sweep import sweep_command
 from annelid.cli.tune import tune_command
 from annelid.cli.view import view_command
-from annelid.cli.worm import arenas, build, doctor, presets
+from annelid.cli.worm import arenas, build, check, doctor, presets
 
 __all__ = ["app", "main"]
 
 # In the order in which the help lists them.
 for _name, _command in (
     ("run", run_command),
+    ("check", check),
     ("build", build),
     ("show", show),
     ("compare", compare_command),
@@ -41,5 +42,5 @@ for _name, _command in (
     ("arenas", arenas),
     ("doctor", doctor),
 ):
-    app.command(_name)(_command)
+    app.command(_name, cls=Command)(_command)
 app.add_typer(experiment, name="experiment")

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
-from annelid.errors import RunFileError
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
 
 
 def bench_command(
@@ -49,15 +48,13 @@ def bench_command(
     """
     import json
 
-    from rich.console import Console
-
     from annelid.studies.bench.benchmark import bench
     from annelid.studies.progress import study_progress
+    from annelid.terminal import Console
     from annelid.view.bench_table import bench_table
     from annelid.view.figures.bench import bench_figure
 
-    if output.exists() and not output.is_dir():
-        raise RunFileError(f"{output} is a file: name a folder with -o")
+    lock(output)
     try:
         with study_progress(quiet=quiet) as progress:
             path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
@@ -71,3 +68,4 @@ def bench_command(
         Console().print(bench_table(report))
     for written in (path, bench_figure(report, output / "bench")):
         typer.echo(written)
+    end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)

@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.common import Assignments, Force, Preset, config_of, or_default, overrides_of, refuse_existing
+from annelid.cli.common import RIGID_PRESET, Assignments, Force, NamedPreset, config_of, overrides_of, refuse_existing
+from annelid.cli.entry import lock
 
 
 def calibrate_command(
-    preset: Preset = None,
+    preset: NamedPreset = RIGID_PRESET,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("calibration"),
     assignments: Assignments = None,
     free: Annotated[
@@ -47,20 +48,19 @@ def calibrate_command(
     annelid calibrate --set body.springs.stiffness_N_per_m=24.5 --set body.springs.rest_length_m=0.065
     annelid calibrate --free young_modulus --free dry_friction --data mine.csv
     """
-    from rich.console import Console
-
     from annelid.studies.calibration.fit import DEFAULT_FREE, calibrate
     from annelid.studies.calibration.loop import read_loop
     from annelid.studies.calibration.report import EQUAL_STIFFNESS, fit_tables, write_calibration
     from annelid.studies.progress import study_progress
+    from annelid.terminal import Console
     from annelid.view.figures.load_frame import load_frame_figure
 
     report = output / "calibration.json"
-    if output.is_dir():
-        refuse_existing(report, force)
+    lock(output)
+    refuse_existing(report, force)
     measured = read_loop(data)
-    source, changes = or_default(preset), EQUAL_STIFFNESS | overrides_of(assignments)
-    config = config_of(source, dict(changes), None)
+    source, changes = preset, EQUAL_STIFFNESS | overrides_of(assignments)
+    config = config_of(source, dict(changes))
     with study_progress(quiet=quiet) as progress:
         fit = calibrate(
             config,
@@ -70,7 +70,6 @@ def calibrate_command(
             if progress is None
             else lambda loops, rms: progress(f"calibrating, {rms:.2f} N off after {loops} loops", 0, 0, 0.0),
         )
-    output.mkdir(parents=True, exist_ok=True)
     if not quiet:
         for table in fit_tables(fit):
             Console().print(table)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from annelid.cli.entry import complain
 from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
@@ -15,9 +17,18 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
     from annelid.studies.workers import Workers
 
-DEFAULT_PRESET = "riddle2023-rods"
+FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
+"""What runs where no preset is named: the paper's worm with its soft pins, or the one with rigid crossings."""
 
-Preset = Annotated[str | None, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
+Preset = Annotated[
+    str | None,
+    typer.Argument(
+        help=f"Name of a preset, or a TOML file.  [default: {FIRST_PRESET}; with --segments, --fidelity or"
+        f" --uncertainty {RIGID_PRESET}]",
+        metavar="[PRESET|FILE.toml]",
+    ),
+]
+NamedPreset = Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
 Assignments = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="FIELD=VALUE", help="Set any field by its dotted path; may be repeated."),
@@ -28,8 +39,8 @@ FidelityLevel = Annotated[
     typer.Option(
         "--fidelity",
         metavar="LEVEL",
-        help="How finely the 3D worm is resolved: paper, accurate, fast or preview (docs/speed.md has their errors)"
-        "  [default: as the preset has it, fast for riddle2023-rods]",
+        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview (docs/speed.md"
+        " has their errors)  [default: as the preset has it]",
     ),
 ]
 ArenaName = Annotated[
@@ -40,15 +51,17 @@ ArenaName = Annotated[
         help="Put the 3D worm elsewhere: a name of `annelid arenas`, or a TOML file  [default: where the preset is]",
     ),
 ]
-Jobs = Annotated[int | None, typer.Option(min=1, help="Runs at a time.  [default: as many as there are cores]")]
+Jobs = Annotated[
+    int | None, typer.Option(min=1, max=4096, help="Runs at a time.  [default: as many as there are cores]")
+]
 ClusterName = Annotated[
     str | None,
     typer.Option(
         "--cluster",
         metavar="WHERE",
         envvar="ANNELID_CLUSTER",
-        help="Where runs are computed: processes, local (Dask on this machine), slurm, the address or the scheduler"
-        " file (.json) of a Dask scheduler, or a TOML file with a table [cluster]",
+        help="Where runs are computed: processes (of this machine), slurm, the address or the scheduler file (.json) of"
+        " a Dask scheduler, or a TOML file with a table [cluster]: name only what you trust  [default: processes]",
     ),
 ]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
@@ -65,18 +78,6 @@ def workers_for(cluster: str | None, jobs: int | None) -> AbstractContextManager
     from annelid.studies.cluster import workers_of
 
     return nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
-
-
-def or_default(preset: str | None, fidelity: str | None = None) -> str:
-    """Returns the preset that was named, or the one that a level of fidelity comes from, or the default one."""
-    # An empty name, as from an unset variable of a shell, must not pass for none.
-    if preset is not None:
-        return preset
-    if fidelity is None:
-        return DEFAULT_PRESET
-    from annelid.config import find_level
-
-    return find_level(fidelity).preset
 
 
 def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
@@ -99,45 +100,67 @@ def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any
 
 
 def config_of(
-    source: str,
+    preset: str | None,
     overrides: dict[str, Any],
-    segments: int | None,
+    segments: int | None = None,
     fidelity: str | None = None,
     arena: str | None = None,
+    uncertainty: int | None = None,
 ) -> RunConfig:
-    """Loads a preset or a TOML file with what is changed in it.
+    """Loads a preset or a TOML file with what is changed in it; where none is named, that of the first run.
+
+    The worm of the first run is fitted to three segments, its own mesh and its own step: without a name, an option that
+    changes these takes the worm with rigid crossings instead, and says so.
 
     Raises:
         ConfigError: There is no such preset, file, level of fidelity or arena, or a value is out of range.
     """
     from annelid.config import PlanarWorm, load_config
 
+    options = {"--segments": segments, "--fidelity": fidelity, "--uncertainty": uncertainty}
+    refitting = [option for option, value in options.items() if value is not None]
+    # An empty name, as from an unset variable of a shell, must not pass for none.
+    source = (RIGID_PRESET if refitting else FIRST_PRESET) if preset is None else preset
     if segments is not None:
         planar = isinstance(load_config(source).body, PlanarWorm)
         overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
-    return load_config(source, overrides, fidelity=fidelity, arena=arena)
+    config = load_config(source, overrides, fidelity=fidelity, arena=arena)
+    if preset is None and refitting:
+        fitted = f"{FIRST_PRESET} is fitted to three segments, its mesh and its step"
+        complain(f"{refitting[0]} without a preset takes {RIGID_PRESET}: {fitted}")
+    return config
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Keeps what stands in the way of an output file that an option names.
+    """Keeps what stands in the way of an output file that an option names, and sees that it can be written.
 
     Raises:
-        RunFileError: The path is a folder, or a file that exists and ``force`` is false.
+        RunFileError: The path is a folder, or a file that exists and ``force`` is false, or cannot be written.
     """
     if path.is_dir():
         raise RunFileError(f"{path} is a folder: name a file")
     if path.exists() and not force:
         raise RunFileError(f"{path} exists: name another file with {option}, or replace it with --force")
+    # A device or a pipe is written as it is, a file by way of a draft beside it.
+    written = path if path.exists() and not path.is_file() else path.parent
+    if not written.exists():
+        raise RunFileError(f"{path} cannot be written: there is no folder {written}")
+    if not os.access(written, os.W_OK):
+        raise RunFileError(f"{path} cannot be written: {written} does not allow it")
 
 
 def print_table(run: Run) -> None:
-    """Prints the numbers of a run, the published ones beside them."""
-    from rich.console import Console
-
+    """Prints the numbers of a run, those to compare with beside them, and what follows."""
     from annelid.analysis import gait, summary
+    from annelid.terminal import Console
     from annelid.view.gait_table import add_gait
-    from annelid.view.table import summary_table
+    from annelid.view.table import closing_sentence, summary_table
 
-    table = summary_table(summary(run), run.config)
+    numbers = summary(run)
+    table = summary_table(numbers, run.config)
     add_gait(table, gait(run))
     Console().print(table)
+    for doubt in run.warnings:
+        typer.echo(f"warning: {doubt}")
+    if closing := closing_sentence(numbers, run.config):
+        typer.echo(closing)

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import Force, refuse_existing
-from annelid.cli.entry import complain
+from annelid.cli.entry import complain, lock
 from annelid.errors import RunFileError
 
 
@@ -38,10 +38,9 @@ def compare_command(
     annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
     annelid compare runs/* --json | jq .numbers.period_s
     """
-    from rich.console import Console
-
     from annelid.analysis.comparison import compare
     from annelid.simulation.runfile import open_run
+    from annelid.terminal import Console
     from annelid.view.comparison_table import comparison_table, fields_table
     from annelid.view.figures.comparison import lengths_figure, potentials_figure, travel_figure
     from annelid.view.output import write_json
@@ -54,8 +53,7 @@ def compare_command(
     if potentials:
         figures["potentials.png"] = potentials_figure
     if output is not None:
-        if output.exists() and not output.is_dir():
-            raise RunFileError(f"{output} is a file: name a folder with -o")
+        lock(output)
         for name in ("comparison.json", *figures):
             refuse_existing(output / name, force)
     opened = [open_run(run) for run in runs]
@@ -67,7 +65,6 @@ def compare_command(
         Console().print(fields_table(comparison) if comparison.fields else "the configurations are the same")
     if output is None:
         return
-    output.mkdir(parents=True, exist_ok=True)
     written = [write_json(output / "comparison.json", comparison.to_dict())]
     for name, draw in figures.items():
         try:

@@ -3,29 +3,72 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 import warnings
-from typing import Annotated, Any
+from contextlib import ExitStack, suppress
+from contextvars import ContextVar
+from io import TextIOWrapper
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any, TextIO
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
-from annelid.errors import AnnelidError, SimulationStopped
+from annelid.errors import AnnelidError, RunKilled, SimulationStopped
+from annelid.text import write_printable_only
 
+EXIT_DONE = 0
+"""Everything that was asked for is there."""
+EXIT_BUG = 1
+"""An error that annelid does not expect, with a traceback; or nobody reads any more what is printed, without a word."""
 EXIT_USAGE = 2
+"""Refused: the command, a file, a field, a missing program; what to do is in the sentence."""
 EXIT_STOPPED = 3
+"""A guard stopped the run, or runs of a study; all others are there."""
+EXIT_SOME_FAILED = 4
+"""Runs of a study could not be computed; the results of all others are written."""
+EXIT_ALL_FAILED = 5
+"""No run of a study could be computed, or a search found nothing."""
 EXIT_INTERRUPTED = 130
+"""Ended by Ctrl-C, SIGTERM or SIGHUP; what was finished is kept."""
+
+
+_locks: ContextVar[ExitStack] = ContextVar("_locks")
 
 
 class _Sentences(TyperGroup):
     """Ends every error a user can act on with one sentence and an exit code, never with a traceback."""
 
+    def main(self, *args: Any, **options: Any) -> Any:
+        """Parses the command line and runs the command; what cannot be printed is an error too."""
+        write_printable_only()
+        try:
+            try:
+                return super().main(*args, **options)
+            finally:
+                sys.stdout.flush()
+        except OSError as error:
+            _throw_away(sys.stdout)
+            if isinstance(error, BrokenPipeError):
+                sys.exit(EXIT_BUG)
+            complain(f"cannot print: {error.strerror or error}")
+            sys.exit(EXIT_USAGE)
+
     def invoke(self, ctx: Any) -> Any:
         """Runs the command."""
         try:
-            return super().invoke(ctx)
+            with ExitStack() as stack:
+                _locks.set(stack)
+                return super().invoke(ctx)
         except SimulationStopped as stop:
             complain(stop)
             raise typer.Exit(EXIT_STOPPED) from None
+        except RunKilled as killed:
+            complain(killed)
+            raise typer.Exit(EXIT_SOME_FAILED) from None
         except AnnelidError as error:
             complain(error)
             raise typer.Exit(EXIT_USAGE) from None
@@ -38,11 +81,15 @@ class _Sentences(TyperGroup):
             complain(error)
             raise typer.Exit(EXIT_USAGE) from None
         except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            complain(f"{where}{error.strerror or error}")
+            # A stream or a file that is already open tells no name.
+            where = error.filename or "cannot print, or write a file"
+            complain(f"{where}: {error.strerror or error}")
             raise typer.Exit(EXIT_USAGE) from None
         except MemoryError:
             complain("there is not enough memory for this: try fewer segments, or a smaller picture")
+            raise typer.Exit(EXIT_USAGE) from None
+        except UnicodeError as error:
+            complain(f"a text cannot be written or read: {error}")
             raise typer.Exit(EXIT_USAGE) from None
         except ArithmeticError as error:
             complain(f"a number is too large or too small to compute with: {str(error) or type(error).__name__}")
@@ -50,6 +97,21 @@ class _Sentences(TyperGroup):
         except KeyboardInterrupt:
             complain("interrupted")
             raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+class Command(TyperCommand):
+    """A command whose numbers are all finite, so that none of them makes it compute for ever."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Reads the options, and refuses infinite ones and those that are not a number."""
+        rest = super().parse_args(ctx, args)
+        for parameter in self.params:
+            value = ctx.params.get(parameter.name)
+            if isinstance(value, float) and not isfinite(value):
+                raise typer.BadParameter(
+                    f"{value} is not a finite number.", ctx=ctx, param_hint=f"'{parameter.opts[0]}'"
+                )
+        return rest
 
 
 app = typer.Typer(
@@ -65,7 +127,36 @@ app = typer.Typer(
 def main() -> None:
     """Entry point of the command ``annelid``."""
     warnings.showwarning = _complain_of_warning
+    _end_as_ctrl_c_does("SIGTERM", "SIGHUP")
+    _open_what_is_closed()
+    # Pictures are drawn into files only; another back-end, or one that does not exist, would serve nothing.
+    os.environ["MPLBACKEND"] = "agg"
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     app(prog_name="annelid")
+
+
+def _open_what_is_closed() -> None:
+    """Throws away what is printed to a closed stream; else the next file to be opened would take its number."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(number)
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "w", encoding="utf-8"))  # noqa: SIM115 -- open to the end
+
+
+def _throw_away(stream: TextIO) -> None:
+    """Sends nowhere what is still to be written to a stream that fails: it would fail again when Python ends."""
+    with suppress(OSError, ValueError), open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), stream.fileno())
+
+
+def _end_as_ctrl_c_does(*signals: str) -> None:
+    """Has further signals end a command in good order; one that the process was told to ignore stays ignored."""
+    for number in (getattr(signal, name) for name in signals if hasattr(signal, name)):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
 
 
 def _print_version(wanted: bool) -> None:
@@ -85,7 +176,7 @@ def _start(
     """Simulate a soft, peristaltic earthworm robot driven by a synthetic nervous system.
 
     \b
-    annelid run                        run the paper's robot with pins that hold: a few seconds
+    annelid run                        run the paper's worm as rods: a few seconds
     annelid run riddle2023             run it as the paper built it: about a minute
     annelid run riddle2022-planar      run the planar worm: a few seconds
     annelid paper                      reproduce and examine the whole paper: about 40 minutes
@@ -95,10 +186,39 @@ def _start(
     """
 
 
+def end_study(n_runs: int, failed: int, reasons: object, *, stopped: int = 0) -> None:
+    """Ends a study's command with a sentence and an exit code where runs failed or were stopped.
+
+    Args:
+        n_runs: All runs.
+        failed: Those that could not be computed.
+        reasons: Where the reasons can be read.
+        stopped: Those that a guard stopped.
+
+    Raises:
+        typer.Exit: Not all runs are complete.
+    """
+    if not failed and not stopped:
+        return
+    counts = [f"{n} {what}" for n, what in ((failed, "failed"), (stopped, "were stopped by a guard")) if n]
+    complain(f"of {n_runs} runs {' and '.join(counts)}: the reasons are in {reasons}")
+    raise typer.Exit(EXIT_ALL_FAILED if failed == n_runs else EXIT_SOME_FAILED if failed else EXIT_STOPPED)
+
+
 def _complain_of_warning(message: Warning | str, *_: object, **__: object) -> None:
     complain(f"warning: {message}")
 
 
+def lock(folder: Path, *, new: bool = False) -> None:
+    """Keeps other writers out of a folder, as `annelid.simulation.lock.locked` does, until the command ends."""
+    from annelid.simulation.lock import locked
+
+    _locks.get().enter_context(locked(folder, new=new))
+
+
 def complain(what: object) -> None:
-    """Writes one line to stderr, whatever the line breaks in it."""
-    typer.echo(f"annelid: {' '.join(str(what).split())}", err=True)
+    """Writes one line to stderr, whatever the line breaks in it, if stderr can be written."""
+    try:
+        typer.echo(f"annelid: {' '.join(str(what).split())}", err=True)
+    except OSError:
+        _throw_away(sys.stderr)

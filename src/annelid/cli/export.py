@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import Force, RunPath, refuse_existing
+from annelid.cli.entry import lock
 from annelid.errors import RunFileError
 
 
@@ -25,7 +26,9 @@ def export_command(
     ] = None,
     every: Annotated[
         int | None,
-        typer.Option(min=1, metavar="N", help="Only every Nth sample, and every Nth frame (csv, mat, parquet)."),
+        typer.Option(
+            min=1, max=10_000_000, metavar="N", help="Only every Nth sample, and every Nth frame (csv, mat, parquet)."
+        ),
     ] = None,
     from_time: Annotated[
         float | None, typer.Option("--from-time", metavar="SECONDS", help="From this time on (not mjcf).")
@@ -66,6 +69,8 @@ def export_command(
     opened = open_run(run)
     target = kind.target(opened, output)
     if output is not None:
+        if kind.many and target.suffix.lower() != kind.suffix:
+            lock(target)
         _refuse_standing(target, kind.many, force)
     names = None if signals is None else [name.strip() for name in signals.split(",") if name.strip()]
     part = selected(opened, Selection(names, every or 1, from_time, to_time))
@@ -77,7 +82,9 @@ def export_command(
 
 def _refuse_standing(target: Path, many: bool, force: bool) -> None:
     """Keeps what stands in the way; a folder of tables may be there already, but not with something in it."""
-    if not (many and target.is_dir()):
+    from annelid.simulation.lock import LOCK_NAME
+
+    if not many or target.is_file():
         refuse_existing(target, force)
-    elif not force and any(target.iterdir()):
+    elif not force and target.is_dir() and any(entry.name != LOCK_NAME for entry in target.iterdir()):
         raise RunFileError(f"the folder {target} is not empty: name another with -o, or write into it with --force")

@@ -53,9 +53,8 @@ def limit_cycle_command(
     import json
     from typing import cast, get_args
 
-    from rich.console import Console
-
     from annelid.analysis.limit_cycle import Time, limit_cycle
+    from annelid.terminal import Console
     from annelid.view.cycle_table import HEADINGS, cycle_numbers, cycle_table
     from annelid.view.figures.limit_cycle import limit_cycle_figure
     from annelid.view.plots import plot_path

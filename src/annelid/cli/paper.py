@@ -10,13 +10,13 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import ClusterName, Jobs, workers_for
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock
 from annelid.errors import RunFileError
 
 
 def paper_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 5 minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 4 minutes.")] = False,
     only: Annotated[
         list[str] | None,
         typer.Option("--only", metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
@@ -31,7 +31,7 @@ def paper_command(
     """Reproduce the paper's figures and claims, and examine them.
 
     Writes report.html, one file with all pictures to read and to send, and report.md beside its figures.
-    The whole takes about 40 minutes on two cores, --quick about 5. Every run is kept in report/runs, so
+    The whole takes about 40 minutes on two cores, --quick about 4. Every run is kept in report/runs, so
     a second call takes seconds, and a killed one goes on where it was.
 
     \b
@@ -45,8 +45,7 @@ def paper_command(
     from annelid.studies.report import claims_page, write_report
     from annelid.view.output import whole_file, with_suffix
 
-    if output.exists() and not output.is_dir():
-        raise RunFileError(f"{output} is a file: name a folder with -o")
+    lock(output)
     if claims is not None:
         if only:
             raise typer.BadParameter("--claims needs the whole report, so leave --only out")

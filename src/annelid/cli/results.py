@@ -15,18 +15,30 @@ from annelid.cli.common import Force, RunPath, print_table, refuse_existing
 def show(
     run: RunPath,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON, in SI units.")] = False,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Only tell whether every byte of the file is as it was when the run ended.")
+    ] = False,
 ) -> None:
     """Print the numbers of a run.
 
     Beside them stand the published ones, where there are any.
 
+    A run that has ended carries a digest of every variable. Files up to 64 MB are compared with theirs whenever they
+    are opened, larger ones with --verify only, which names the variables that are damaged.
+
     \b
     annelid show runs/riddle2023-001
     annelid show runs/riddle2023-001 --json | jq .period_s
+    annelid show runs/riddle2023-001 --verify
     """
     from annelid.analysis import gait, summary
-    from annelid.simulation.runfile import open_run
+    from annelid.simulation.runfile import open_run, verify_run
 
+    if verify:
+        if as_json:
+            raise typer.BadParameter("--verify prints one sentence: it does not go with --json")
+        typer.echo(verify_run(run))
+        return
     opened = open_run(run)
     if as_json:
         numbers = summary(opened).to_dict() | {"gait": gait(opened).to_dict()}

@@ -10,19 +10,19 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import ClusterName, Jobs, workers_for
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
-from annelid.errors import RunFileError
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock
 
 
 def robustness_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("robustness"),
-    points: Annotated[int, typer.Option("--points", min=1, help="How many points of the sample, as drawn.")] = 300,
+    points: Annotated[int, typer.Option("--points", min=1, max=1_000_000, help="How many points of the sample.")] = 300,
     segments: Annotated[
-        int | None, typer.Option(min=3, help="Give every worm this many segments.  [default: as drawn, 3 to 24]")
+        int | None,
+        typer.Option(min=3, max=200, help="Give every worm this many segments.  [default: as drawn, 3 to 24]"),
     ] = None,
     controller: Annotated[
         list[str] | None,
-        typer.Option("--controller", metavar="KIND", help="Only this one; may be repeated.  [default: both]"),
+        typer.Option("--controller", metavar="KIND", help="Only this one; may be repeated.  [default: all four]"),
     ] = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
@@ -34,9 +34,10 @@ def robustness_command(
     """Compare how often controllers walk over a designed sample of worms.
 
     The sample varies sensor noise, friction, physics step, number of segments and stiffness. Every point is walked
-    by the paper's controller and by sns-robust. Writes robustness.json and robustness.md after every run, and
-    keeps runs, so that a second call goes on where the first was stopped. All 300 points take about 20 hours of one
-    core for each controller.
+    by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
+    tolerance that its body needs), sns-robust, and timed (a wave without sensing). Writes robustness.json and
+    robustness.md after every run, and keeps runs, so that a second call goes on where the first was stopped. All 300
+    points take about 25 hours of one core for each controller.
 
     \b
     annelid robustness --points 10 -o draft     the first ten points
@@ -47,8 +48,7 @@ def robustness_command(
     from annelid.studies.progress import study_progress
     from annelid.studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
-    if output.exists() and not output.is_dir():
-        raise RunFileError(f"{output} is a file: name a folder with -o")
+    lock(output)
     try:
         with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:
             judged = robustness(

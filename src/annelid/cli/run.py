@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,11 +16,10 @@ from annelid.cli.common import (
     Preset,
     Segments,
     config_of,
-    or_default,
     overrides_of,
     print_table,
 )
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
 from annelid.cli.uncertainty import command_words, report_error_bars, run_with_error_bars
 from annelid.errors import SimulationStopped
 
@@ -50,6 +47,7 @@ def run_command(
         int | None,
         typer.Option(
             min=2,
+            max=10_000,
             metavar="N",
             help="Give the numbers error bars: from N worms drawn about this one, from finer steps and more elements.",
         ),
@@ -69,7 +67,7 @@ def run_command(
         ),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Runs at a time with --uncertainty  [default: as many as cores]")
+        int | None, typer.Option(min=1, max=4096, help="Runs at a time with --uncertainty  [default: as many as cores]")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the run that the folder holds.")] = False,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
@@ -80,10 +78,10 @@ def run_command(
     Writes run.nc, figure7.png, frame.png and video.mp4, and prints a table.
 
     \b
-    annelid run                                              the paper's robot with pins that hold, in seconds
-    annelid run riddle2023                                   the paper's own worm to the letter, in a minute
-    annelid run --segments 4 --fidelity accurate             four segments, finely resolved
-    annelid run riddle2023-rods --set arena.friction=0.3     any field of any preset
+    annelid run                                              the paper's worm, in seconds
+    annelid run riddle2023                                   the paper's own formulation, in a minute
+    annelid run riddle2023-rods --segments 4                 four segments, with rigid crossings
+    annelid run --set arena.friction=0.3                     any field of any preset
     annelid run --arena pipe.bend --set arena.radius=0.8     elsewhere: annelid arenas lists the places
     annelid run my.toml --duration 20 --out long             your own file, your own folder
     annelid run --resume long --duration 40                  twenty seconds more
@@ -94,11 +92,12 @@ def run_command(
     below the folder: the same command with the same --out goes on where it was stopped.
 
     \b
-    annelid run --uncertainty 8 --out walk                   13 runs, a few seconds each
+    annelid run riddle2023-rods --uncertainty 8 --out walk   13 runs, a few seconds each
     annelid run wang --uncertainty 8 --out wang              the robot: several minutes
-    annelid run --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
-    annelid run --uncertainty 8 --uncertainty-from calibration/calibration.json
+    annelid run riddle2023-rods --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
+    annelid run riddle2023-rods --uncertainty 8 --uncertainty-from calibration/calibration.json
     """
+    from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import open_run
     from annelid.view.gallery import draw_all
@@ -110,31 +109,33 @@ def run_command(
 
     overrides = overrides_of(assignments, duration_s=duration, seed=seed)
     if resume is None:
-        config = config_of(or_default(preset, fidelity), overrides, segments, fidelity, arena)
+        config = config_of(preset, overrides, segments, fidelity, arena, uncertainty)
     elif (preset, segments, fidelity, arena) == (None, None, None, None):
         config = _config_to_continue(resume, overrides)
     else:
         raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments, --fidelity or --arena")
-    with _run_folder(out, config.name) as folder:
-        try:
-            if uncertainty is None:
-                result = None
-                done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
-            else:
-                result = run_with_error_bars(
-                    config,
-                    uncertainty,
-                    folder,
-                    source=uncertainty_from,
-                    vary=vary,
-                    jobs=jobs,
-                    overwrite=force,
-                    quiet=quiet,
-                    given=command_words(preset, assignments, segments, fidelity, arena, duration, seed),
-                )
-                done = open_run(folder)
-        except SimulationStopped as stop:
-            raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
+    for doubt in refuse_nonsense(config):
+        complain(f"warning: {doubt}")
+    folder = _locked_folder(out, config.name)
+    try:
+        if uncertainty is None:
+            result = None
+            done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
+        else:
+            result = run_with_error_bars(
+                config,
+                uncertainty,
+                folder,
+                source=uncertainty_from,
+                vary=vary,
+                jobs=jobs,
+                overwrite=force,
+                quiet=quiet,
+                given=command_words(preset, assignments, segments, fidelity, arena, duration, seed),
+            )
+            done = open_run(folder)
+    except SimulationStopped as stop:
+        raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
     if not quiet:
         print_table(done)
     if done.status == "interrupted":
@@ -145,6 +146,9 @@ def run_command(
         report_error_bars(result, quiet=quiet)
     for path in draw_all(done, folder, video=video, quiet=quiet, complain=complain):
         typer.echo(path)
+    if result is not None:
+        stopped = sum(bool(run.message) for run in result.runs)
+        end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
 
 
 def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
@@ -154,34 +158,20 @@ def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
     return load_config(open_run(path).config.model_dump(), overrides)
 
 
-@contextmanager
-def _run_folder(out: Path | None, name: str) -> Iterator[Path]:
-    """Yields the folder to run into; what was made for a numbered one and stayed empty is removed."""
+def _locked_folder(out: Path | None, name: str) -> Path:
+    """Returns the folder to run into, or a new one with the next number, which this command alone writes."""
     if out is not None:
-        yield out
-        return
+        lock(out)
+        return out
     parent = Path("runs")
-    first = not parent.exists()
-    folder = _next_free(parent, re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run")
-    try:
-        yield folder
-    finally:
-        with suppress(OSError):
-            folder.rmdir()
-            if first:
-                parent.rmdir()
-
-
-def _next_free(parent: Path, name: str) -> Path:
-    """Makes and returns the folder with the next number; making it keeps it from runs that start together."""
-    parent.mkdir(exist_ok=True)
+    name = re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run"
     numbered = re.compile(re.escape(name) + r"-(\d+)")
-    taken = [int(match[1]) for entry in parent.iterdir() if (match := numbered.fullmatch(entry.name))]
-    number = max(taken, default=0) + 1
+    entries = parent.iterdir() if parent.is_dir() else ()
+    number = max((int(match[1]) for entry in entries if (match := numbered.fullmatch(entry.name))), default=0) + 1
     while True:
         folder = parent / f"{name}-{number:03d}"
         try:
-            folder.mkdir()
+            lock(folder, new=True)
         except FileExistsError:
             number += 1
         else:

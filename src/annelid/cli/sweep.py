@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import ClusterName, Jobs
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
 
 
 def sweep_command(
@@ -21,7 +21,8 @@ def sweep_command(
     cluster: ClusterName = None,
     jobs: Jobs = None,
     samples: Annotated[
-        int | None, typer.Option("--samples", min=1, help="Samples to draw.  [default: as the study has it]")
+        int | None,
+        typer.Option("--samples", min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]"),
     ] = None,
     example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
@@ -34,12 +35,14 @@ def sweep_command(
     Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, a row a run; sweep.png and
     .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A run
     that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
-    the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm.
+    the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the study
+    describes is used where --cluster names the file.
 
     \b
     annelid sweep --example > study.toml
     annelid sweep study.toml
     annelid sweep study.toml --cluster tcp://10.0.0.1:8786
+    annelid sweep study.toml --cluster study.toml
     annelid sweep study.toml --samples 512
     """
     if example:
@@ -49,20 +52,21 @@ def sweep_command(
         return
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
-    from rich.console import Console
-
     from annelid.config import load_study
     from annelid.studies.progress import study_progress
     from annelid.studies.sweep import swept
     from annelid.studies.sweep.dataset import dataset_of
     from annelid.studies.sweep.results import results_table, write_results
+    from annelid.terminal import Console
 
     loaded = load_study(study)
     if samples is not None:
         loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
+    lock(output)
     try:
         with study_progress(quiet=quiet) as progress:
-            done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress)
+            to_use = f"add --cluster {shlex.quote(str(study))}"
+            done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
     except KeyboardInterrupt:
         words = ["annelid", "sweep", str(study), "-o", str(output)]
         words += [] if cluster is None else ["--cluster", cluster]
@@ -76,3 +80,5 @@ def sweep_command(
         Console().print(results_table(done, data))
     for path in written:
         typer.echo(path)
+    failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
+    end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)

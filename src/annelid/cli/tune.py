@@ -9,13 +9,12 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.common import Assignments, ClusterName, Jobs, Preset, or_default, overrides_of, workers_for
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
-from annelid.errors import RunFileError
+from annelid.cli.common import RIGID_PRESET, Assignments, ClusterName, Jobs, NamedPreset, overrides_of, workers_for
+from annelid.cli.entry import EXIT_ALL_FAILED, EXIT_INTERRUPTED, complain, end_study, lock
 
 
 def tune_command(
-    preset: Preset = None,
+    preset: NamedPreset = RIGID_PRESET,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("tune"),
     objective: Annotated[
         list[str] | None,
@@ -38,8 +37,8 @@ def tune_command(
     duration: Annotated[
         float | None, typer.Option("--duration", help="Simulated time of each run, s.  [default: the preset's]")
     ] = None,
-    trials: Annotated[int, typer.Option("--trials", min=1, help="Runs that the search may take.")] = 100,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the optimiser.")] = 0,
+    trials: Annotated[int, typer.Option("--trials", min=1, max=1_000_000, help="Runs that the search may take.")] = 100,
+    seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Of the optimiser.")] = 0,
     jobs: Jobs = None,
     cluster: ClusterName = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
@@ -60,21 +59,23 @@ def tune_command(
     annelid tune riddle2025 --objective speed --objective slip --trials 200 -o front
     annelid run tune/best.toml
     """
-    from rich.console import Console
-
+    from annelid.plausibility import refuse_nonsense
     from annelid.studies.case import Case
     from annelid.studies.progress import study_progress
     from annelid.studies.store import Store
     from annelid.studies.tune.judge import objectives_of
-    from annelid.studies.tune.results import results_table, write_results
+    from annelid.studies.tune.results import HISTORY, chosen, results_table, write_results
     from annelid.studies.tune.search import Task, Trial, search
     from annelid.studies.tune.space import variables_of
+    from annelid.terminal import Console
 
-    if output.exists() and not output.is_dir():
-        raise RunFileError(f"{output} is a file: name a folder with -o")
-    source, changes = or_default(preset), overrides_of(assignments, duration_s=duration)
+    lock(output)
+    source, changes = preset, overrides_of(assignments, duration_s=duration)
     objectives = objectives_of(objective or ["speed"])
-    variables = variables_of(vary or [], Case(source, changes).config)
+    base = Case(source, changes).config
+    for doubt in refuse_nonsense(base):
+        complain(f"warning: {doubt}")
+    variables = variables_of(vary or [], base)
     task = Task(source, changes, variables, objectives, trials, seed)
     words = ["annelid", "tune", source, *(f"--objective={one.name}" for one in objectives)]
     words += [word for text in vary or [] for word in ("--vary", text)]
@@ -96,3 +97,7 @@ def tune_command(
         Console().print(results_table(task, found))
     for path in written:
         typer.echo(path)
+    end_study(len(found), sum(trial.failed for trial in found), output / HISTORY)
+    if chosen(task, found) is None:
+        complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / HISTORY}")
+        raise typer.Exit(EXIT_ALL_FAILED)

@@ -72,9 +72,8 @@ def run_with_error_bars(
 
 def report_error_bars(result: Uncertainty, *, quiet: bool) -> None:
     """Writes the files of a run with error bars, prints its table unless quiet, and names the files."""
-    from rich.console import Console
-
     from annelid.studies.uncertainty import uncertainty_table, write_uncertainty
+    from annelid.terminal import Console
 
     paths = write_uncertainty(result)
     if not quiet:

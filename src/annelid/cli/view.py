@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from annelid.cli.common import (
+    RIGID_PRESET,
     ArenaName,
     Assignments,
     FidelityLevel,
     Force,
     Segments,
     config_of,
-    or_default,
     overrides_of,
     refuse_existing,
 )
+from annelid.cli.entry import complain
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -46,7 +47,7 @@ def view_command(
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
     host: Annotated[
         str,
-        typer.Option(help="Address to listen on; 0.0.0.0 lets other machines in, which may then do all that you may."),
+        typer.Option(help="Address to listen on; 0.0.0.0 lets in other machines that know the token."),
     ] = "127.0.0.1",
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: the first from 8080]")
@@ -61,7 +62,7 @@ def view_command(
     the network, and the page is for this machine only unless --host says otherwise. Ctrl-C ends it.
 
     \b
-    annelid view                                         the paper's robot, live
+    annelid view                                         riddle2023-rods, live
     annelid view riddle2025-adaptive --arena pipe.taper  another one, elsewhere
     annelid view --set arena.friction=0.3 --speed 0.5    changed, in slow motion
     annelid view runs/riddle2023-rods-001                a run, as it was recorded
@@ -79,9 +80,11 @@ def view_command(
 
         show_native(worm, speed=speed)
         return
-    from annelid.view.live.server import free_port
+    from annelid.view.live.server import free_port, warning_of
     from annelid.view.live.show import Show
 
+    if (warning := warning_of(host)) is not None:
+        complain(f"warning: {warning}")
     with Show(worm, host=host, port=free_port(host, port), speed=speed) as show:
         typer.echo(f"{show.address}  (Ctrl-C ends)")
         if open_browser:
@@ -107,7 +110,7 @@ def _worm_or_run(
         if (assignments, segments, fidelity, arena) != (None, None, None, None):
             raise typer.BadParameter("a run is played as it was: give no --set, --segments, --fidelity or --arena")
         return open_run(path)
-    return config_of(or_default(source, fidelity), overrides_of(assignments), segments, fidelity, arena)
+    return config_of(RIGID_PRESET if source is None else source, overrides_of(assignments), segments, fidelity, arena)
 
 
 def _export(worm: RunConfig | Run, path: Path, speed: float, force: bool) -> None:

@@ -1,14 +1,17 @@
 # ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
-"""The commands on what there is before a run: `build`, `presets`, `arenas` and `doctor`."""
+"""The commands on what there is before a run: `check`, `build`, `presets`, `arenas` and `doctor`."""
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from annelid.cli.common import (
+    FIRST_PRESET,
     ArenaName,
     Assignments,
     FidelityLevel,
@@ -16,10 +19,40 @@ from annelid.cli.common import (
     Preset,
     Segments,
     config_of,
-    or_default,
     overrides_of,
     refuse_existing,
 )
+from annelid.cli.entry import EXIT_USAGE
+
+
+def check(
+    preset: Preset = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    fidelity: FidelityLevel = None,
+    arena: ArenaName = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+) -> None:
+    """Hold the numbers of a 3D worm against one another, before anything is computed.
+
+    Lengths against the ring at rest, forces against what the mesh bears, the step against stiffness, the sensors'
+    tolerance against the mesh. A finding says what is wrong and what to set instead. With an error a run can mean
+    nothing, and is refused; with a warning it is doubtful, goes on, and its file says so. The exit code is 2 where
+    there is an error, else 0.
+
+    \b
+    annelid check riddle2025 --set body.mesh.radius_m=0.05
+    annelid check my.toml --json
+    """
+    from annelid.plausibility import check as findings_of
+
+    found = findings_of(config_of(preset, overrides_of(assignments), segments, fidelity, arena))
+    if as_json:
+        typer.echo(json.dumps([asdict(finding) for finding in found], indent=2))
+    else:
+        typer.echo("\n".join(f"{finding.severity}: {finding}" for finding in found) or "nothing found")
+    if any(finding.severity == "error" for finding in found):
+        raise typer.Exit(EXIT_USAGE)
 
 
 def build(
@@ -45,7 +78,7 @@ def build(
     from annelid.view.output import whole_file
 
     refuse_existing(output, force)
-    config = config_of(or_default(preset, fidelity), overrides_of(assignments), segments, fidelity, arena)
+    config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
     text = mjcf_text(config)
     with whole_file(output) as draft:
         draft.write_text(text, encoding="utf-8")
@@ -65,16 +98,15 @@ def presets(
     annelid presets riddle2023 > my.toml
     annelid presets riddle2023 --fields
     """
-    from rich.console import Console
-
     from annelid.config import load_config, preset_names, preset_text
+    from annelid.terminal import Console
     from annelid.view.table import field_lines, presets_table
 
     if name is not None and not fields:
         typer.echo(preset_text(name), nl=False)
         return
     if fields:
-        typer.echo("\n".join(field_lines(load_config(or_default(name)))))
+        typer.echo("\n".join(field_lines(load_config(FIRST_PRESET if name is None else name))))
         return
     Console().print(presets_table([load_config(each) for each in preset_names()]))
 
@@ -91,9 +123,8 @@ def arenas(
     annelid arenas pipe.bend > my_pipe.toml
     annelid run --arena my_pipe.toml --set arena.radius=0.8
     """
-    from rich.console import Console
-
     from annelid.config import arena_names, arena_summary, arena_text
+    from annelid.terminal import Console
     from annelid.view.table import arenas_table
 
     if name is not None:

@@ -28,11 +28,11 @@ from annelid.config.loading import (
     arena_names,
     arena_summary,
     arena_text,
+    as_config,
     load_config,
     parse_assignments,
     preset_names,
     preset_text,
-    toml_value,
 )
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, DynamicPlanarWorm, PlanarBody, PlanarWorm
 from annelid.config.run import Clock, Guard, Record, RunConfig
@@ -47,6 +47,7 @@ from annelid.config.turning import (
     TurningSection,
 )
 from annelid.config.worm import Chain, Joints, Mesh, Pins, Rings, Rods, ServoRings, Springs, Strands, WormBody
+from annelid.textfiles import toml_value
 
 __all__ = [
     "LEVELS",
@@ -102,6 +103,7 @@ __all__ = [
     "arena_names",
     "arena_summary",
     "arena_text",
+    "as_config",
     "check_config",
     "field_paths",
     "field_value",

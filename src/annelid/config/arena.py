@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from annelid.config.sections import Impedance, NonNegative, Positive, Section, kind_or
+from annelid.config.sections import Impedance, NonNegative, Positive, Section, Seed, kind_or
 
 Friction = Annotated[float, Field(ge=0.01, le=100)]
 Place = Annotated[float, Field(ge=-1e4, le=1e4)]
@@ -26,6 +26,11 @@ class Arena(Section):
     contact_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
     )
+    friction_cone: Literal["pyramidal", "elliptic"] = Field(
+        default="pyramidal",
+        description="elliptic: friction is alike in every direction of sliding; pyramidal: it is weaker by 16 % at 45 "
+        "degrees to the world's axes",
+    )
 
     @property
     def has_setae(self) -> bool:
@@ -43,15 +48,17 @@ class Floor(Arena):
     kind: Literal["floor"] = "floor"
     floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
     slope_deg: Slope = Field(
-        default=0.0, description="how steeply it rises where the worm leads; the model's axes lie in the slope"
+        default=0.0,
+        description="how steeply it rises towards -x, where a worm with body.heading_deg = 0 leads; the model's axes "
+        "lie in the slope",
     )
     rail_gap_m: Positive | None = Field(
         default=None, description="distance of two upright guard rails, the worm midway (not set: none)"
     )
-    posts: tuple[Post, ...] | None = Field(
+    posts: Annotated[tuple[Post, ...], Field(max_length=1000)] | None = Field(
         default=None,
-        description="x, y and radius of upright round posts, m; the worm starts along 0 <= x <= its length, leads "
-        "towards -x, and its left is -y (not set: none)",
+        description="x, y and radius of upright round posts, m; a worm with body.heading_deg = 0 starts along "
+        "0 <= x <= its length, leads towards -x, and its left is -y (not set: none)",
     )
 
     @property
@@ -90,7 +97,7 @@ class Rough(Relief):
     kind: Literal["rough"] = "rough"  # type: ignore[assignment]
     roughness_m: Positive = Field(default=0.008, description="root mean square of the height")
     correlation_m: Positive = Field(default=0.15, description="distance at which heights correlate by 1/e")
-    relief_seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of the random ground")
+    relief_seed: Seed = Field(default=0, description="seed of the random ground")
 
     @model_validator(mode="after")
     def _not_too_steep(self) -> Self:

@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from annelid.config.run import RunConfig
 from annelid.config.sections import Section
-from annelid.errors import ConfigError
+from annelid.errors import MOST_SHOWN, ConfigError, listed, shown
 
 Checked = TypeVar("Checked", bound=Section)
 
@@ -26,8 +26,7 @@ def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
     try:
         return section.model_validate(tree)
     except ValidationError as error:
-        sentences = dict.fromkeys(_explain(detail, section) for detail in error.errors())
-        raise ConfigError("; ".join(sentences)) from None
+        raise ConfigError(_explain_all(error, section)) from None
 
 
 def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
@@ -138,35 +137,6 @@ def _is_unit(words: str) -> bool:
     return UNITS.issuperset(words.split("_"))
 
 
-_KINDS = {
-    "worm",
-    "riddle2022",
-    "daltorio2013",
-    "boxerbaum2012",
-    "floor",
-    "steps",
-    "rough",
-    "pipe",
-    "rods",
-    "chain",
-    "muscle",
-    "servo",
-    "sns",
-    "program",
-    "sine",
-    "timed",
-    "shc",
-    "phase-chain",
-    "adaptive",
-    "constant",
-    "heading",
-    "course",
-    "touch",
-    "processes",
-    "local",
-    "scheduler",
-    "slurm",
-}
 _WORDS = {
     "greater_than": "must be greater than {gt:g}",
     "greater_than_equal": "must be at least {ge:g}",
@@ -174,6 +144,7 @@ _WORDS = {
     "less_than_equal": "must be at most {le:g}",
     "literal_error": "must be one of {expected}",
     "union_tag_invalid": "must be one of {expected_tags}",
+    "union_tag_not_found": "must be the name of a kind",
     "int_from_float": "must be a whole number",
     "int_type": "must be a whole number",
     "int_parsing": "must be a whole number",
@@ -183,7 +154,7 @@ _WORDS = {
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",
     "tuple_type": "must be a list",
-    "too_long": "has too many entries",
+    "too_long": "has {actual_length:d} entries: must have at most {max_length:d}",
     "too_short": "must have at least {min_length:d} entries",
     "string_type": "must be a text in quotes",
     "model_type": "is a section; set one of its fields instead",
@@ -191,60 +162,76 @@ _WORDS = {
 }
 
 
+MOST_SENTENCE = 450
+"""Characters of what is wrong with a configuration; the first thing is told in any case."""
+
+
+def _explain_all(error: ValidationError, root: type[Section]) -> str:
+    """Joins what is wrong, as much of it as a sentence can hold."""
+    sentences: dict[str, None] = {}
+    for count, detail in enumerate(error.errors()):
+        sentence = _explain(detail, root)
+        if sentences and sum(map(len, [*sentences, sentence])) > MOST_SENTENCE:
+            return f"{'; '.join(sentences)}; and {error.error_count() - count:,} more"
+        sentences[sentence] = None
+    return "; ".join(sentences)
+
+
 def _explain(detail: ErrorDetails, root: type[Section]) -> str:
-    loc = detail["loc"]
-    # What follows a kind is a field, even where it is called as another kind is.
-    kinds = [part in _KINDS and (not i or loc[i - 1] not in _KINDS) for i, part in enumerate(loc)]
-    parts = [str(part) for part, is_kind in zip(loc, kinds, strict=True) if not is_kind and not _is_type_label(part)]
-    path = ".".join(parts)
-    kind = detail["type"]
+    parts, section = _place(detail["loc"], root)
+    kind, given = detail["type"], detail["input"]
     if kind == "extra_forbidden":
-        return f"unknown field {path!r}: {_nearest_fields(detail['loc'], root)}"
+        unknown = str(detail["loc"][-1])
+        return f"unknown field {shown('.'.join([*parts, unknown]))}: {_nearest_fields(unknown, parts, section, root)}"
+    path = ".".join(parts)
     if kind == "missing":
         return f"{path} must be given"
     if kind == "value_error":
         message = str(detail.get("ctx", {}).get("error", detail["msg"]))
-        given = detail["input"]
-        return message if isinstance(given, dict | BaseModel) else f"{path} = {given!r}: {message}"
+        return message if isinstance(given, dict | BaseModel) else f"{path} = {shown(given)}: {message}"
     words = _WORDS.get(kind, "").format(**detail.get("ctx", {})) or detail["msg"]
-    if kind == "union_tag_invalid":
-        given = detail["input"].get("kind") if isinstance(detail["input"], Mapping) else detail["input"]
-        return f"{path}.kind = {given!r}: {words}"
-    return f"{path} = {detail['input']!r}: {words}"
+    if kind in ("union_tag_invalid", "union_tag_not_found"):
+        path = f"{path}.kind" if path else "kind"
+        given = given.get("kind") if isinstance(given, Mapping) else given
+    return f"{path or 'the configuration'} = {shown(given)}: {words}"
 
 
-def _is_type_label(part: int | str) -> bool:
-    """Pydantic puts the label of a union's member into the location; it is no field name."""
-    return isinstance(part, str) and ("[" in part or "constrained" in part)
+def _place(loc: tuple[int | str, ...], root: type[Section]) -> tuple[list[str], type[BaseModel]]:
+    """Follows an error's location, which names kinds and types too, through the sections.
+
+    Returns:
+        The parts of the dotted path, without a last part that is no field; the section that it leads to.
+    """
+    section: type[BaseModel] = root
+    members: list[type[Section]] = []
+    parts: list[str] = []
+    for part in loc:
+        names = {info.alias or name: name for name, info in section.model_fields.items()}
+        if part in names and not members:
+            members = _field_sections(section, names[str(part)])
+        elif members and part in (tags := {_kind_of(member): member for member in members}):
+            section, members = tags[part], []
+            continue
+        elif not isinstance(part, int):
+            continue
+        parts.append(str(part))
+        if len(members) == 1:
+            section, members = members[0], []
+    return parts, section
 
 
-def _nearest_fields(loc: tuple[int | str, ...], root: type[Section]) -> str:
+def _nearest_fields(leaf: str, parts: Sequence[str], section: type[BaseModel], root: type[Section]) -> str:
     """Suggests a field for the last part of a location that names none."""
-    section, leaf = _section_at(loc[:-1], root), str(loc[-1])
     siblings = sorted(info.alias or name for name, info in section.model_fields.items())
     by_leaf: dict[str, str] = {}
     for path in field_paths(root):
         by_leaf.setdefault(path.rsplit(".", 1)[-1], path)
-    near = get_close_matches(leaf, siblings, n=1, cutoff=0.6)
-    near_elsewhere = get_close_matches(leaf, by_leaf, n=1, cutoff=0.6)
-    if leaf in by_leaf and set(by_leaf[leaf].split(".")) <= set(map(str, loc)):
+    near = get_close_matches(leaf[:MOST_SHOWN], siblings, n=1, cutoff=0.6)
+    near_elsewhere = get_close_matches(leaf[:MOST_SHOWN], by_leaf, n=1, cutoff=0.6)
+    if leaf in by_leaf and by_leaf[leaf].split(".")[:-1] == list(parts):
         hint = "it belongs to another kind. "
     elif leaf in by_leaf or (near_elsewhere and not near):
         hint = f"did you mean {by_leaf[near_elsewhere[0]]!r}? "
     else:
         hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"{hint}Valid here: {', '.join(siblings)}"
-
-
-def _section_at(loc: tuple[int | str, ...], root: type[Section]) -> type[BaseModel]:
-    """Follows a location through sections and the tags of their kinds."""
-    section: type[BaseModel] = root
-    members: list[type[Section]] = []
-    for part in loc:
-        if part in section.model_fields and not members:
-            members = _sections_of(section.model_fields[str(part)].annotation)
-        else:
-            members = [member for member in members if member.model_fields["kind"].default == part]
-        if len(members) == 1:
-            section, members = members[0], []
-    return section
+    return f"{hint}Valid here: {listed(siblings)}"

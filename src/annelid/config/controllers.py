@@ -279,7 +279,7 @@ class PressureSns(Section):
 
 
 class RobustSns(Section):
-    """A peristalsis network whose rhythm goes on whatever its sensors say: `annelid.nervous.robust`.
+    """A peristalsis network made to keep its rhythm under wrong sensor signals: `annelid.nervous.robust`.
 
     All contraction neurons suppress each other, a slow relay counts each turn, and the stretch sensors entrain it
     within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used. With

@@ -1,6 +1,7 @@
-"""Levels of fidelity: how finely a 3D worm is resolved in space and time, from the paper's own way to a preview.
+"""Levels of fidelity: how finely the worm of rods is resolved in space and time, never which worm it is.
 
-The errors and the speed of each level are measured by ``annelid bench`` and stated in ``docs/speed.md``.
+Errors over mesh and time step come from the study ``docs/studies/resolution.toml`` and stand in ``docs/speed.md``. The
+paper's own worm, a chain of capsules, is no level but the preset ``riddle2023``.
 """
 
 from __future__ import annotations
@@ -17,15 +18,10 @@ RESOLUTION = (
     "record.signals_interval_s",
     "record.frames_interval_s",
 )
-"""Fields that every level sets."""
+"""Fields that every level sets, and the only ones."""
 
-CALIBRATION = (
-    "body.formulation",
-    "body.mesh.elements_per_end",
-    "body.rings.length_range_m",
-    "sensor.tolerance_m",
-)
-"""Fields that belong to a formulation, which the paper's robot needs to walk; a level sets them where it changes it."""
+HOME = "riddle2023-rods"
+"""The preset whose resolution the levels start from."""
 
 
 @dataclass(frozen=True)
@@ -34,61 +30,62 @@ class Fidelity:
 
     Attributes:
         summary: What it is good for.
-        preset: The preset whose formulation, calibration and resolution it takes.
-        changes: Fields of the resolution that differ from that preset, by their dotted paths.
+        changes: Fields of the resolution that differ from the preset `HOME`, by their dotted paths.
     """
 
     summary: str
-    preset: str
     changes: Mapping[str, Any] = field(default_factory=dict)
 
 
 LEVELS = {
-    "paper": Fidelity("the paper's own chain of capsules with soft pins, 1 ms", "riddle2023"),
     "accurate": Fidelity(
         "rods, six elements a rhombus side, 5 ms",
-        "riddle2023-rods",
         {
             "body.mesh.elements_per_side": 6,
             "clock.physics_timestep_s": 0.005,
             "record.signals_interval_s": 0.005,
         },
     ),
-    "fast": Fidelity("rods, two elements a side, 20 ms; the default of riddle2023-rods", "riddle2023-rods"),
+    "fast": Fidelity("rods, three elements a rhombus side, 20 ms; as riddle2023-rods has it"),
     "preview": Fidelity(
         "rods, two elements a side, 40 ms: edges stretch by up to 3 %",
-        "riddle2023-rods",
-        {"clock.physics_timestep_s": 0.04, "record.signals_interval_s": 0.04},
+        {"body.mesh.elements_per_side": 2, "clock.physics_timestep_s": 0.04, "record.signals_interval_s": 0.04},
     ),
 }
 """The levels by name, from the slowest to the fastest."""
 
 
-def fidelity_changes(level: str, tree: Mapping[str, Any], preset: Mapping[str, Any]) -> dict[str, Any]:
+def fidelity_changes(level: str, tree: Mapping[str, Any], home: Mapping[str, Any]) -> dict[str, Any]:
     """Tells what a level changes in a configuration.
 
     Args:
         level: One of `LEVELS`.
         tree: The configuration as a tree of tables, not yet checked.
-        preset: The tree of the preset that the level takes its values from.
+        home: The tree of the preset `HOME`.
 
     Returns:
-        Values by dotted path: the resolution, and where the formulation changes its calibration too.
+        Values of `RESOLUTION` by dotted path.
 
     Raises:
-        ConfigError: The body is planar, or its pins are springs, whose resolution is their own.
+        ConfigError: There is no such level, or the body is not one of rods with shared pins.
     """
-    kind = _value(tree, "body.kind")
+    find_level(level)
+    kind = _value(tree, "body.kind") or "worm"
     if kind != "worm":
         raise ConfigError(f"fidelity = {level!r} is for the 3D worm (body.kind = 'worm'), not for body.kind = {kind!r}")
-    present, wanted = (_value(each, "body.formulation.kind") for each in (tree, preset))
-    if present == wanted == "rods" and _value(tree, "body.formulation.pins") == "separate":
+    formulation = _value(tree, "body.formulation.kind") or "rods"
+    if formulation != "rods":
         raise ConfigError(
-            f"fidelity = {level!r} is for rods that share their pins; with body.formulation.pins = 'separate' "
-            "set body.mesh.elements_per_side and clock.physics_timestep_s, or take fidelity = 'paper'"
+            f"fidelity = {level!r} is for worms of rods, not for body.formulation.kind = {formulation!r}: set "
+            "body.mesh.elements_per_side and clock.physics_timestep_s, or take the preset riddle2023-rods"
         )
-    fields = RESOLUTION if present == wanted and level != "paper" else RESOLUTION + CALIBRATION
-    return {path: _value(preset, path) for path in fields} | dict(LEVELS[level].changes)
+    if _value(tree, "body.formulation.pins") == "separate":
+        raise ConfigError(
+            f"fidelity = {level!r} is for rods that share their pins; those of body.formulation.pins = 'separate' are "
+            "fitted to their mesh and step: take the preset riddle2023-rods, or set body.mesh.elements_per_side and "
+            "clock.physics_timestep_s and fit the pins again"
+        )
+    return {path: _value(home, path) for path in RESOLUTION} | dict(LEVELS[level].changes)
 
 
 def find_level(name: str) -> Fidelity:
@@ -97,6 +94,11 @@ def find_level(name: str) -> Fidelity:
     Raises:
         ConfigError: There is none; the sentence suggests the nearest.
     """
+    if name == "paper":
+        raise ConfigError(
+            "fidelity = 'paper': a level changes the resolution and never the worm; the paper's own worm is the preset "
+            "riddle2023 (annelid run riddle2023)"
+        )
     if name not in LEVELS:
         raise ConfigError(f"unknown fidelity {name!r}: {suggest(name, list(LEVELS))}")
     return LEVELS[name]

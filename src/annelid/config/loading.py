@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
@@ -11,13 +9,16 @@ from typing import Any
 
 from annelid.config.arena import SHARED
 from annelid.config.checking import check_config, whole_path
-from annelid.config.fidelity import fidelity_changes, find_level
+from annelid.config.fidelity import HOME, fidelity_changes
 from annelid.config.run import RunConfig
-from annelid.config.sections import Section
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
+from annelid.textfiles import check_depth, parse_toml, read_toml
 
 DEFAULT_BASE = "riddle2023-rods"
 """What a user's file starts from unless it says otherwise or states its own kind of body."""
+
+MOST_EXTENDED = 50
+"""Files of which each extends the next."""
 
 
 def preset_names() -> list[str]:
@@ -54,7 +55,7 @@ def arena_summary(name: str) -> str:
     Raises:
         ConfigError: No arena has that name; the sentence suggests the nearest.
     """
-    return str(tomllib.loads(arena_text(name))["summary"])
+    return str(parse_toml(arena_text(name), name)["summary"])
 
 
 def _names(folder: str) -> list[str]:
@@ -64,7 +65,7 @@ def _names(folder: str) -> list[str]:
 
 def _text(folder: str, what: str, name: str) -> str:
     if name not in _names(folder):
-        raise ConfigError(f"unknown {what} {name!r}: {suggest(name, _names(folder))}")
+        raise ConfigError(f"unknown {what} {shown(name)}: {suggest(name, _names(folder))}")
     return (resources.files("annelid") / folder / f"{name}.toml").read_text(encoding="utf-8")
 
 
@@ -84,8 +85,8 @@ def load_config(
         overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``; whole sections too. The
             unit at the end of a field's name may be left out (``arena.radius``). A section whose ``kind`` changes
             keeps nothing of what it had before.
-        fidelity: How finely a 3D worm is resolved: a level of `annelid.config.LEVELS`; lies over what the source
-            says and under the overrides. None leaves the source as it is.
+        fidelity: How finely a 3D worm of rods is resolved: a level of `annelid.config.LEVELS`; lies over what the
+            source says and under the overrides. None leaves the source as it is.
         arena: Where the worm is put instead: a name of `arena_names`, or a TOML file with a table ``[arena]``; lies
             under the overrides. Friction, gravity and contacts stay the source's where the arena does not state them.
 
@@ -97,11 +98,25 @@ def load_config(
     """
     tree = _read_tree(source)
     if fidelity is not None:
-        preset = _read_tree(find_level(fidelity).preset)
-        tree = _overridden(tree, fidelity_changes(fidelity, tree, preset))
+        tree = _overridden(tree, fidelity_changes(fidelity, tree, _read_tree(HOME)))
     if arena is not None:
         tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     return check_config(_overridden(tree, overrides or {}))
+
+
+def as_config(source: RunConfig | str | Path | Mapping[str, Any]) -> RunConfig:
+    """Returns a configuration as it is, and loads anything else by `load_config`.
+
+    Raises:
+        ConfigError: It is none of these, or as `load_config`.
+    """
+    if isinstance(source, RunConfig):
+        return source
+    if not isinstance(source, str | Path | Mapping):
+        raise ConfigError(
+            f"{shown(source)} is no configuration: give a RunConfig, the name of a preset, a TOML file or a mapping"
+        )
+    return load_config(source)
 
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
@@ -115,33 +130,15 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
         path, equals, text = assignment.partition("=")
         path = path.strip()
         if not equals or not path or not all(path.split(".")):
-            raise ConfigError(f"{assignment!r} is not of the form field=value, for example arena.friction=0.3")
+            raise ConfigError(f"{shown(assignment)} is not of the form field=value, for example arena.friction=0.3")
         parsed[path] = _parse_value(text.strip())
     return parsed
-
-
-def toml_value(value: Any) -> str:
-    """Writes a value of a field as TOML, in the form that `parse_assignments` reads.
-
-    Args:
-        value: A number, a string, a truth value, a section, or lists and tables of these.
-    """
-    if isinstance(value, Section):
-        value = dict(value)
-    if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{name} = {toml_value(item)}' for name, item in value.items())}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(toml_value(item) for item in value)}]"
-    if isinstance(value, float):
-        short = f"{value:g}"
-        return short if float(short) == value else repr(value)
-    return json.dumps(value)
 
 
 def _arena_instead(present: Any, name: str | Path) -> dict[str, Any]:
     """Returns the table of another arena, with the fields of every arena from the present one where it has none."""
     from_file = str(name).endswith(".toml")
-    stated = (read_toml(Path(name)) if from_file else tomllib.loads(arena_text(str(name)))).get("arena")
+    stated = (read_toml(Path(name)) if from_file else parse_toml(arena_text(str(name)), str(name))).get("arena")
     if not isinstance(stated, Mapping):
         raise ConfigError(f"{name} describes no arena: it must have a table [arena]")
     shared = present if isinstance(present, Mapping) else {}
@@ -161,13 +158,16 @@ def _overridden(tree: dict[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 
 def _parse_value(text: str) -> Any:
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        tree = parse_toml(f"value = {text}", "the value")
+    except UnreadableText:
         return text
+    # A text of several lines may state more than the value.
+    return tree["value"] if len(tree) == 1 else text
 
 
 def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if isinstance(source, Mapping):
+        check_depth(source, "the configuration")
         own = dict(source)
         base = own.pop("extends", None)
     elif isinstance(source, Path) or str(source).endswith(".toml"):
@@ -175,32 +175,20 @@ def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] =
         own = read_toml(path)
         own.setdefault("name", path.stem)
         if path.resolve() in above:
-            raise ConfigError(f"{path} extends itself: {' -> '.join(file.name for file in (*above, path))}")
+            raise ConfigError(f"{path} extends itself: {listed(each.name for each in (*above, path))}")
+        if len(above) >= MOST_EXTENDED:
+            raise ConfigError(f"{path}: more than {MOST_EXTENDED} files extend one another")
         above = (*above, path.resolve())
         body = own.get("body")
         stands_alone = isinstance(body, Mapping) and "kind" in body
         base = own.pop("extends", None if stands_alone else DEFAULT_BASE)
     else:
-        return tomllib.loads(preset_text(str(source)))
+        return parse_toml(preset_text(str(source)), str(source))
     if base is None:
         return own
     if not isinstance(base, str):
-        raise ConfigError(f"extends = {base!r}: must be the name of a preset or of a TOML file")
+        raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML file")
     return _merge(_read_tree(base, above), own)
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Reads a TOML file.
-
-    Raises:
-        ConfigError: It cannot be read, or is not valid TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"cannot read the configuration file {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path} is not valid TOML: {error}") from None
 
 
 def _kinds_first(override: tuple[str, Any]) -> float:

@@ -29,7 +29,10 @@ class PlanarBody(PlanarWorm):
     @model_validator(mode="after")
     def _heights_fit_the_rhombus(self) -> Self:
         if not self.height_min_m < self.height_max_m < 2 * self.side_m:
-            raise ValueError("heights must satisfy height_min_m < height_max_m < 2 side_m")
+            raise ValueError(
+                f"body.height_min_m = {self.height_min_m:g} and body.height_max_m = {self.height_max_m:g} must satisfy "
+                f"height_min_m < height_max_m < 2 side_m = {2 * self.side_m:g}"
+            )
         return self
 
 

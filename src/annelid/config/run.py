@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, Tag, model_validator
 
-from annelid.config.arena import ArenaSection, Pipe
+from annelid.config.arena import ArenaSection, Floor, Pipe
 from annelid.config.controllers import (
     ControllerSection,
     HeteroclinicChannel,
@@ -17,7 +17,7 @@ from annelid.config.controllers import (
     StretchSensor,
 )
 from annelid.config.planar import Boxerbaum2012Body, Daltorio2013Body, PlanarBody, PlanarWorm
-from annelid.config.sections import Positive, Section, kind_or
+from annelid.config.sections import Line, NonNegative, Positive, Section, Seed, kind_or
 from annelid.config.turning import Descending, TurningSection
 from annelid.config.worm import WormBody
 
@@ -69,15 +69,25 @@ class Guard(Section):
     height_m: Positive = Field(default=1.0, description="of any crossing above the ground, or off a pipe's wall")
     edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
     pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
+    depth_m: Positive = Field(default=0.05, description="of any vertex below the ground, or outside a pipe's wall")
+    stretch: Positive = Field(
+        default=1.1, description="of any axial spring, over the length at which the strands beside it are straight"
+    )
+    ring_closure: NonNegative = Field(
+        default=1.0,
+        description="least length of any ring, over that at which the strands of neighbouring crossings touch; 0: none",
+    )
 
 
 class RunConfig(Section):
     """Everything that defines a run; the run file carries it whole."""
 
-    name: str = Field(default="custom", description="name of the preset or of the user's own configuration")
-    summary: str = Field(default="", description="one line for the list of presets")
+    name: Line = Field(
+        default="custom", max_length=200, description="name of the preset or of the user's own configuration"
+    )
+    summary: Line = Field(default="", max_length=1000, description="one line for the list of presets")
     duration_s: Positive = Field(default=5.0, description="simulated time")
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of every random draw")
+    seed: Seed = Field(default=0, description="seed of every random draw")
     body: Body = WormBody()
     arena: ArenaSection | None = Field(default=None, description="the 3D worm's ground; planar worms have none")
     controller: ControllerSection = SnsController()
@@ -115,6 +125,22 @@ class RunConfig(Section):
                     "that starts inside; make it narrower further on with arena.profile"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _walls_and_relief_lie_along_x(self) -> Self:
+        body, arena = self.body, self.arena
+        if not isinstance(body, WormBody) or arena is None or not body.heading_deg:
+            return self
+        if type(arena) is not Floor:
+            where = f"arena.kind = {arena.kind!r}"
+        elif arena.rail_gap_m is not None:
+            where = f"arena.rail_gap_m = {arena.rail_gap_m:g}"
+        else:
+            return self
+        raise ValueError(
+            f"body.heading_deg = {body.heading_deg:g}: must be 0 with {where}, which lies along x; take a floor "
+            "without rails (arena.kind = 'floor')"
+        )
 
     @model_validator(mode="after")
     def _contractions_are_of_segments_that_exist(self) -> Self:

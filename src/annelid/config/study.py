@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from annelid.config.checking import check_section
-from annelid.config.cluster import Cluster, Local
-from annelid.config.loading import read_toml
-from annelid.config.sections import Section
+from annelid.config.cluster import Cluster
+from annelid.config.sections import Line, Section, Seed
+from annelid.textfiles import check_depth, read_toml
 
 Design = Literal["grid", "random", "lhs", "sobol"]
-MOST_RUNS = 1_000_000
+MOST_RUNS = 100_000
 HOW = "give values = [..], choices = [..], or from, to and, in a grid, number"
 
 
@@ -41,7 +41,8 @@ class Vary(Section):
         if listed is not None:
             if self.log or self.number is not None:
                 raise ValueError(f"vary {self.field!r}: log and number are of a range only, from .. to ..")
-            if len(listed) < 1 or any(listed.count(one) > 1 for one in listed):
+            # Choices may be lists and tables, which have no hash.
+            if len(listed) < 1 or len({repr(one) for one in listed}) < len(listed):
                 raise ValueError(f"vary {self.field!r}: must list at least one value, and none twice")
             return self
         if self.from_ is None or self.to is None or not self.from_ < self.to:
@@ -58,7 +59,7 @@ class Vary(Section):
 class Study(Section):
     """A sweep over fields of a configuration."""
 
-    name: str = Field(default="sweep", description="for titles")
+    name: Line = Field(default="sweep", max_length=200, description="for titles")
     preset: str = Field(description="name of a preset, or a TOML file")
     set: Mapping[str, Any] = Field(default_factory=dict, description="fields that are the same in every run")
     vary: Annotated[tuple[Vary, ...], Field(min_length=1)] = Field(description="the fields that are varied")
@@ -66,14 +67,14 @@ class Study(Section):
     samples: Annotated[int, Field(ge=1, le=MOST_RUNS)] | None = Field(
         default=None, description="how many, but for a grid"
     )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="of the samples")
+    seed: Seed = Field(default=0, description="of the samples")
     repeats: Annotated[int, Field(ge=1, le=MOST_RUNS)] = Field(
         default=1, description="runs of each combination, with seeds of their own"
     )
     outputs: tuple[str, ...] = Field(default=(), description="numbers that are kept; all where it is left out")
     rank: str | None = Field(default=None, description="the number that the table and the figure tell first")
     keep: Literal["runs", "outcomes"] = Field(default="runs", description="all files of every run, or its numbers only")
-    cluster: Cluster = Local()
+    cluster: Cluster | None = Field(default=None, description="used only where the user names it on the command line")
 
     @model_validator(mode="after")
     def _samples_are_not_of_a_grid(self) -> Self:
@@ -107,5 +108,6 @@ def load_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
     if isinstance(source, Study):
         return source
     if isinstance(source, Mapping):
+        check_depth(source, "the study")
         return check_section(Study, source)
-    return check_section(Study, {"name": Path(source).stem, **read_toml(Path(source))})
+    return check_section(Study, {"name": Path(source).stem, **read_toml(Path(source), "the study")})

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Tag, field_validator, model_validator
 
-from annelid.config.sections import Impedance, NonNegative, Positive, Range, Section, kind_or
+from annelid.config.sections import Impedance, Length, Modulus, NonNegative, Positive, Range, Section, kind_or
 from annelid.errors import ConfigError
+
+JOINT_DAMPING = 0.12
+"""The paper's, N m s/rad."""
+LONGEST_BUILD_S = 100.0
+"""Estimated time to build a body, above which it is refused, s."""
 
 
 class Mesh(Section):
@@ -17,8 +23,8 @@ class Mesh(Section):
     n_helices: Annotated[int, Field(ge=6, le=96)] = Field(
         default=12, description="strands, half of each handedness; even"
     )
-    radius_m: Positive = Field(default=0.16, description="radius of the tube at rest")
-    angular_rate_rad_per_m: Positive = Field(
+    radius_m: Length = Field(default=0.16, description="radius of the tube at rest")
+    angular_rate_rad_per_m: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
         default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"
     )
     elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
@@ -33,7 +39,7 @@ class Mesh(Section):
     free_planes_at_ends: Annotated[int, Field(ge=1, le=50)] = Field(
         default=3, description="crossing planes before the first and after the last ring"
     )
-    rear_overhang_m: Positive | None = Field(
+    rear_overhang_m: Annotated[float, Field(ge=1e-4, le=1e3)] | None = Field(
         default=None,
         description="free strand behind the last crossing, along the body; default half a plane spacing",
     )
@@ -49,20 +55,70 @@ class Mesh(Section):
 class Strands(Section):
     """Material of the strands."""
 
-    radius_m: Positive = Field(default=0.002, description="radius of the solid round cross-section")
-    young_modulus_Pa: Positive = Field(default=0.3e9, description="resists bending")
-    shear_modulus_Pa: Positive = Field(default=0.2e9, description="resists twisting")
+    radius_m: Length = Field(default=0.002, description="radius of the solid round cross-section")
+    young_modulus_Pa: Modulus = Field(default=0.3e9, description="resists bending")
+    shear_modulus_Pa: Modulus = Field(default=0.2e9, description="resists twisting")
     linear_density_kg_per_m: Positive = Field(default=0.01291, description="mass per length of strand")
-    joint_damping_Nms_per_rad: NonNegative = Field(
-        default=0.12, description="viscous resistance to bending between two elements"
+    damping_time_s: NonNegative | None = Field(
+        default=None,
+        description="Kelvin-Voigt time of the material, its viscous over its elastic modulus, for bending in every "
+        "direction and twist (not set: loss_factor or joint_damping_Nms_per_rad)",
     )
+    loss_factor: Annotated[float, Field(ge=0, le=10)] | None = Field(
+        default=None,
+        description="tan delta of the material at loss_frequency_Hz, instead of damping_time_s (not set: none)",
+    )
+    loss_frequency_Hz: Positive | None = Field(
+        default=None, description="frequency at which the loss factor holds (not set: none)"
+    )
+    joint_damping_Nms_per_rad: NonNegative = Field(
+        default=JOINT_DAMPING,
+        description="viscous resistance to bending between two elements whatever their length; not used where the "
+        "material's damping is given",
+    )
+
+    @model_validator(mode="after")
+    def _damped_in_one_way(self) -> Self:
+        if self.damping_time_s is not None and self.loss_factor is not None:
+            raise ValueError(
+                f"body.strands.damping_time_s = {self.damping_time_s:g} and body.strands.loss_factor = "
+                f"{self.loss_factor:g} both give the damping of the material: set one of them to 'none'"
+            )
+        if self.material_damping_s is not None and self.joint_damping_Nms_per_rad != JOINT_DAMPING:
+            raise ValueError(
+                f"body.strands.joint_damping_Nms_per_rad = {self.joint_damping_Nms_per_rad:g} has no effect where the "
+                "damping of the material is given: set body.strands.damping_time_s, or set that to 'none'"
+            )
+        if (self.loss_factor is None) != (self.loss_frequency_Hz is None):
+            raise ValueError(
+                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it holds, and "
+                "the other way round"
+            )
+        return self
+
+    @property
+    def material_damping_s(self) -> float | None:
+        """Kelvin-Voigt time of the material, s; None where each joint has a damping of its own instead."""
+        if self.loss_factor is not None and self.loss_frequency_Hz is not None:
+            return self.loss_factor / (2 * pi * self.loss_frequency_Hz)
+        return self.damping_time_s
+
+    @property
+    def bending_rigidity_Nm2(self) -> float:
+        """Bending moment per curvature, E I, N m^2."""
+        return self.young_modulus_Pa * pi * self.radius_m**4 / 4
+
+    def joint_damping(self, stiffness_Nm_per_rad: float) -> float:
+        """Returns the damping of a joint between two elements with a stiffness, N m s/rad."""
+        time_s = self.material_damping_s
+        return self.joint_damping_Nms_per_rad if time_s is None else time_s * stiffness_Nm_per_rad
 
 
 class Pins(Section):
     """The pins that join two strands at a crossing."""
 
     mass_kg: Positive = Field(default=0.00052, description="mass of one pin")
-    radius_m: Positive = Field(default=0.005, description="radius of the drawn sphere")
+    radius_m: Length = Field(default=0.005, description="radius of the drawn sphere")
 
 
 class Joints(Section):
@@ -145,10 +201,14 @@ class Rings(RingCables):
     peak_force_N: Positive | tuple[Positive, ...] = Field(
         default=117.57, description="isometric force at the optimal length, F0, one number for all or one a segment"
     )
-    minimum_length: Positive = Field(default=0.58, description="lmin, relative to the optimal length")
-    maximum_length: Positive = Field(default=1.6, description="lmax, relative to the optimal length")
+    minimum_length: Annotated[float, Field(gt=0, lt=1)] = Field(
+        default=0.58, description="lmin, relative to the optimal length"
+    )
+    maximum_length: Annotated[float, Field(gt=1, le=1e6)] = Field(
+        default=1.6, description="lmax, relative to the optimal length"
+    )
     maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
-    passive_peak: NonNegative = Field(default=1.3, description="fpmax, relative to the peak force")
+    passive_peak: Positive = Field(default=1.3, description="fpmax, relative to the peak force")
     lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
     activation_dynamics: bool = Field(
         default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
@@ -259,6 +319,11 @@ class WormBody(Section):
     """The 3D worm."""
 
     kind: Literal["worm"] = "worm"
+    heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
+        default=0.0,
+        description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
+        "(90: towards -y)",
+    )
     mesh: Mesh = Mesh()
     strands: Strands = Strands()
     pins: Pins = Pins()
@@ -282,6 +347,40 @@ class WormBody(Section):
         if isinstance(self.rings, ServoRings):
             raise ConfigError("body.rings.kind = 'servo' has no muscles; this needs body.rings.kind = 'muscle'")
         return self.rings
+
+    @model_validator(mode="after")
+    def _can_be_built(self) -> Self:
+        mesh = self.mesh
+        planes = mesh.planes_between_rings * (mesh.n_segments - 1) + 2 * mesh.free_planes_at_ends
+        at_ends = 2 * (mesh.elements_per_end or mesh.elements_per_side)
+        elements = mesh.n_helices * (mesh.elements_per_side * planes + at_ends)
+        # Measured on one core: the factorisation of rods fills with the number of helices.
+        chain = isinstance(self.formulation, Chain)
+        time_s = 2e-6 * elements**2 if chain else 1e-8 * elements**2 * mesh.n_helices
+        memory_GB = 5e-5 * elements if chain else 2e-6 * elements * mesh.n_helices
+        if time_s > LONGEST_BUILD_S:
+            raise ValueError(
+                f"body.mesh.n_segments = {mesh.n_segments}, body.mesh.n_helices = {mesh.n_helices} and "
+                f"body.mesh.elements_per_side = {mesh.elements_per_side} make {elements:,} elements, which take about "
+                f"{time_s:,.0f} s and {memory_GB:,.1f} GB to build; at most {LONGEST_BUILD_S:g} s are allowed: lower "
+                "one of them"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _damped_by_one_law(self) -> Self:
+        lateral = self.formulation.lateral_damping_Nms_per_rad if isinstance(self.formulation, Rods) else 0.0
+        if lateral > 0 and self.strands.material_damping_s is not None:
+            raise ValueError(
+                f"body.formulation.lateral_damping_Nms_per_rad = {lateral:g} must be 0 where body.strands gives the "
+                "damping of the material, which acts in every direction"
+            )
+        if lateral > 0 and self.heading_deg:
+            raise ValueError(
+                f"body.heading_deg = {self.heading_deg:g}: must be 0 with body.formulation.lateral_damping_Nms_per_rad "
+                f"= {lateral:g}, whose dampers are fixed in the world; give body.strands.damping_time_s instead"
+            )
+        return self
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:

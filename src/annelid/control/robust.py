@@ -1,4 +1,4 @@
-"""The controller whose rhythm goes on whatever its sensors say: the robust peristalsis network on a body."""
+"""The controller made to keep its rhythm under wrong sensor signals: the robust peristalsis network on a body."""
 
 from __future__ import annotations
 

@@ -221,6 +221,8 @@ class CourseSteering(AimedSteering[CourseTurning]):
         """Restores what `get_state` returned."""
         super().set_state(state)
         self._n_reached = int(state["n_reached"])
+        if not 0 <= self._n_reached <= len(self._settings.waypoints):
+            raise ValueError(f"{self._n_reached} waypoints reached of {len(self._settings.waypoints)}")
 
 
 class TouchSteering(Steering[TouchTurning]):

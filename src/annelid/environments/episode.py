@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from annelid.config import WormBody
 from annelid.environments.observation import Layout, Observation, Senses, layout_of
 from annelid.environments.reward import Deed, reward_terms
 from annelid.environments.task import Task
@@ -42,12 +43,14 @@ class Episode:
 
     def __init__(self, task: Task, worm: Worm) -> None:
         """Puts the worm at its start."""
-        assert task.config.arena is not None
+        body, arena = task.config.body, task.config.arena
+        assert isinstance(body, WormBody)
+        assert arena is not None
         self.task = task
         self.worm = worm
         self.layout: Layout = layout_of(worm)
         self.stopped = ""
-        self._way = way_of(task.config.arena)
+        self._way = way_of(arena, body.heading_deg)
         self._sensation: Sensation = worm.reset(0)
         self._senses = Senses(worm, task.interval_s)
         self._begin(np.zeros(worm.n_muscles))

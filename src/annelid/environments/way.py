@@ -8,6 +8,7 @@ import numpy as np
 
 from annelid.arena.course import AHEAD, LEFT, UP, Course, course_of
 from annelid.config import Arena, Pipe
+from annelid.morphology import heading_turn
 from annelid.protocols import Array
 
 STRAIGHT = np.stack([AHEAD, LEFT, UP])
@@ -34,11 +35,14 @@ class Way(Protocol):
 
 
 class Ahead:
-    """Straight ahead, towards -x of the model, where every worm leads at the start."""
+    """Straight ahead, where the worm leads at the start."""
+
+    def __init__(self, heading_deg: float) -> None:
+        self._axes = STRAIGHT @ heading_turn(heading_deg).T
 
     def place(self, ring_centre_m: Array) -> Place:
         """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
-        return Place(float(ring_centre_m.mean(axis=0) @ AHEAD), STRAIGHT)
+        return Place(float(ring_centre_m.mean(axis=0) @ self._axes[0]), self._axes)
 
 
 class AlongPipe:
@@ -60,6 +64,6 @@ class AlongPipe:
         return Place(along, np.stack([tangent, left, np.cross(tangent, left)]))
 
 
-def way_of(arena: Arena) -> Way:
-    """Returns the way through an arena."""
-    return AlongPipe(course_of(arena)) if isinstance(arena, Pipe) else Ahead()
+def way_of(arena: Arena, heading_deg: float = 0.0) -> Way:
+    """Returns the way through an arena of a worm that starts with a heading."""
+    return AlongPipe(course_of(arena)) if isinstance(arena, Pipe) else Ahead(heading_deg)

@@ -29,7 +29,7 @@ def write_mjcf(run: Run, path: Path) -> Path:
         path: File to write.
 
     Raises:
-        ConfigError: The worm is planar, or its friction depends on the direction.
+        ConfigError: The worm is planar or started with a heading, or its friction depends on the direction.
         RunFileError: The file cannot be written.
     """
     text = mjcf_text(run.config, [] if isinstance(run.config.body, PlanarWorm) else _keyframes(run))

@@ -18,7 +18,7 @@ from annelid.view.gait_table import gait_rows
 from annelid.view.output import whole_file
 from annelid.view.plots import figure7
 from annelid.view.render import Progress, render_frame
-from annelid.view.table import legend, summary_rows
+from annelid.view.table import COMPARED, closing_sentence, legend, summary_rows
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -67,12 +67,14 @@ def _head(run: Run) -> str:
 
 
 def _numbers(run: Run) -> list[str]:
-    rows = summary_rows(summary(run), run.config)
-    beside = legend(run.config)
-    rows += [(label, value, "") for label, value in gait_rows(gait(run))]
-    header = ["quantity", "this run", *(["published"] if beside else [])]
+    numbers = summary(run)
+    rows = summary_rows(numbers, run.config)
+    beside = legend(numbers, run.config)
+    rows += [(label, value, "", "") for label, value in gait_rows(gait(run))]
+    header = ["quantity", "this run", *(COMPARED if beside else ())]
     cells = [[words(word) for word in row[: len(header)]] for row in rows]
-    return ["## Numbers", table(header, cells), *([words(beside)] if beside else [])]
+    below = [beside, closing_sentence(numbers, run.config)]
+    return ["## Numbers", table(header, cells), *(words(text) for text in below if text)]
 
 
 def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:

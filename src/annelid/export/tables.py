@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import prod
@@ -74,7 +75,7 @@ def tables_of(run: Run) -> list[Table]:
 def about(run: Run) -> dict[str, Any]:
     """Returns what a run is, as plain values: name, status, configuration, versions, and each signal's meaning."""
     data = run.data
-    attrs = {key: value.item() if isinstance(value, np.generic) else value for key, value in data.attrs.items()}
+    attrs = {key: _plain(value) for key, value in data.attrs.items()}
     return {
         "name": run.config.name,
         "status": run.status,
@@ -119,3 +120,9 @@ def _label(data: xr.Dataset, dim: str, place: int, sizes: Mapping[str, int]) -> 
 def _column(variable: xr.DataArray, name: str, values: NDArray[Any]) -> Column:
     meaning = _meaning(variable)
     return Column(name, meaning["units"], meaning["long_name"], values)
+
+
+def _plain(value: Any) -> Any:
+    """Returns an attribute as JSON can have it, a number that is not finite as None."""
+    plain = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from annelid.errors import ConfigError
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.text import printable
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Connection, Network
@@ -168,13 +169,12 @@ def _table(heading: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 
 def _cell(text: str) -> str:
-    return " ".join(text.replace("|", "\\|").split())
+    return _line(text.replace("|", "\\|"))
 
 
 def _quoted(text: str) -> str:
-    """A DOT string; a control character would end the statement or be unreadable."""
-    printable = "".join(c if c.isprintable() else " " for c in text)
-    return json.dumps(printable, ensure_ascii=False)
+    """A DOT string of one line; a control character would end the statement or be unreadable."""
+    return json.dumps(_line(text), ensure_ascii=False)
 
 
 def _graphviz(network: Network) -> Iterator[str]:
@@ -372,4 +372,8 @@ def _towards(start: Point, end: Point, distance: float) -> Point:
 
 
 def _text(words: str) -> str:
-    return escape("".join(c if c.isprintable() else " " for c in words))
+    return escape(_line(words))
+
+
+def _line(text: str) -> str:
+    return printable(" ".join(text.split()))

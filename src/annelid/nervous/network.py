@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError, require_finite, shown, suggest
 from annelid.nervous.arrays import NetworkArrays, build_arrays
 from annelid.nervous.diagram import Diagram, draw_diagram, markdown_tables
 from annelid.nervous.neurons import Neuron
@@ -77,9 +77,10 @@ class Network:
             initial_mV: Potential at the start; default: the neuron's rest.
 
         Raises:
-            ConfigError: The name is taken.
+            ConfigError: The name is taken, or is no text; the potential is not finite.
         """
         _refuse_duplicate("neuron", name, self._neurons)
+        require_finite(**{f"neuron {shown(name)}: initial_mV": initial_mV})
         self._neurons[name] = neuron
         self._initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
 
@@ -195,9 +196,13 @@ class Network:
     def _require_neuron(self, name: str) -> None:
         if name not in self._neurons:
             hint = suggest(name, self._neurons) if self._neurons else "the network has no neurons yet"
-            raise ConfigError(f"unknown neuron {name!r}: {hint}")
+            raise ConfigError(f"unknown neuron {shown(name)}: {hint}")
 
 
 def _refuse_duplicate(kind: str, name: str, taken: Mapping[str, object]) -> None:
     if name in taken:
-        raise ConfigError(f"{kind} {name!r} exists already: every {kind} needs a name of its own")
+        raise ConfigError(f"{kind} {shown(name)} exists already: every {kind} needs a name of its own")
+    try:
+        name.encode()
+    except (UnicodeEncodeError, AttributeError):
+        raise ConfigError(f"{kind} {shown(name)}: its name must be a text that can be written as UTF-8") from None

@@ -6,14 +6,28 @@ capacitances in nF, times in ms: a consistent set, since uS mV = nA and nF mV / 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_finite
 
 Array = NDArray[np.float64]
+
+
+def refuse_not_finite(owner: str, item: Any) -> None:
+    """Refuses a part of a network one of whose numbers is infinite or not a number.
+
+    Args:
+        owner: What it is, for the sentence: "a neuron's".
+        item: A dataclass.
+
+    Raises:
+        ConfigError: Of the first such number.
+    """
+    require_finite(**{f"{owner} {field.name}": getattr(item, field.name) for field in fields(item)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +47,8 @@ class Gate:
             its steady state at once.
 
     Raises:
-        ConfigError: A negative factor, a slow gate with factor 0, or a time constant that is not positive.
+        ConfigError: A number that is not finite, a negative factor, a slow gate with factor 0, or a time constant that
+            is not positive.
     """
 
     slope_per_mV: float
@@ -43,6 +58,7 @@ class Gate:
     time_constant_ms: float | None = None
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a gate's", self)
         if not self.factor >= 0 or (self.time_constant_ms is not None and self.factor == 0):
             raise ConfigError(f"a gate's factor must be positive (0 only without time constant), not {self.factor}")
         if self.time_constant_ms is not None and not self.time_constant_ms > 0:
@@ -67,7 +83,7 @@ class Channel:
         gates: Its gates.
 
     Raises:
-        ConfigError: A negative conductance.
+        ConfigError: A number that is not finite, a negative conductance.
     """
 
     conductance_uS: float
@@ -75,6 +91,7 @@ class Channel:
     gates: tuple[Gate, ...] = ()
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a channel's", self)
         if not self.conductance_uS >= 0:
             raise ConfigError(f"a channel's conductance_uS must not be negative, not {self.conductance_uS}")
 
@@ -108,7 +125,8 @@ class Firing:
         adaptation_time_constant_ms: tau, time constant of the threshold.
 
     Raises:
-        ConfigError: A reset at or above the threshold, or a time constant that is not positive.
+        ConfigError: A number that is not finite, a reset at or above the threshold, or a time constant that is not
+            positive.
     """
 
     threshold_mV: float = 1.0
@@ -117,6 +135,7 @@ class Firing:
     adaptation_time_constant_ms: float = 5.0
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a firing neuron's", self)
         if not self.reset_mV < self.threshold_mV:
             raise ConfigError(
                 f"a firing neuron's reset_mV must be below its threshold_mV = {self.threshold_mV}, not {self.reset_mV}"
@@ -141,7 +160,7 @@ class Neuron:
         firing: Threshold and reset of a spiking neuron; None for a non-spiking one.
 
     Raises:
-        ConfigError: A capacitance that is not positive, or a negative leak.
+        ConfigError: A number that is not finite, a capacitance that is not positive, or a negative leak.
     """
 
     capacitance_nF: float = 5.0
@@ -152,6 +171,7 @@ class Neuron:
     firing: Firing | None = None
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a neuron's", self)
         if not self.capacitance_nF > 0:
             raise ConfigError(f"a neuron's capacitance_nF must be positive, not {self.capacitance_nF}")
         if not self.leak_conductance_uS >= 0:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from annelid.errors import ConfigError, suggest
+from annelid.nervous.neurons import refuse_not_finite
 
 Modulated = Literal["leak", "channels", "membrane", "gates"]
 
@@ -24,7 +25,7 @@ class Synapse:
         saturation_mV: Presynaptic potential at which it is largest.
 
     Raises:
-        ConfigError: A negative conductance, or a saturation equal to the threshold.
+        ConfigError: A number that is not finite, a negative conductance, or a saturation equal to the threshold.
     """
 
     conductance_uS: float
@@ -33,6 +34,7 @@ class Synapse:
     saturation_mV: float = 20.0
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a synapse's", self)
         if not self.conductance_uS >= 0:
             raise ConfigError(f"a synapse's conductance_uS must not be negative, not {self.conductance_uS}")
         if self.saturation_mV == self.threshold_mV:
@@ -50,13 +52,14 @@ class GapJunction:
         rectified: Conducts only while the presynaptic potential is the higher one.
 
     Raises:
-        ConfigError: A negative conductance.
+        ConfigError: A number that is not finite, a negative conductance.
     """
 
     conductance_uS: float
     rectified: bool = False
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a gap junction's", self)
         if not self.conductance_uS >= 0:
             raise ConfigError(f"a gap junction's conductance_uS must not be negative, not {self.conductance_uS}")
 
@@ -76,7 +79,8 @@ class SpikingSynapse:
         increment: Jump of the release at a spike.
 
     Raises:
-        ConfigError: A negative conductance, a time constant that is not positive, or an increment outside (0, 1].
+        ConfigError: A number that is not finite, a negative conductance, a time constant that is not positive, or an
+            increment outside (0, 1].
     """
 
     conductance_uS: float
@@ -85,6 +89,7 @@ class SpikingSynapse:
     increment: float = 1.0
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a spiking synapse's", self)
         if not self.conductance_uS >= 0:
             raise ConfigError(f"a spiking synapse's conductance_uS must not be negative, not {self.conductance_uS}")
         if not self.time_constant_ms > 0:
@@ -111,7 +116,8 @@ class ModulatorySynapse:
         saturation_mV: Presynaptic potential at which it is full.
 
     Raises:
-        ConfigError: An unknown quantity, a factor that is not positive, or a saturation equal to the threshold.
+        ConfigError: A number that is not finite, an unknown quantity, a factor that is not positive, or a saturation
+            equal to the threshold.
     """
 
     quantity: Modulated
@@ -120,6 +126,7 @@ class ModulatorySynapse:
     saturation_mV: float = 20.0
 
     def __post_init__(self) -> None:
+        refuse_not_finite("a modulatory synapse's", self)
         if self.quantity not in get_args(Modulated):
             raise ConfigError(
                 f"unknown modulated quantity {self.quantity!r}: {suggest(self.quantity, get_args(Modulated))}"

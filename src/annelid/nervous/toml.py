@@ -6,15 +6,15 @@ the names. The order of the tables is the order in the network.
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, asdict, fields
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError, shown, suggest
 from annelid.nervous.neurons import Channel, Firing, Gate, Neuron
 from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.textfiles import parse_toml, toml_text
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
@@ -39,20 +39,22 @@ _KEYS = {
 
 def write_network(network: Network) -> str:
     """Returns a network as TOML text; every field is written, defaults too."""
-    lines = [f"name = {_literal(network.name)}"]
-    for name, neuron in network.neurons.items():
-        lines += ["", "[[neuron]]", f"name = {_literal(name)}"]
-        lines += [f"initial_mV = {_literal(network.initial_mV[name])}", *_entries(neuron, "neuron")]
     names = {kind: name for name, kind in KINDS.items()}
-    for connection in network.connections:
-        lines += ["", "[[connection]]", f"source = {_literal(connection.source)}"]
-        lines += [f"target = {_literal(connection.target)}", f"kind = {_literal(names[type(connection.kind)])}"]
-        lines += _entries(connection.kind, "connection")
-    for name, targets in network.inputs.items():
-        lines += ["", "[[input]]", f"name = {_literal(name)}", f"targets = [{', '.join(map(_literal, targets))}]"]
-    for name, source in network.outputs.items():
-        lines += ["", "[[output]]", f"name = {_literal(name)}", f"source = {_literal(source)}"]
-    return "\n".join(lines) + "\n"
+    return toml_text(
+        {
+            "name": network.name,
+            "neuron": [
+                {"name": name, "initial_mV": network.initial_mV[name], **asdict(neuron)}
+                for name, neuron in network.neurons.items()
+            ],
+            "connection": [
+                {"source": each.source, "target": each.target, "kind": names[type(each.kind)], **asdict(each.kind)}
+                for each in network.connections
+            ],
+            "input": [{"name": name, "targets": targets} for name, targets in network.inputs.items()],
+            "output": [{"name": name, "source": source} for name, source in network.outputs.items()],
+        }
+    )
 
 
 def read_network(text: str, make: type[Network]) -> Network:
@@ -68,10 +70,7 @@ def read_network(text: str, make: type[Network]) -> Network:
     Raises:
         ConfigError: No valid TOML, an unknown or missing field, a value of the wrong type, or one that is refused.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"the network is not valid TOML: {error}") from None
+    document = parse_toml(text, "the network")
     _refuse_unknown(document, _KEYS["network"], "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))
     for place, entry in _tables(document, "neuron"):
@@ -84,7 +83,7 @@ def read_network(text: str, make: type[Network]) -> Network:
             _string(_required(entry, key, place), f"{place}: {key}") for key in ("source", "target", "kind")
         )
         if kind not in KINDS:
-            raise ConfigError(f"{place}: unknown kind {kind!r}: {suggest(kind, KINDS)}")
+            raise ConfigError(f"{place}: unknown kind {shown(kind)}: {suggest(kind, KINDS)}")
         built = _build(KINDS[kind], entry, place, _KEYS["connection"])
         if isinstance(built, GapJunction):
             network.add_gap_junction(source, target, built)
@@ -94,7 +93,7 @@ def read_network(text: str, make: type[Network]) -> Network:
         _refuse_unknown(entry, _KEYS["input"], place)
         targets = _required(entry, "targets", place)
         if not isinstance(targets, list):
-            raise ConfigError(f"{place}: targets must be a list of names, not {targets!r}")
+            raise ConfigError(f"{place}: targets must be a list of names, not {shown(targets)}")
         names = [_string(target, f"{place}: targets") for target in targets]
         network.add_input(_string(_required(entry, "name", place), f"{place}: name"), names)
     for place, entry in _tables(document, "output"):
@@ -102,30 +101,6 @@ def read_network(text: str, make: type[Network]) -> Network:
         name, source = (_string(_required(entry, key, place), f"{place}: {key}") for key in ("name", "source"))
         network.add_output(name, source)
     return network
-
-
-def _entries(item: Any, path: str) -> Iterator[str]:
-    """Lines of all fields: plain ones first, since TOML puts what follows a header into its table."""
-    nested = []
-    for field in fields(item):
-        value = getattr(item, field.name)
-        if field.name in _NESTED:
-            nested.append((field.name, value))
-        elif value is not None:
-            yield f"{field.name} = {_literal(value)}"
-    for name, value in nested:
-        many = isinstance(value, tuple)
-        for part in value if many else (value,) if value is not None else ():
-            yield f"[[{path}.{name}]]" if many else f"[{path}.{name}]"
-            yield from _entries(part, f"{path}.{name}")
-
-
-def _literal(value: str | float | bool) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(float(value))
 
 
 def _build(kind: type, entry: Mapping[str, Any], place: str, others: set[str] | None = None) -> Any:
@@ -142,7 +117,7 @@ def _build(kind: type, entry: Mapping[str, Any], place: str, others: set[str] | 
         if name in _NESTED:
             many = isinstance(field.default, tuple)
             if not isinstance(value, list if many else dict):
-                raise ConfigError(f"{where} must be {'an array of tables' if many else 'a table'}, not {value!r}")
+                raise ConfigError(f"{where} must be {'an array of tables' if many else 'a table'}, not {shown(value)}")
             if many:
                 values[name] = tuple(_build(_NESTED[name], _table(part, where), where) for part in value)
             else:
@@ -151,7 +126,7 @@ def _build(kind: type, entry: Mapping[str, Any], place: str, others: set[str] | 
             values[name] = _string(value, where)
         elif name == "rectified":
             if not isinstance(value, bool):
-                raise ConfigError(f"{where} must be true or false, not {value!r}")
+                raise ConfigError(f"{where} must be true or false, not {shown(value)}")
             values[name] = value
         else:
             values[name] = _number(value, where)
@@ -165,15 +140,15 @@ def _tables(document: Mapping[str, Any], key: str) -> Iterator[tuple[str, Mappin
     """The tables of an array, each with words that say where it is."""
     entries = document.get(key, [])
     if not isinstance(entries, list):
-        raise ConfigError(f"{key} must be an array of tables, [[{key}]], not {entries!r}")
+        raise ConfigError(f"{key} must be an array of tables, [[{key}]], not {shown(entries)}")
     for number, entry in enumerate(entries, start=1):
         name = _table(entry, f"{key} {number}").get("name")
-        yield f"{key} {number}" + (f" ({name!r})" if name is not None else ""), entry
+        yield f"{key} {number}" + (f" ({shown(name)})" if name is not None else ""), entry
 
 
 def _table(value: Any, place: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
-        raise ConfigError(f"{place} must be a table, not {value!r}")
+        raise ConfigError(f"{place} must be a table, not {shown(value)}")
     return value
 
 
@@ -186,16 +161,22 @@ def _required(entry: Mapping[str, Any], key: str, place: str) -> Any:
 def _refuse_unknown(entry: Mapping[str, Any], known: set[str], place: str) -> None:
     for key in entry:
         if key not in known:
-            raise ConfigError(f"{place}: unknown field {key!r}: {suggest(key, known)}")
+            raise ConfigError(f"{place}: unknown field {shown(key)}: {suggest(key, known)}")
 
 
 def _string(value: Any, place: str) -> str:
     if not isinstance(value, str):
-        raise ConfigError(f"{place} must be a string, not {value!r}")
+        raise ConfigError(f"{place} must be a string, not {shown(value)}")
     return value
 
 
 def _number(value: Any, place: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ConfigError(f"{place} must be a number, not {value!r}")
-    return float(value)
+        raise ConfigError(f"{place} must be a number, not {shown(value)}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = inf
+    if not isfinite(number):
+        raise ConfigError(f"{place} must be a finite number, not {shown(value)}")
+    return number

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from annelid.clock import StepRatio
 from annelid.config import Clock
+from annelid.errors import SimulationStopped
 from annelid.planar.linkage import Linkage
 from annelid.planar.midpoint import midpoint_step
 from annelid.protocols import Array, Recordable, Sensation, Signal, State
@@ -58,7 +59,7 @@ class DynamicPlanarPlant:
         n = self.n_segments
         self._q, self._p = self._rest.copy(), np.zeros_like(self._rest)
         self._muscle_force_N, self._friction_N = np.zeros(n), np.zeros(n)
-        self._muscle_work_J, self._slip_loss_J = np.zeros(n), np.zeros(n)
+        self._muscle_work_J, self._positive_work_J, self._slip_loss_J = np.zeros(n), np.zeros(n), np.zeros(n)
         self._damping_loss_J = 0.0
         self._converged = True
         self._n_control_steps = 0
@@ -73,14 +74,24 @@ class DynamicPlanarPlant:
 
         Returns:
             The sensation at its end.
+
+        Raises:
+            SimulationStopped: The step has no unique solution.
         """
         activation = np.asarray(activation, dtype=np.float64)
         self._n_control_steps += 1
         for _ in range(self._ratio.physics_steps_due(self._n_control_steps)):
-            step = midpoint_step(self.worm, self._q, self._p, activation, self._ratio.physics_timestep_s)
+            try:
+                step = midpoint_step(self.worm, self._q, self._p, activation, self._ratio.physics_timestep_s)
+            except np.linalg.LinAlgError:
+                raise SimulationStopped(
+                    "the planar worm's equations of motion have no unique solution: its masses, stiffnesses or "
+                    "dampings differ by too much"
+                ) from None
             self._q, self._p = step.q, step.p
             self._muscle_force_N, self._friction_N = step.muscle_force_N, step.friction_N
             self._muscle_work_J = self._muscle_work_J + step.muscle_work_J
+            self._positive_work_J = self._positive_work_J + np.maximum(step.muscle_work_J, 0.0)
             self._slip_loss_J = self._slip_loss_J + step.slip_loss_J
             self._damping_loss_J += step.damping_loss_J
             self._converged &= step.converged
@@ -114,7 +125,8 @@ class DynamicPlanarPlant:
                 Signal("outline", ("corner", "plane_axis"), (corners, 2), "m", "upper half, front tip first: x and z"),
                 Signal("kinetic_energy", (), (), "J", "kinetic energy"),
                 Signal("elastic_energy", (), (), "J", "energy of springs and walls"),
-                Signal("muscle_work", ("muscle",), (n,), "J", "work done by an actuator so far"),
+                Signal("muscle_work", ("muscle",), (n,), "J", "net work done by an actuator so far"),
+                Signal("positive_work", ("muscle",), (n,), "J", "positive work of an actuator so far, none regained"),
                 Signal("damping_loss", (), (), "J", "energy lost to dampers so far"),
             ),
             coords={"segment": list(range(1, n + 1)), "axis": ["x", "y", "z"]},
@@ -137,6 +149,7 @@ class DynamicPlanarPlant:
             "kinetic_energy": self.kinetic_energy_J(),
             "elastic_energy": self.elastic_energy_J(),
             "muscle_work": self._muscle_work_J.copy(),
+            "positive_work": self._positive_work_J.copy(),
             "damping_loss": self._damping_loss_J,
         }
 
@@ -148,6 +161,7 @@ class DynamicPlanarPlant:
             "muscle_force": self._muscle_force_N.copy(),
             "friction": self._friction_N.copy(),
             "muscle_work": self._muscle_work_J.copy(),
+            "positive_work": self._positive_work_J.copy(),
             "slip_loss": self._slip_loss_J.copy(),
             "damping_loss": np.array(self._damping_loss_J),
             "n_control_steps": np.array(self._n_control_steps),
@@ -159,6 +173,7 @@ class DynamicPlanarPlant:
         self._muscle_force_N = np.array(state["muscle_force"], dtype=np.float64)
         self._friction_N = np.array(state["friction"], dtype=np.float64)
         self._muscle_work_J = np.array(state["muscle_work"], dtype=np.float64)
+        self._positive_work_J = np.array(state["positive_work"], dtype=np.float64)
         self._slip_loss_J = np.array(state["slip_loss"], dtype=np.float64)
         self._damping_loss_J = float(state["damping_loss"])
         self._n_control_steps = int(state["n_control_steps"])

@@ -94,13 +94,11 @@ class Forces(_Rows):
     """What acted during the last physics step; of many worms with one more axis in front.
 
     Attributes:
-        muscle: Contractile force of every ring muscle, N, ``(n_muscles,)``.
         contact: Force of the arena on every segment, N, ``(n_segments, 3)``.
         edge_strain: Largest strain of a rod's edge, ``()``; 0 for a chain.
         pin_gap: Largest gap between two pinned strands, m, ``()``; 0 where pins cannot part.
     """
 
-    muscle: Array
     contact: Array
     edge_strain: Array
     pin_gap: Array
@@ -167,7 +165,7 @@ class Anatomy:
         edges = ("flexedge_length",) if self.has_edges else ()
         self.elasticity = Elasticity(model, body)
         self.bookkeeper = Bookkeeper(model, body.rings)
-        self.outputs: tuple[str, ...] = ("actuator_force", "sensordata", *edges, *pin_outputs)
+        self.outputs: tuple[str, ...] = ("sensordata", *edges, *pin_outputs)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
         """Crossings along a ring tendon."""
@@ -250,24 +248,22 @@ class Anatomy:
         return by_geom.reshape(*by_geom.shape[:-1], -1, 3)
 
     def forces(self, engine: Mapping[str, Array]) -> Forces:
-        """Reads what acted during the last physics step.
+        """Reads what acted during the last physics step, but for the muscles' pull, which the books tell.
 
         Args:
             engine: The engine's arrays named in `outputs`.
         """
-        muscle = -engine["actuator_force"]
         contact = self._segment_rows @ self._by_geom(engine)
-        strain = gap = np.zeros(muscle.shape[:-1])
+        strain = gap = np.zeros(contact.shape[:-2])
         if self.has_edges:
             strain = np.abs(engine["flexedge_length"] * self._edges_per_m - 1.0).max(axis=-1)
         if self._pin_gap is not None:
             gap = self._pin_gap(engine)
-        return Forces(muscle, contact, strain, gap)
+        return Forces(contact, strain, gap)
 
     def no_forces(self, *n_worms: int) -> Forces:
         """Returns the forces before the first step."""
         return Forces(
-            np.zeros((*n_worms, self.n_muscles)),
             np.zeros((*n_worms, self.n_segments, 3)),
             np.zeros(n_worms),
             np.zeros(n_worms),

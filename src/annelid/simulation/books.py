@@ -34,12 +34,14 @@ class Books:
     """Work done and energy lost since the start, J.
 
     Attributes:
-        muscle_work: Work of every ring actuator on the body, ``(n_muscles,)``.
+        muscle_work: Net work of every ring actuator on the body, ``(n_muscles,)``.
+        positive_work: What every ring actuator did in the physics steps in which its work was positive, likewise.
         damping_loss: Energy that dampers have taken, ``()``.
         constraint_loss: Energy that contacts, their friction included, and other constraints have taken, ``()``.
     """
 
     muscle_work: Array
+    positive_work: Array
     damping_loss: Array
     constraint_loss: Array
 
@@ -47,6 +49,7 @@ class Books:
         """Returns the books after one more step."""
         return Books(
             self.muscle_work + step.muscle_work,
+            self.positive_work + step.positive_work,
             self.damping_loss + step.damping_loss,
             self.constraint_loss + step.constraint_loss,
         )
@@ -80,15 +83,19 @@ class Bookkeeper:
 
     def opened(self) -> Books:
         """Returns the books before the first step."""
-        return Books(np.zeros(self._n_muscles), np.zeros(()), np.zeros(()))
+        return Books(np.zeros(self._n_muscles), np.zeros(self._n_muscles), np.zeros(()), np.zeros(()))
 
-    def step(self, engine: Engine, drive: Array) -> Books:
-        """Tells what one step did.
+    def step(self, engine: Engine, drive: Array) -> tuple[Array, Books]:
+        """Tells what the actuators pulled with in one step, and what the step did.
 
         Args:
             engine: The engine's arrays named in `outputs`, of one worm, after the step.
             drive: What the actuators' gain was multiplied by during it: the control, or the engine's actuator states
                 before the step where there are any; ``(n_muscles,)``.
+
+        Returns:
+            Tension of every ring actuator that acted over the step, N, ``(n_muscles,)``: its work is this times the
+            shortening. And the step's entries.
         """
         velocity, h = engine["qvel"], self._timestep_s
         rate, earlier = self._rates(engine, velocity), engine["actuator_velocity"]
@@ -96,11 +103,14 @@ class Bookkeeper:
         if self.slopes is not None:
             per_length, per_rate = self.slopes(engine["actuator_length"], earlier, drive, tension)
             tension = tension + per_length * (h * rate) + per_rate * (rate - earlier)
-        return Books(
-            -h * tension * rate,
+        work = -h * tension * rate
+        entries = Books(
+            work,
+            np.maximum(work, 0.0),
             np.asarray(-h * (engine["qfrc_damper"] @ velocity)),
             np.asarray(-h * (engine["qfrc_constraint"] @ velocity)),
         )
+        return tension, entries
 
     def _rates(self, engine: Engine, velocity: Array) -> Array:
         """Rates of the actuators' lengths at a velocity of the body, m/s, with the lever arms of the step."""

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import io
 import struct
+import zipfile
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -43,25 +45,66 @@ class Checkpoint:
 
     def to_bytes(self) -> bytes:
         """Packs it as an uncompressed npz archive."""
-        arrays: dict[str, Any] = {
-            "loop/step": np.int64(self.step),
-            "loop/noise": self.noise,
-        }
+        buffer = io.BytesIO()
+        np.savez(buffer, **self.arrays())
+        return buffer.getvalue()
+
+    def arrays(self) -> dict[str, Any]:
+        """Returns all that it consists of, by name."""
+        arrays: dict[str, Any] = {"loop/step": np.int64(self.step), "loop/noise": self.noise}
         arrays |= {f"sensation/{field.name}": getattr(self.sensation, field.name) for field in fields(Sensation)}
         arrays |= {f"plant/{name}": value for name, value in self.plant.items()}
-        arrays |= {f"controller/{name}": value for name, value in self.controller.items()}
-        buffer = io.BytesIO()
-        np.savez(buffer, **arrays)
-        return buffer.getvalue()
+        return arrays | {f"controller/{name}": value for name, value in self.controller.items()}
+
+    def misfit(self, fresh: Checkpoint, timestep_s: float, last_step: int) -> str | None:
+        """Tells why plant and controller cannot be in this state.
+
+        Args:
+            fresh: The checkpoint of the same plant and controller at time zero.
+            timestep_s: Control step, s.
+            last_step: Control steps of the whole run that it is of.
+
+        Returns:
+            The reason, or None where they can.
+        """
+        if not 0 <= self.step <= last_step:
+            return f"its step is {self.step}, not in 0 .. {last_step}"
+        ours, theirs = self.arrays(), fresh.arrays()
+        for name in sorted({*ours, *theirs}):
+            if name not in ours or name not in theirs:
+                return f"{name!r} is {'missing' if name in theirs else 'not of this plant or controller'}"
+            own, wanted = np.asarray(ours[name]), np.asarray(theirs[name])
+            if own.shape != wanted.shape or own.dtype.kind != wanted.dtype.kind:
+                return f"{name!r} is {own.dtype} of shape {own.shape}, not {wanted.dtype} of shape {wanted.shape}"
+            # A quantity that a body does not have is NaN from the start.
+            if own.dtype.kind == "f" and np.isfinite(wanted).all() and not np.isfinite(own).all():
+                return f"{name!r} holds a value that is not finite"
+            counts = own.dtype.kind == "i" and name.endswith(("step", "steps"))
+            if counts and not np.all((own >= 0) & (own <= self.step)):
+                return f"{name!r} is {own.tolist()}, not in 0 .. {self.step}"
+        if abs(self.sensation.time_s - self.step * timestep_s) > timestep_s / 2:
+            return f"its time is {self.sensation.time_s:g} s, not the {self.step * timestep_s:g} s of its step"
+        return None
 
     @classmethod
     def from_bytes(cls, packed: bytes) -> Checkpoint:
-        """Unpacks what `to_bytes` gave."""
+        """Unpacks what `to_bytes` gave.
+
+        Raises:
+            ValueError: They are no such bytes, or declare more than they hold.
+            KeyError: Something is missing.
+        """
         groups: dict[str, dict[str, NDArray[Any]]] = {"loop": {}, "sensation": {}, "plant": {}, "controller": {}}
-        with np.load(io.BytesIO(packed), allow_pickle=False) as archive:
-            for key in archive.files:
-                group, _, name = key.partition("/")
-                groups[group][name] = archive[key]
+        with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+            entries = archive.infolist()
+            # Entries may be the same bytes under many names.
+            if sum(entry.file_size for entry in entries) > len(packed):
+                raise ValueError("its checkpoint declares more than it holds")
+            for entry in entries:
+                if entry.compress_type != zipfile.ZIP_STORED:
+                    raise ValueError("its checkpoint is packed as no checkpoint is")
+                group, _, name = entry.filename.removesuffix(".npy").partition("/")
+                groups[group][name] = _array(archive.read(entry))
         time_s = float(groups["sensation"].pop("time_s"))
         return cls(
             step=int(groups["loop"]["step"]),
@@ -70,6 +113,18 @@ class Checkpoint:
             plant=groups["plant"],
             controller=groups["controller"],
         )
+
+
+def _array(packed: bytes) -> NDArray[Any]:
+    """Unpacks an array of an npz archive, which must be exactly as long as it says before memory is taken for it."""
+    stream = io.BytesIO(packed)
+    if np.lib.format.read_magic(stream) != (1, 0):
+        raise ValueError("its checkpoint holds an array of an unknown form")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype.kind not in "fiub" or dtype.itemsize * prod(shape) != len(packed) - stream.tell():
+        raise ValueError("its checkpoint holds an array that is not what it says")
+    stream.seek(0)
+    return np.lib.format.read_array(stream, allow_pickle=False)
 
 
 def to_slot(sequence: int, payload: bytes) -> bytes:
@@ -113,7 +168,13 @@ def generator_state(generator: np.random.Generator) -> NDArray[np.uint64]:
 
 
 def restore_generator(words: NDArray[np.uint64]) -> np.random.Generator:
-    """Returns a PCG64 generator in the state that `generator_state` gave."""
+    """Returns a PCG64 generator in the state that `generator_state` gave.
+
+    Raises:
+        ValueError: No generator has such a state.
+    """
+    if words.shape != (6,) or words.dtype != np.uint64 or not words[3] & 1 or words[4] > 1 or words[5] >> 32:
+        raise ValueError("no generator of noise has the state that it holds")
     high, low, inc_high, inc_low, has_uint32, uinteger = (int(word) for word in words)
     bits = np.random.PCG64()
     bits.state = {

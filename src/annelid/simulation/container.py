@@ -4,7 +4,7 @@ HDF5 keeps its metadata in memory while a file is open for writing, so a process
 a file that no longer opens. Here HDF5 only lays the file out: every variable at its full size, contiguous,
 allocated and filled at once. Then the file is closed, and the run writes raw numbers at the variables'
 offsets. The metadata never change again, so the file is valid at every instant, other processes may read it
-during the run, and its room on the disk is taken from the start.
+during the run, and its room on the disk is taken from the start. Behind it lies room for a digest of the finished file.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.errors import RunFileError
+from annelid.simulation import digest
+from annelid.simulation.digest import Extent
 
 _MEGABYTE = 1e6
 _METADATA_BYTES = 262_144
@@ -62,7 +64,7 @@ def needed_bytes(sizes: Mapping[str, int], variables: Sequence[Variable]) -> int
 
 def create(
     path: Path, sizes: Mapping[str, int], variables: Sequence[Variable], attrs: Mapping[str, Any]
-) -> dict[str, int]:
+) -> dict[str, Extent]:
     """Lays out the file, making its folder if needed; it appears under its name only when it is complete.
 
     Args:
@@ -72,7 +74,7 @@ def create(
         attrs: Global attributes.
 
     Returns:
-        Offset in the file, in bytes, of each variable that has no ``data`` of its own.
+        Where each variable lies in the file.
 
     Raises:
         RunFileError: The folder cannot be made or written, or the disk has no room. Nothing is left behind.
@@ -84,8 +86,10 @@ def create(
         _check_room(path, made, needed_bytes(sizes, variables))
         path.parent.mkdir(parents=True, exist_ok=True)
         _try_room(draft, needed_bytes(sizes, variables))
-        offsets = _lay_out(draft, sizes, variables, attrs)
+        extents = _lay_out(draft, sizes, variables, attrs)
         with open(draft, "r+b") as handle:
+            handle.write(digest.room(extents, handle.seek(0, os.SEEK_END)))
+            handle.flush()
             os.fsync(handle.fileno())
         os.replace(draft, path)
     # HDF5 reports a failed write as an OSError or, while it closes the file, as a RuntimeError.
@@ -95,7 +99,7 @@ def create(
     except BaseException:
         _remove(draft, made)
         raise
-    return offsets
+    return extents
 
 
 def _check_room(path: Path, made: Sequence[Path], needed: int) -> None:
@@ -131,7 +135,7 @@ def _reason(error: BaseException) -> str:
 
 def _lay_out(
     path: Path, sizes: Mapping[str, int], variables: Sequence[Variable], attrs: Mapping[str, Any]
-) -> dict[str, int]:
+) -> dict[str, Extent]:
     import h5netcdf
     import h5py
 
@@ -156,7 +160,8 @@ def _lay_out(
             created = file.create_variable(variable.name, variable.dims, **options)
             created.attrs.update({"units": variable.units, "long_name": variable.long_name, **variable.attrs})
     with h5py.File(path, "r") as file:
-        return {v.name: file[v.name].id.get_offset() for v in variables if v.data is None}
+        stored = {variable.name: file[variable.name].id for variable in variables}
+        return {name: (dataset.get_offset(), dataset.get_storage_size()) for name, dataset in stored.items()}
 
 
 def _allocated_at_once() -> Any:
@@ -176,22 +181,34 @@ class RawWriter:
         RunFileError: From every method, where the operating system refuses (a full disk, for example).
     """
 
-    def __init__(self, path: Path, offsets: Mapping[str, int]) -> None:
+    def __init__(self, path: Path, extents: Mapping[str, Extent]) -> None:
         self._path = path
-        self._offsets = offsets
+        self._extents = extents
         try:
             # Unbuffered, so that what was written is the operating system's even if this process dies.
             self._file = open(path, "r+b", buffering=0)  # noqa: SIM115
         except OSError as error:
             raise self._failure(error) from None
 
+    @property
+    def closed(self) -> bool:
+        """Whether nothing more can be written."""
+        return self._file.closed
+
     def write(self, name: str, content: NDArray[np.generic] | bytes, skip_bytes: int = 0) -> None:
         """Overwrites a variable's bytes, from ``skip_bytes`` after its start on."""
         rest = memoryview(content if isinstance(content, bytes) else np.ascontiguousarray(content).tobytes())
         try:
-            self._file.seek(self._offsets[name] + skip_bytes)
+            self._file.seek(self._extents[name][0] + skip_bytes)
             while rest:
                 rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            raise self._failure(error) from None
+
+    def write_digest(self) -> None:
+        """Writes the digest of the file as it is, which is not to change any more."""
+        try:
+            digest.write(self._file, self._extents)
         except OSError as error:
             raise self._failure(error) from None
 

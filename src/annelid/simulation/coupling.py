@@ -13,6 +13,7 @@ from annelid.errors import RunFileError, SimulationStopped
 from annelid.protocols import (
     Array,
     Controller,
+    Doubtful,
     Plant,
     Sensation,
     SlowPlant,
@@ -105,6 +106,11 @@ class Coupling:
             if reason:
                 raise SimulationStopped(self.at(reason))
 
+    def doubts(self) -> tuple[str, ...]:
+        """Returns what plant and controller find doubtful, a sentence each."""
+        parts = (self.plant, self.controller)
+        return tuple(doubt for part in parts if isinstance(part, Doubtful) for doubt in part.doubts())
+
     def felt(self) -> Sensation:
         """Returns what the controller is told: the sensation with noise on the stretch sensors."""
         true = self.sensation
@@ -165,16 +171,26 @@ def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origi
         origin: The run to continue, or None.
 
     Raises:
-        RunFileError: There is a run to continue, but plant or controller cannot be restored.
+        RunFileError: There is a run to continue, but plant or controller cannot be restored, or not to its state.
     """
     noise, plant_seed, controller_seed = np.random.SeedSequence(config.seed).spawn(3)
     sensation = plant.reset(int(plant_seed.generate_state(1)[0]))
     controller.reset(int(controller_seed.generate_state(1)[0]))
+    beginning = Coupling(config, plant, controller, sensation, np.random.Generator(np.random.PCG64(noise)))
     if origin is None:
-        return Coupling(config, plant, controller, sensation, np.random.Generator(np.random.PCG64(noise)))
-    if not (isinstance(plant, Stateful) and isinstance(controller, Stateful)):
+        return beginning
+    fresh, saved = beginning.checkpoint(), origin.checkpoint
+    if not (isinstance(plant, Stateful) and isinstance(controller, Stateful)) or fresh is None:
         raise RunFileError(f"{origin.path} cannot be continued with a plant or controller that cannot be restored")
-    saved = origin.checkpoint
-    plant.set_state(saved.plant)
-    controller.set_state(saved.controller)
-    return Coupling(config, plant, controller, saved.sensation, restore_generator(saved.noise), saved.step)
+    before = Schedule.of(origin.config)
+    try:
+        misfit = saved.misfit(fresh, before.timestep_s, before.end)
+        if misfit is None:
+            generator = restore_generator(saved.noise)
+            plant.set_state(saved.plant)
+            controller.set_state(saved.controller)
+            return Coupling(config, plant, controller, saved.sensation, generator, saved.step)
+    # What a plant or a controller says to a state that none of its own runs has come to.
+    except Exception as error:
+        misfit = str(error) or type(error).__name__
+    raise RunFileError(f"{origin.path} cannot be continued: {' '.join(misfit.split())}")

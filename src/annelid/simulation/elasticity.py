@@ -103,7 +103,7 @@ class _Rods:
         per_length = pi * body.strands.radius_m**4 / (lengths[:, :-1] + lengths[:, 1:])
         self._bending = body.strands.young_modulus_Pa * per_length / 4
         self._torsion = body.strands.shear_modulus_Pa * per_length / 2
-        self._frames_at_rest = self._frames(_plastic_at_rest(model))
+        self._frames_at_rest = self._frames(plastic_at_rest(model))
         tangent, direction, _ = self._frames_at_rest
         self._seen_at_rest = _Neighbours(tangent, direction).seen(np.zeros(self._shape))
 
@@ -132,11 +132,27 @@ class _Rods:
         return frames[0].copy(), frames[1].copy(), by_strand[:, _NUMBERS_PER_EDGE * n_edges :]
 
 
-def _plastic_at_rest(model: mujoco.MjModel) -> Array:
-    """The frames that the engine gives the edges where they are at rest, ``(nplastic,)``."""
+def plastic_at_rest(model: mujoco.MjModel) -> Array:
+    """Returns the frames that the engine gives the edges where they are at rest, ``(nplastic,)``."""
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data)
     return data.plastic.copy()
+
+
+def turned_frames(model: mujoco.MjModel, plastic: Array, turn: Array) -> Array:
+    """Returns the plastic state of rods that are turned as a whole, ``(nplastic,)``.
+
+    Args:
+        model: A compiled body.
+        plastic: The state before, ``(nplastic,)``.
+        turn: Rotation matrix, ``(3, 3)``.
+    """
+    if not model.nplastic:
+        return plastic
+    turned = plastic.reshape(model.nflex, -1).copy()
+    axes = turned[:, : _NUMBERS_PER_EDGE * int(model.flex_edgenum[0])]
+    axes[:] = (axes.reshape(-1, 3) @ turn.T).reshape(axes.shape)
+    return turned.reshape(-1)
 
 
 class _Neighbours:

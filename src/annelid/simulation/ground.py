@@ -17,6 +17,9 @@ class MovingGround:
     What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
     the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions
     and velocities alone, so a run continues and a batch computes to the same bits.
+
+    Attributes:
+        depth_m: Depth of the deepest part of the skin in the ground where planes were laid last, m; negative above it.
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:
@@ -28,6 +31,7 @@ class MovingGround:
             arena: The ground.
         """
         self._model = model
+        self.depth_m = -np.inf
         self._surface = ground_of(arena)
         self._skin, self._planes = _skin_and_planes(model)
         self._bodies = model.geom_bodyid[self._skin]
@@ -48,6 +52,7 @@ class MovingGround:
         with np.errstate(invalid="ignore", over="ignore"):
             velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
             distance, normal = self._surface.nearest(places, first_order=True)
+            self.depth_m = -float(np.minimum.reduce(distance))
             ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
             data.mocap_pos[self._planes] = places - (distance - ahead)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)

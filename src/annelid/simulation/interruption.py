@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a request to end a run in good order."""
+"""Ctrl-C, SIGTERM and SIGHUP as a request to end a run in good order."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import threading
 from types import FrameType, TracebackType
 from typing import Any, Self
 
+SIGNALS = tuple(signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Those that ask a process to end; Windows has no SIGHUP."""
+
 
 class Interruption:
-    """While entered, the first SIGINT or SIGTERM sets `requested`; a second one raises KeyboardInterrupt.
+    """While entered, the first signal of `SIGNALS` sets `requested`; a second one raises KeyboardInterrupt.
 
     Signals reach Python's main thread only, so in any other thread this does nothing. A signal that the
     process was told to ignore stays ignored.
@@ -24,7 +27,7 @@ class Interruption:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in SIGNALS:
                 previous = signal.getsignal(number)
                 # None stands for a handler that was not installed from Python and could not be put back.
                 if previous not in (None, signal.SIG_IGN):

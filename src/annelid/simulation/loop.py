@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
@@ -10,12 +10,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from annelid.config import RunConfig, load_config
+from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
 from annelid.protocols import Controller, Plant, Records, Sensation
 from annelid.simulation.assemble import as_controller, build_plant
 from annelid.simulation.coupling import Coupling, start
 from annelid.simulation.interruption import Interruption
+from annelid.simulation.lock import locks
 from annelid.simulation.progress import ProgressCallback, reporting
 from annelid.simulation.recorder import (
     Recorder,
@@ -38,8 +39,9 @@ PROGRESS_INTERVAL_S = 0.2
 _CHECKPOINT_SHARE = 0.02
 
 
+@locks("out")
 def simulate(
-    config: RunConfig | str | None,
+    config: RunConfig | str | Path | Mapping[str, Any] | None,
     out: str | Path,
     *,
     plant: Plant | None = None,
@@ -55,7 +57,7 @@ def simulate(
     there in the file; a second one raises KeyboardInterrupt.
 
     Args:
-        config: The configuration, or the name of a preset; None for that of the run to continue.
+        config: The configuration, or what `annelid.load_config` makes one of; None for that of the run to continue.
         out: Folder for the run file; made if it is not there.
         plant: The body, instead of the one that the configuration describes.
         controller: The controller, likewise, or a plain function from sensation to activation.
@@ -71,13 +73,13 @@ def simulate(
 
     Raises:
         ConfigError: No configuration, one that does not continue the given run, or a folder in use.
-        RunFileError: The file cannot be written, also in the middle (what was written stays readable), or
-            the run to continue cannot be read or has no checkpoint.
+        RunFileError: The file cannot be written, also in the middle (what was written stays readable), another
+            process writes into the folder, or the run to continue cannot be read or has no valid checkpoint.
         SimulationStopped: A guard stopped the run; its file is kept.
     """
     out = Path(out)
-    if isinstance(config, str):
-        config = load_config(config)
+    if config is not None:
+        config = as_config(config)
     refuse_used_folder(out, overwrite)
     origin = None if resume is None else origin_of(resume)
     if origin is not None:
@@ -129,12 +131,12 @@ def _record(simulation: Coupling, recorder: Recorder, report: ProgressCallback |
             if checkpoint is not None:
                 recorder.checkpoint(checkpoint.to_bytes())
             if interrupted:
-                recorder.finish("interrupted", simulation.at(f"{interruption.requested} ended the run"))
+                _finish(simulation, recorder, "interrupted", simulation.at(f"{interruption.requested} ended the run"))
             else:
-                recorder.finish("complete")
+                _finish(simulation, recorder, "complete")
         except SimulationStopped as stop:
             with suppress(RunFileError):
-                recorder.finish("stopped_by_guard", str(stop))
+                _finish(simulation, recorder, "stopped_by_guard", str(stop))
             raise
         except RunFileError as failure:
             with suppress(RunFileError):
@@ -149,6 +151,11 @@ def _record(simulation: Coupling, recorder: Recorder, report: ProgressCallback |
             with suppress(RunFileError):
                 recorder.finish("failed", simulation.at(f"{type(error).__name__}: {error}"))
             raise
+
+
+def _finish(simulation: Coupling, recorder: Recorder, status: str, message: str = "") -> None:
+    recorder.warn(simulation.doubts())
+    recorder.finish(status, message)
 
 
 def _run(simulation: Coupling, recorder: Recorder, report: ProgressCallback | None, interruption: Interruption) -> None:
@@ -179,6 +186,7 @@ def _run(simulation: Coupling, recorder: Recorder, report: ProgressCallback | No
             checkpoint = simulation.checkpoint()
             if checkpoint is not None:
                 recorder.checkpoint(checkpoint.to_bytes())
+            recorder.warn(simulation.doubts())
             cost = perf_counter() - now
             next_checkpoint = now + max(CHECKPOINT_INTERVAL_S, cost / _CHECKPOINT_SHARE)
         if report is not None and now >= next_report:

@@ -33,8 +33,9 @@ def reporting(
 
 @contextmanager
 def _bar(start_s: float, end_s: float, forced: bool) -> Iterator[ProgressCallback]:
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
+
+    from annelid.terminal import Console
 
     console = Console(stderr=True, force_terminal=True if forced else None)
     bar = Progress(

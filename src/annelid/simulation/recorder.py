@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from importlib import metadata
 from math import prod
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,15 @@ from annelid.protocols import Array, Controller, Plant, Recordable, Records, Sen
 from annelid.simulation import container
 from annelid.simulation.checkpoint import slot_capacity, to_slot
 from annelid.simulation.container import RawWriter, Variable
-from annelid.simulation.runfile import MESSAGE_BYTES, SLOTS, STATUSES
+from annelid.simulation.runfile import (
+    CPU_TIME,
+    MESSAGE_BYTES,
+    RUN_FILE_VERSION,
+    SLOTS,
+    STATUSES,
+    WARNING_BYTES,
+    WARNINGS,
+)
 
 Values = Mapping[str, "NDArray[np.generic] | float"]
 
@@ -124,6 +133,7 @@ def global_attributes(config: RunConfig, parts: Sequence[Recordable]) -> dict[st
     for part in parts:
         attrs.update(part.attrs)
     return attrs | {
+        "run_file_version": RUN_FILE_VERSION,
         "config": config.model_dump_json(),
         # The format's integers have 64 bits, a seed may have more.
         "seed": config.seed if config.seed < 2**63 else str(config.seed),
@@ -177,6 +187,7 @@ def layout(schedule: Schedule, parts: Sequence[Recordable], rest_stretch_m: Arra
     # A dimension of size 0 would be an unlimited one, so a spare row stays NaN where there is no instant.
     times = {dim: values if values.size else np.array([np.nan]) for dim, values in times.items()}
     sizes = {dim: values.size for dim, values in times.items()} | {"message_character": MESSAGE_BYTES}
+    sizes["warning_character"] = WARNING_BYTES
     sizes |= dict(zip(("segment", "sensor"), rest_stretch_m.shape, strict=True))
     variables = [
         *_bookkeeping(),
@@ -234,6 +245,15 @@ def _bookkeeping() -> list[Variable]:
             "S1",
             attrs={"_Encoding": "utf-8"},
         ),
+        Variable(
+            WARNINGS,
+            ("warning_character",),
+            "1",
+            "what is doubtful about the run, a sentence a line",
+            "S1",
+            attrs={"_Encoding": "utf-8"},
+        ),
+        Variable(CPU_TIME, (), "s", "processor time that the process spent from the start to the end of the run"),
     ]
 
 
@@ -284,12 +304,14 @@ class Recorder:
     """
 
     def __init__(self, path: Path, plan: Layout, attrs: Mapping[str, Any]) -> None:
-        offsets = container.create(path, plan.sizes, plan.variables, attrs)
+        extents = container.create(path, plan.sizes, plan.variables, attrs)
         self._samples = _Block(plan.signals, plan.sizes["time"], "samples_written")
         self._frames = _Block(plan.frame_signals, plan.sizes["frame"], "frames_written")
         self._slot_bytes = plan.sizes.get("checkpoint_byte", 0)
         self._sequence = 0
-        self._writer = RawWriter(path, offsets)
+        self._doubts: tuple[str, ...] = ()
+        self._writer = RawWriter(path, extents)
+        self._began_cpu_s = process_time()
 
     def sample(self, *sources: Values) -> None:
         """Takes one sample of the signals from mappings that together name all of them."""
@@ -324,17 +346,41 @@ class Recorder:
             raise ValueError(f"the state has grown from below {self._slot_bytes} to {len(slot)} bytes during the run")
         self._writer.write(SLOTS[self._sequence % len(SLOTS)], slot)
 
+    def warn(self, doubts: tuple[str, ...]) -> None:
+        """Writes what is doubtful about the run so far, a sentence each, instead of what was written before."""
+        if doubts != self._doubts:
+            self._writer.write(WARNINGS, _padded("\n".join(doubts), WARNING_BYTES))
+            self._doubts = doubts
+
     def finish(self, status: str, message: str = "") -> None:
-        """Writes what is left, how the run ended and why, and closes the file."""
+        """Writes what is left, how the run ended and why, and closes the file.
+
+        A run is not complete where its last samples cannot be written: its file is left open, to be closed otherwise.
+        """
         try:
-            self.flush()
-        finally:
-            self.close(status, message)
+            if not self._writer.closed:
+                self.flush()
+        except BaseException:
+            if status != "complete":
+                self.close(status, message)
+            raise
+        self.close(status, message)
 
     def close(self, status: str, message: str = "") -> None:
-        """Writes how the run ended and closes the file, without the samples still in memory."""
-        text = message.encode()[:MESSAGE_BYTES].decode(errors="ignore").encode()
+        """Writes how the run ended and closes the file, without the samples still in memory.
+
+        What a file says that is closed already, also by an error in the middle of this, is left as it is.
+        """
+        if self._writer.closed:
+            return
         with self._writer as writer:
-            writer.write("status_message", text.ljust(MESSAGE_BYTES, b"\0"))
+            writer.write("status_message", _padded(message, MESSAGE_BYTES))
+            writer.write(CPU_TIME, np.array(process_time() - self._began_cpu_s, dtype="<f8"))
             writer.write("status_code", np.array(STATUSES.index(status), dtype="i1"))
+            writer.write_digest()
             writer.close()
+
+
+def _padded(text: str, n_bytes: int) -> bytes:
+    """Returns as much of a text as fits, in whole characters, filled up with zeros."""
+    return text.encode()[:n_bytes].decode(errors="ignore").encode().ljust(n_bytes, b"\0")

@@ -11,14 +11,22 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
-from annelid.errors import ConfigError, RunFileError
+from annelid.errors import ConfigError, RunFileError, listed
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
+from annelid.simulation.digest import Finding, examine
+from annelid.simulation.lock import LOCK_NAME
 
 if TYPE_CHECKING:
     import xarray
 
 FILE_NAME = "run.nc"
 MESSAGE_BYTES = 512
+WARNINGS = "warnings"
+WARNING_BYTES = 8192
+RUN_FILE_VERSION = 2
+"""Of the file's form: 2 has room for a digest; 1, which does not say so, has none."""
+CHECKED_ON_OPENING_BYTES = 64_000_000
+"""Files up to this size are compared with their digests whenever they are opened; larger ones by `verify_run` only."""
 SLOTS = ("checkpoint/slot_0", "checkpoint/slot_1")
 STATUSES = (
     "running_or_killed",
@@ -30,6 +38,7 @@ STATUSES = (
 )
 """How a run ended, in the order of the file's ``status_code``; ``failed``: its plant or controller raised."""
 
+CPU_TIME = "cpu_time"
 _BOOKKEEPING = ("samples_written", "frames_written", "status_code", "status_message")
 
 
@@ -43,6 +52,8 @@ class Run:
         config: The configuration it was made with.
         status: How it ended, one of `STATUSES`.
         message: Why it ended before its time; empty if it did not.
+        warnings: What is doubtful about it, a sentence each.
+        cpu_time_s: Processor time that its process spent on it, s; 0 for a run that was killed or is still going on.
     """
 
     path: Path
@@ -50,6 +61,8 @@ class Run:
     config: RunConfig
     status: str
     message: str
+    warnings: tuple[str, ...] = ()
+    cpu_time_s: float = 0.0
 
     def __repr__(self) -> str:
         time = self.data["time"].values
@@ -98,11 +111,21 @@ def open_run(path: str | Path) -> Run:
             n_frames = _count(marks, "frames_written", dataset.sizes["frame"])
             status = STATUSES[_count(marks, "status_code", len(STATUSES) - 1)]
             message = str(marks["status_message"].values)
-            data = dataset.drop_vars(list(_BOOKKEEPING)).isel(time=slice(n_samples), frame=slice(n_frames)).load()
+            # Files of an older annelid have neither.
+            doubts = str(dataset[WARNINGS].values) if WARNINGS in dataset else ""
+            cpu_time_s = float(dataset[CPU_TIME]) if CPU_TIME in dataset else 0.0
+            kept = dataset.drop_vars([*_BOOKKEEPING, WARNINGS, CPU_TIME], errors="ignore")
+            for name, variable in kept.variables.items():
+                # Labels of a dimension may be words.
+                if variable.dtype.kind not in "fiu" and variable.dims != (name,):
+                    raise ValueError(f"{name!r} holds no numbers")
+                if variable.dims[:1] not in (("time",), ("frame",), (name,)) and name != "stretch_rest_length":
+                    raise ValueError(f"{name!r} is along {variable.dims}, not along time or frame")
+            data = kept.isel(time=slice(n_samples), frame=slice(n_frames)).load()
     # What a damaged file raises depends on where the damage is.
     except Exception as error:
         raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
-    return Run(file, data, _config(file, data.attrs), status, message)
+    return Run(file, data, _config(file, data.attrs), status, message, tuple(doubts.splitlines()), cpu_time_s)
 
 
 def read_config(path: str | Path) -> RunConfig:
@@ -144,38 +167,81 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
     return checkpoint
 
 
-def refuse_used_folder(out: Path, overwrite: bool) -> None:
-    """Checks that a run may go into a folder.
+def verify_run(path: str | Path) -> str:
+    """Compares a whole run file, of any size, with the digest that was written when the run ended.
+
+    Args:
+        path: The run's folder or its file.
+
+    Returns:
+        A sentence: that it is intact, or that and why it carries no digest.
 
     Raises:
-        ConfigError: It is a file, or it holds something and ``overwrite`` is false.
+        RunFileError: As `open_run`; for a damaged file it names the variables that differ.
+    """
+    file, finding = _examined_file(path, whole=True)
+    if finding.state == "intact":
+        return f"{file} is intact: every byte is as it was when the run ended"
+    if finding.state == "unfinished":
+        reason = "it has not ended, was killed, or its digest could not be written"
+    else:
+        reason = "an older version of annelid wrote it"
+    return f"{file} carries no digest, so damage would not show: {reason}"
+
+
+def refuse_used_folder(out: Path, overwrite: bool) -> None:
+    """Checks that a run may go into a folder, which is to be locked first.
+
+    Raises:
+        ConfigError: It holds something and ``overwrite`` is false.
         RunFileError: It cannot be read.
     """
     try:
-        if out.exists() and not out.is_dir():
-            raise ConfigError(f"the output folder {out} is a file: name a folder")
         # A draft is left where a process was killed while it laid out its file.
-        if out.is_dir() and not overwrite and any(entry.name != f".{FILE_NAME}.part" for entry in out.iterdir()):
+        ours = {f".{FILE_NAME}.part", LOCK_NAME}
+        if out.is_dir() and not overwrite and any(entry.name not in ours for entry in out.iterdir()):
             raise ConfigError(f"the output folder {out} is not empty: name another, or allow overwriting")
     except OSError as error:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
 
 
 def _checked_file(path: str | Path) -> Path:
-    """Returns the run file behind a path, once it is clear that it is one and whole."""
+    """Returns the run file behind a path, once it is clear that it is one, whole, and safe to read."""
+    return _examined_file(path)[0]
+
+
+def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Finding]:
+    """Returns the run file behind a path and what its digest says, once it is clear that it is safe to read.
+
+    Args:
+        path: The run's folder or its file.
+        whole: Compare the file with its digest also where it is large.
+    """
     import h5py
+
+    from annelid.simulation.content_check import check_content
 
     path = Path(path)
     file = path / FILE_NAME if path.is_dir() else path
     size = 0
     try:
-        with open(file, "rb") as handle:
-            size = os.fstat(handle.fileno()).st_size
+        size = os.stat(file).st_size
+        # To open a pipe would be to wait for its writer.
+        if not file.is_file():
+            raise RunFileError(f"{file} is not an annelid run: it is not a file")
         if size == 0:
             raise RunFileError(f"{file} is empty")
+        finding = examine(file, footer_only=not whole and size > CHECKED_ON_OPENING_BYTES)
+        if finding.state == "damaged":
+            names = listed(ascii(name)[1:-1] for name in finding.damaged)
+            raise RunFileError(f"{file} is damaged: not as it was when the run ended: {names}")
         if not h5py.is_hdf5(file):
             raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file")
         with h5py.File(file, "r") as content:
+            check_content(content, size)
+            version = content.attrs.get("run_file_version", 1)
+            if version != 1 and finding.state == "absent":
+                raise RunFileError(f"{file} is truncated or damaged: the digest at its end is missing")
             ours = "config" in content.attrs and "annelid_version" in content.attrs
             missing = [name for name in _BOOKKEEPING if name not in content]
     except OSError as error:
@@ -193,7 +259,7 @@ def _checked_file(path: str | Path) -> Path:
         raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
     if not ours or missing:
         raise RunFileError(f"{file} is not an annelid run: another program wrote it")
-    return file
+    return file, finding
 
 
 def _count(marks: xarray.Dataset, name: str, most: int) -> int:

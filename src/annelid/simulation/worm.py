@@ -5,26 +5,30 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import asdict, fields
-from typing import Any
+from dataclasses import asdict, fields, replace
+from typing import Any, cast
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.arena.contact import has_moving_planes
-from annelid.arena.surface import Plane, surface_of
+from annelid.arena.surface import Plane, ground_of, surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.clock import StepRatio
-from annelid.config import Pipe, RunConfig, WormBody
-from annelid.errors import ConfigError, SimulationStopped
-from annelid.morphology import Array, MeshGeometry
+from annelid.config import Pipe, Rods, RunConfig, WormBody
+from annelid.errors import SimulationStopped
+from annelid.morphology import Array, MeshGeometry, heading_turn
+from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
 from annelid.simulation.books import Books, Engine
+from annelid.simulation.damping import MaterialDamping, add_damper_rows
 from annelid.simulation.ground import MovingGround
+from annelid.simulation.placing import at_rest, turned
 from annelid.simulation.signals import worm_signals
 from annelid.simulation.skin import Touch
+from annelid.simulation.watch import Energies, Watch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on: positions, velocities, activations, warm start, and the rods' frames
@@ -55,18 +59,29 @@ def compile_worm(config: RunConfig) -> Anatomy:
     """Builds and compiles a worm in its arena.
 
     Raises:
-        ConfigError: The body is planar, or the engine refuses the model.
+        ConfigError: The body is planar, its numbers can mean nothing, or the engine refuses the model.
     """
-    spec = build_spec(config, moving_planes=True)
+    refuse_nonsense(config)
+    spec = build_spec(config, for_plant=True)
     assert isinstance(config.body, WormBody)
     assert config.arena is not None
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     add_contact_sensors(spec)
-    try:
-        model = compile_spec(spec)
-    except ValueError as error:
-        raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+    add_damper_rows(spec)
+    model = compile_spec(spec)
     return Anatomy(model, config.body, surface_of(config.arena))
+
+
+def owns_model(config: RunConfig) -> bool:
+    """Tells whether a worm sets numbers in its compiled model as it moves, which no other worm may use then."""
+    body, arena = config.body, config.arena
+    assert isinstance(body, WormBody)
+    assert arena is not None
+    return arena.has_setae or _has_damper_rows(body)
+
+
+def _has_damper_rows(body: WormBody) -> bool:
+    return isinstance(body.formulation, Rods) and bool(body.strands.material_damping_s)
 
 
 class Worm(ABC):
@@ -74,6 +89,9 @@ class Worm(ABC):
 
     Lengths and positions are those at the end of the step; forces and edge strains are those that acted during
     the last physics step, since the engine computes them on the way.
+
+    Attributes:
+        start: Where it starts; None for the model's own rest, which leads towards -x.
     """
 
     def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
@@ -81,7 +99,7 @@ class Worm(ABC):
 
         Args:
             config: The run's configuration.
-            anatomy: The compiled body; the worm's own where friction depends on the direction of sliding.
+            anatomy: The compiled body; the worm's own where `owns_model` says so.
         """
         self.anatomy = anatomy
         self._config = config
@@ -91,12 +109,27 @@ class Worm(ABC):
         self._height_words = "distance of a crossing from the pipe's wall" if in_pipe else "height of a crossing"
         moving = has_moving_planes(config.arena)
         self.ground = MovingGround(anatomy.model, anatomy.geometry, config.arena) if moving else None
+        body = config.body
+        assert isinstance(body, WormBody)
+        self.damping = MaterialDamping(anatomy.model, body.strands) if _has_damper_rows(body) else None
+        # What needs no moving planes is level.
+        self._floor = cast(Plane, ground_of(config.arena))
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._control_step = 0
         self._posture: Posture
         self._forces: Forces = anatomy.no_forces()
         self._books: Books = anatomy.bookkeeper.opened()
+        self._tension_N = np.zeros(anatomy.n_muscles)
         self._touch = Touch.none(anatomy.n_segments)
+        self._activation: Array = np.zeros(anatomy.n_muscles)
+        self._watch = self._new_watch()
+        self._elastic_at_start_J = self._potential_at_start_J = 0.0
+        heading = body.heading_deg
+        self.start = turned(anatomy.model, at_rest(anatomy.model), heading_turn(heading)) if heading else None
+
+    def _new_watch(self) -> Watch:
+        assert isinstance(self._config.body, WormBody)
+        return Watch(self._config.body, self._config.guard)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -191,13 +224,20 @@ class Worm(ABC):
         return actuator_state.copy() if self.model.na else activation
 
     def book(self, engine: Engine, drive: Array) -> None:
-        """Enters one physics step in the books.
+        """Enters one physics step in the books, and notes what the actuators pulled with.
 
         Args:
             engine: The engine's arrays named in the bookkeeper's `outputs`, after the step.
             drive: What `drive` returned before it.
         """
-        self._books += self.anatomy.bookkeeper.step(engine, drive)
+        self._tension_N, entries = self.anatomy.bookkeeper.step(engine, drive)
+        if self.damping is not None:
+            # The engine counts the rows among its constraints.
+            loss = self._config.clock.physics_timestep_s * self.damping.loss_W(engine["qvel"])
+            entries = replace(
+                entries, damping_loss=entries.damping_loss + loss, constraint_loss=entries.constraint_loss - loss
+            )
+        self._books += entries
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
@@ -205,8 +245,11 @@ class Worm(ABC):
         self._control_step = 0
         self._forces = self.anatomy.no_forces()
         self._books = self.anatomy.bookkeeper.opened()
+        self._tension_N = np.zeros(self.n_muscles)
         self._touch = Touch.none(self.n_segments)
         self._posture = self.locate()
+        self._watch = self._new_watch()
+        self._elastic_at_start_J, self._potential_at_start_J = self.elastic_energy_J(), self.potential_energy_J()
         return self.feel()
 
     def step(self, activation: Array) -> Sensation:
@@ -250,6 +293,7 @@ class Worm(ABC):
 
     def control(self, activation: Array, n_steps: int) -> Array:
         """Tells what the engine's actuators get during the next physics steps under an activation, ``(n_muscles,)``."""
+        self._activation = activation
         time_s = n_steps * self._config.clock.physics_timestep_s
         return self.anatomy.control(activation, self.actuator_state(), self._posture.ring_length, time_s)
 
@@ -285,7 +329,7 @@ class Worm(ABC):
             stretch_m=posture.stretch,
             rest_stretch_m=self.anatomy.rest_stretch_m,
             ring_length_m=posture.ring_length,
-            muscle_force_N=forces.muscle,
+            muscle_force_N=self._tension_N,
             contact_force_N=forces.contact,
             center_of_mass_m=posture.center_of_mass,
             touch_N=self._touch.normal,
@@ -294,7 +338,7 @@ class Worm(ABC):
         )
 
     def alarm(self) -> str | None:
-        """Tells whether the engine has warned, or energy, height, edge strain or pin gaps exceed the guard.
+        """Tells whether the engine has warned, or a quantity exceeds its guard.
 
         Returns:
             One sentence naming the quantity, its value and its limit, or None.
@@ -320,7 +364,15 @@ class Worm(ABC):
             and gap <= guard.pin_gap_m
             and energy <= guard.kinetic_energy_J
         ):
-            return None
+            return self._watch.look(
+                self._control_step * self._config.clock.control_timestep_s,
+                self._posture.ring_length,
+                self._posture.spring_length,
+                self._depth_m(),
+                gap,
+                self._activation,
+                self._tension_N,
+            )
         readings = (
             ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
@@ -331,6 +383,29 @@ class Worm(ABC):
             if not value <= limit:
                 return f"{words} is {value:.3g}{unit}, above the limit {field} = {limit:g}"
         return None
+
+    def _depth_m(self) -> float:
+        """Depth of the deepest vertex in the ground, m; over moving planes that at the start of the last step."""
+        if self.ground is not None:
+            return self.ground.depth_m
+        return self._floor.offset_m - float(np.minimum.reduce(self._posture.skin @ self._floor.facing))
+
+    def doubts(self) -> tuple[str, ...]:
+        """Tells what is doubtful about the configuration, and about what has happened since time zero."""
+        time_s = self._control_step * self._config.clock.control_timestep_s
+        return *map(str, check(self._config)), *self._watch.warnings(time_s, self._energies())
+
+    def _energies(self) -> Energies:
+        """Tells what has driven the worm and what the integrator took of it; nothing where the books do not close."""
+        # The engine tells the forces of the last of RK4's four stages only.
+        if self.model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
+            return Energies(0.0, 0.0)
+        work = float(self._books.muscle_work.sum())
+        lost = float(self._books.damping_loss + self._books.constraint_loss)
+        # A worm that slides down is driven by its weight as well.
+        sunk = self._potential_at_start_J - self.potential_energy_J()
+        held = self.elastic_energy_J() - self._elastic_at_start_J + self.kinetic_energy_J()
+        return Energies(work + max(0.0, sunk), work + sunk - held - lost)
 
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
@@ -350,7 +425,7 @@ class Worm(ABC):
             "stretch_length": posture.stretch,
             "spring_length": posture.spring_length,
             "ring_length": posture.ring_length,
-            "muscle_force": forces.muscle,
+            "muscle_force": self._tension_N,
             "contact_force": forces.contact,
             "touch": touch.normal,
             "contact_count": touch.count,
@@ -375,11 +450,12 @@ class Worm(ABC):
         return {
             "engine": self.engine_state(),
             "control_step": np.array([self._control_step]),
-            "muscle_force": forces.muscle.copy(),
+            "muscle_force": self._tension_N.copy(),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
             **asdict(self._books),
             **self._touch.state(),
+            **self._watch.get_state(),
         }
 
     def set_state(self, state: State) -> None:
@@ -387,10 +463,11 @@ class Worm(ABC):
         self.reset_engine(np.asarray(state["engine"], dtype=float))
         self._control_step = int(state["control_step"][0])
         strain, gap = np.asarray(state["extremes"], dtype=float)
-        muscle, contact = (np.array(state[name], dtype=float) for name in ("muscle_force", "contact_force"))
-        self._forces = Forces(muscle, contact, strain, gap)
+        self._tension_N = np.array(state["muscle_force"], dtype=float)
+        self._forces = Forces(np.array(state["contact_force"], dtype=float), strain, gap)
         self._books = Books(*(np.array(state[field.name], dtype=float) for field in fields(Books)))
         self._touch = Touch.of_state(state)
+        self._watch.set_state(state)
         self._posture = self.locate()
 
 
@@ -416,6 +493,8 @@ class WormPlant(Worm):
         """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.act[:] = self.anatomy.first_act
+        if self.start is not None:
+            self.data.qpos[:], self.data.plastic[:] = self.start
         if state is not None:
             mujoco.mj_setState(self.model, self.data, state, STATE_PARTS)
 
@@ -431,6 +510,8 @@ class WormPlant(Worm):
             for _ in range(n_steps):
                 if self.ground is not None:
                     self.ground.lay(data)
+                if self.damping is not None:
+                    self.damping.renew(data.qpos)
                 drive = self.drive(activation, data.act)
                 mujoco.mj_step(self.model, data)
                 self.book(self._work, drive)

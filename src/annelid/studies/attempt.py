@@ -10,14 +10,15 @@ import platform
 import shutil
 import tempfile
 import uuid
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from annelid.config import RunConfig
-from annelid.errors import ClusterError, RunFileError, SimulationStopped
-from annelid.simulation.runfile import FILE_NAME, open_run
+from annelid.errors import MOST_LISTED, ClusterError, RunFileError, SimulationStopped, shortened
+from annelid.simulation.runfile import FILE_NAME, Run, open_run
 from annelid.studies.fingerprint import READERS, code_fingerprint, physics_fingerprint
 from annelid.studies.outcome import Outcome, outcome, read_outcome, write_outcome
 
@@ -27,8 +28,13 @@ MARK_NAME = ".store"
 DRAFTS = ".*.part"
 """Folders of attempts."""
 
+MOST_BYTES = {FILE_NAME: 4 * 2**30, OUTCOME_NAME: 2**26}
+"""The files that a worker may send, and how large each may be, bytes."""
+
 Keep = Literal["runs", "outcomes"]
 """What is kept of every run: all of its files, or its numbers only."""
+SENT: Mapping[Keep, str] = {"runs": FILE_NAME, "outcomes": OUTCOME_NAME}
+"""The one file that a worker sends: an outcome is read at home where its run is there."""
 Files = dict[str, bytes]
 
 
@@ -62,7 +68,7 @@ def attempt(task: Task) -> Files | None:
     """Computes a run and publishes it in its store.
 
     Returns:
-        None; or the contents of the run's files by name, where the store's folder is not that of this machine.
+        None; or the content of the file to send by its name, where the store's folder is not that of this machine.
 
     Raises:
         ClusterError: This worker has other code.
@@ -79,7 +85,7 @@ def attempt(task: Task) -> Files | None:
     if not _is_shared(home, task.mark):
         with tempfile.TemporaryDirectory(prefix="annelid-") as away:
             compute_run(RunConfig.model_validate_json(task.config), Path(away), task.keep)
-            return {file.name: file.read_bytes() for file in Path(away).iterdir()}
+            return {SENT[task.keep]: (Path(away) / SENT[task.keep]).read_bytes()}
     draft = new_draft(folder)
     try:
         compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
@@ -93,13 +99,45 @@ def attempt(task: Task) -> Files | None:
     return None
 
 
-def bring_home(files: Files, folder: Path, keep: Keep) -> None:
-    """Publishes the files of a run that was computed on another machine."""
+def fetch_results(files: Files, folder: Path, config: RunConfig, keep: Keep) -> None:
+    """Publishes a run that was computed on another machine, once its file is seen to be of this run.
+
+    Args:
+        files: What the worker sent.
+        folder: Of the run in the store.
+        config: Of the run.
+        keep: What is kept.
+
+    Raises:
+        ClusterError: It is another file, too large, damaged, or of another run.
+        OSError: It cannot be written.
+    """
+    name = SENT[keep]
+    if not isinstance(files, dict) or list(files) != [name]:
+        names = sorted(map(repr, files)) if isinstance(files, dict) else [f"a {type(files).__name__}"]
+        sent = f"{', '.join(names[:3])}{' ..' if len(names) > 3 else ''}"[:200]
+        raise ClusterError(f"a worker sent {sent or 'nothing'} in place of {name}: nothing of it is kept")
+    content = files[name]
+    if not isinstance(content, bytes) or len(content) > MOST_BYTES[name]:
+        raise ClusterError(f"a worker sent a {name} that is no file of at most {MOST_BYTES[name]:,} bytes")
     draft = new_draft(folder)
     try:
         draft.mkdir()
-        for name, content in files.items():
-            (draft / name).write_bytes(content)
+        (draft / name).write_bytes(content)
+        try:
+            if keep == "outcomes":
+                read_outcome(draft / name, code_fingerprint(*READERS))
+            elif (sent := open_run(draft)).config.model_dump_json() != config.model_dump_json():
+                raise ClusterError(f"a worker sent another run in place of {folder.name}: nothing of it is kept")
+            else:
+                keep_outcome(sent)
+        except (OSError, ClusterError):
+            raise
+        # What a file of others raises depends on what is wrong with it.
+        except Exception as error:
+            raise ClusterError(
+                f"a worker sent a damaged {name} of the run {folder.name}: {shortened(str(error), MOST_LISTED)}"
+            ) from None
         publish(draft, folder, keep)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -109,18 +147,22 @@ def compute_run(config: RunConfig, folder: Path, keep: Keep = "runs") -> None:
     """Runs a configuration into a folder and writes its outcome beside it; of ``"outcomes"`` only that is left."""
     from annelid.simulation.loop import simulate
 
-    # A run that a guard stops is a finding, not a failure.
-    with suppress(SimulationStopped):
-        if simulate(config, folder, progress=False, overwrite=True).status == "interrupted":
-            raise KeyboardInterrupt
-    keep_outcome(folder)
+    try:
+        run = simulate(config, folder, progress=False, overwrite=True)
+    except SimulationStopped:
+        # A run that a guard stops is a finding, not a failure.
+        run = open_run(folder)
+    if run.status == "interrupted":
+        raise KeyboardInterrupt
+    keep_outcome(run)
     if keep == "outcomes":
         (folder / FILE_NAME).unlink()
 
 
-def keep_outcome(folder: Path) -> Outcome:
-    """Reads the outcome of the run in a folder, and writes it beside the run."""
-    read = outcome(open_run(folder))
+def keep_outcome(run: Run) -> Outcome:
+    """Reads the outcome of a run, and writes it beside the run."""
+    read = outcome(run)
+    folder = run.path.parent
     draft = folder / f".{OUTCOME_NAME}.{uuid.uuid4().hex[:8]}.part"
     write_outcome(read, draft, code_fingerprint(*READERS))
     draft.replace(folder / OUTCOME_NAME)
@@ -141,7 +183,7 @@ def stored_outcome(folder: Path, keep: Keep = "runs") -> Outcome | None:
         return None
     except ValueError:
         with suppress(RunFileError):
-            return keep_outcome(folder)
+            return keep_outcome(open_run(folder))
         return None
 
 

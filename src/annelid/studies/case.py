@@ -12,12 +12,16 @@ from typing import Any
 
 from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
 from annelid.errors import ConfigError
+from annelid.plausibility import refuse_nonsense
 
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
 PLANAR = "riddle2022-planar"
 PAPERS_MESH = {"body.mesh.elements_per_side": 3, "body.formulation.solver_tolerance": 1e-6}
 """How the rods are compared with the chain; their preset has a coarser mesh and solves less sharply."""
+
+RODS_STEP_S = 0.01
+"""Step of the tight rods in the examinations, s."""
 
 SHEAR_OVER_YOUNG = 1.0 / 1.5
 """G/E of the paper's strands (0.2 and 0.3 GPa) and of the authors' later model's (1.33 and 2 GPa)."""
@@ -106,7 +110,7 @@ class Case(Work):
 def refusal(case: Work) -> ConfigError | None:
     """Returns why a case's configuration is refused; None if it is not."""
     try:
-        _ = case.config
+        refuse_nonsense(case.config)
     except ConfigError as error:
         return error
     return None
@@ -125,8 +129,8 @@ def chain(changes: Mapping[str, Any] | None = None) -> Case:
 
 
 def rods(changes: Mapping[str, Any] | None = None) -> Case:
-    """The worm of tight rods with the paper's three elements a side, at steps of 5 ms."""
-    return Case(RODS, {**PAPERS_MESH, "clock.physics_timestep_s": 0.005, **(changes or {})})
+    """The worm of tight rods with the paper's three elements a side, at steps of `RODS_STEP_S`."""
+    return Case(RODS, {**PAPERS_MESH, "clock.physics_timestep_s": RODS_STEP_S, **(changes or {})})
 
 
 def fast(changes: Mapping[str, Any] | None = None) -> Case:

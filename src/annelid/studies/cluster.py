@@ -1,4 +1,4 @@
-"""Workers of a Dask scheduler: in this process for a laptop, running elsewhere, or in jobs of Slurm.
+"""Workers of a Dask scheduler: one that is running elsewhere, or one in this process whose workers are jobs of Slurm.
 
 Only here is Dask imported. Runs are handed over one a worker (`studies/store.py`), results are published by the workers
 themselves where they see the store's folder, and come home over the network where they do not (`studies/attempt.py`).
@@ -6,16 +6,17 @@ themselves where they see the store's folder, and come home over the network whe
 
 from __future__ import annotations
 
+import asyncio
 import logging
-import os
+import shutil
 import time
 import warnings
 from abc import abstractmethod
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from annelid.config import cluster as settings
-from annelid.errors import ClusterError, ConfigError, MissingDependency, RunKilled
+from annelid.errors import ClusterError, MissingDependency, RunKilled
 from annelid.studies.attempt import Task, attempt
 from annelid.studies.workers import Processes, Result, Workers
 
@@ -24,11 +25,14 @@ if TYPE_CHECKING:
     from distributed.deploy.cluster import Cluster
 
 MISSING = "runs on a cluster need Dask: install it with  pip install 'annelid[sweep]'"
-MISSING_SLURM = "jobs of Slurm need dask-jobqueue: install it with  pip install 'annelid[slurm]'"
+MISSING_SLURM = "jobs of Slurm need dask-jobqueue and cryptography: install them with  pip install 'annelid[slurm]'"
+SBATCH = "sbatch"
 FRESH_S = 0.3
 """For how long the number of workers is not asked again, s."""
-_NO_DASHBOARD = {"dashboard": False, "dashboard_address": ":0"}
-"""Of the page that tells whether a scheduler is well there is no getting rid; at least it takes any free port."""
+HANDSHAKE_S = 5.0
+"""For how long a scheduler may take that has been reached, s."""
+_NO_DASHBOARD = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
+"""Of the page that tells whether a scheduler is well there is no getting rid: it is for this machine only."""
 START_WORKERS = "dask worker ADDRESS --nworkers auto --nthreads 1"
 
 
@@ -38,11 +42,12 @@ def workers_of(cluster: settings.Cluster, jobs: int | None = None) -> Workers:
     Args:
         cluster: Where they are.
         jobs: How many, instead of what the cluster says; has no effect on a scheduler elsewhere.
+
+    Raises:
+        ClusterError: Jobs of Slurm are asked for where there is none.
     """
     if isinstance(cluster, settings.Pool):
-        return Processes(jobs or cluster.workers)
-    if isinstance(cluster, settings.Local):
-        return LocalWorkers(jobs or cluster.workers or os.cpu_count() or 1, cluster.retries)
+        return Processes(jobs or cluster.workers, cluster.retries)
     if isinstance(cluster, settings.Slurm):
         return SlurmWorkers(cluster.model_copy(update={"jobs": jobs or cluster.jobs}))
     return SchedulerWorkers(cluster)
@@ -128,58 +133,6 @@ class DaskWorkers(Workers):
             )
 
 
-class OwnWorkers(DaskWorkers):
-    """Workers that are started for this process and end with it, under a scheduler within it."""
-
-    _cluster: Cluster | None = None
-
-    @abstractmethod
-    def _start(self) -> Cluster:
-        """Starts the scheduler and its workers."""
-
-    @property
-    def _where(self) -> str:
-        return "in this process"
-
-    def _join(self) -> Client:
-        _require_dask()
-        from distributed import Client
-
-        with _quiet(self.retries):
-            self._cluster = self._start()
-        return Client(self._cluster)
-
-    def close(self, *, drop: bool) -> None:
-        """Ends workers and scheduler."""
-        super().close(drop=drop)
-        if self._cluster is not None:
-            self._cluster.close()
-            self._cluster = None
-
-
-class LocalWorkers(OwnWorkers):
-    """Worker processes of this machine; what dies is started again."""
-
-    def __init__(self, n: int, retries: int) -> None:
-        """Prepares ``n`` of them."""
-        super().__init__(retries)
-        self._n = n
-
-    def _start(self) -> Cluster:
-        from distributed import LocalCluster
-
-        start: Any = LocalCluster
-        return start(
-            n_workers=self._n,
-            threads_per_worker=1,
-            processes=True,
-            scheduler_kwargs=_NO_DASHBOARD,
-            # Left to the operating system: Dask would pause workers rather than tell of them.
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
-
-
 class SchedulerWorkers(DaskWorkers):
     """The workers of a scheduler that is running somewhere."""
 
@@ -196,14 +149,14 @@ class SchedulerWorkers(DaskWorkers):
         _require_dask()
         from distributed import Client
 
-        address = self._cluster.address
-        by: dict[str, Any] = {"scheduler_file": address} if address.endswith(".json") else {"address": address}
-        if "scheduler_file" in by and not os.path.exists(address):
-            raise ConfigError(f"cluster.address = {address!r}: there is no such scheduler file")
+        address, seconds = self._cluster.found(), self._cluster.reconnect_s
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         try:
-            return Client(**by, timeout=self._cluster.reconnect_s)
-        except (OSError, ValueError) as error:
+            # In a thread, since this one may have a loop that runs, as in a notebook.
+            with ThreadPoolExecutor(1) as thread:
+                thread.submit(asyncio.run, _greet_scheduler(address, seconds)).result()
+            return Client(address, timeout=seconds)
+        except (OSError, ValueError, TypeError) as error:
             raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
 
     def _greet(self, threads: dict[str, int]) -> None:
@@ -215,28 +168,59 @@ class SchedulerWorkers(DaskWorkers):
         super()._greet(threads)
 
 
-class SlurmWorkers(OwnWorkers):
-    """Workers in jobs of Slurm; a job that ends is followed by another."""
+class SlurmWorkers(DaskWorkers):
+    """Workers in jobs of Slurm, under a scheduler in this process; a job that ends is followed by another."""
 
     def __init__(self, cluster: settings.Slurm) -> None:
-        """Prepares to submit the jobs."""
+        """Prepares to submit the jobs.
+
+        Raises:
+            ClusterError: There is no Slurm here.
+        """
+        if shutil.which(SBATCH) is None:
+            raise ClusterError(
+                f"cluster 'slurm': there is no program {SBATCH} here: call this where jobs of Slurm are submitted, or "
+                "take --cluster processes"
+            )
         super().__init__(cluster.retries)
         self._settings = cluster
+        self._cluster: Cluster | None = None
 
-    def _start(self) -> Cluster:
-        cluster = slurm_cluster(self._settings)
+    @property
+    def _where(self) -> str:
+        return "in this process"
+
+    def _join(self) -> Client:
+        _require_dask()
+        from distributed import Client
+
+        with _quiet(self.retries):
+            cluster = self._cluster = slurm_cluster(self._settings)
         cluster.adapt(minimum_jobs=self._settings.jobs, maximum_jobs=self._settings.jobs)
-        return cluster
+        return Client(cluster)
+
+    def close(self, *, drop: bool) -> None:
+        """Ends workers and scheduler."""
+        super().close(drop=drop)
+        if self._cluster is not None:
+            self._cluster.close()
+            self._cluster = None
 
 
 def slurm_cluster(of: settings.Slurm) -> Any:
     """Starts a scheduler in this process that can submit jobs to Slurm; none is submitted yet.
 
+    It must be reached over the network. It speaks TLS with a key made for this one process, which the jobs read from
+    files in the user's home folder that nobody else may read.
+
     Raises:
-        MissingDependency: dask-jobqueue is not installed.
+        MissingDependency: dask-jobqueue or cryptography is not installed.
     """
     try:
         from dask_jobqueue.slurm import SLURMCluster
+        from distributed import Security
+
+        security = Security.temporary()
     except ImportError:
         raise MissingDependency(MISSING_SLURM) from None
     optional: dict[str, Any] = {"python": of.python, "interface": of.interface}
@@ -249,9 +233,25 @@ def slurm_cluster(of: settings.Slurm) -> Any:
         walltime=of.walltime,
         job_extra_directives=list(of.directives),
         job_script_prologue=list(of.prologue),
+        security=security,
+        shared_temp_directory="~",
         scheduler_options=_NO_DASHBOARD,
         **{name: value for name, value in optional.items() if value is not None},
     )
+
+
+async def _greet_scheduler(address: str, seconds: float) -> None:
+    """Shakes hands with a scheduler: Dask's client would wait for ever for one that accepts and is silent.
+
+    Raises:
+        OSError: There is none that answers.
+    """
+    from distributed import Security
+    from distributed.comm.core import connect
+
+    greeting = connect(address, timeout=seconds, **Security().get_connection_args("client"))
+    comm = await asyncio.wait_for(greeting, seconds + HANDSHAKE_S)
+    comm.abort()
 
 
 def threads_of(client: Client) -> dict[str, int]:

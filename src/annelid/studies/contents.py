@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,14 @@ from typing import Literal
 
 from annelid.studies.examination import Effort, Examination, Findings, Table
 
-Verdict = Literal["holds", "holds within", "does not hold", "not testable here"]
+Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
+_COUNTED: Mapping[Verdict, tuple[str, str]] = {
+    "holds": ("holds", "hold"),
+    "holds within": ("holds within the margin given", "hold within the margin given"),
+    "rests on": ("rests on a choice that is named", "rest on a choice that is named"),
+    "does not hold": ("does not hold", "do not hold"),
+    "not testable here": ("cannot be tested here", "cannot be tested here"),
+}
 
 
 @dataclass(frozen=True)
@@ -21,7 +29,7 @@ class Claim:
         claim: What the paper says, in our words.
         place: Where it says so.
         verdict: Whether it holds.
-        within: How nearly, for example "4.5 %", where it holds within something.
+        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
         paper: The paper's number or words.
         ours: Our number or words.
         evidence: Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it.
@@ -76,7 +84,8 @@ class Report:
         figures: The paper's figures from our own runs.
         claims: The paper's claims.
         examinations: The examinations in the order of the report.
-        provenance: Versions, number of runs, computing time: label and value.
+        provenance: Versions, number of runs, processor time: label and value.
+        rule: Paragraphs that say how the claims are judged.
     """
 
     effort: Effort
@@ -86,3 +95,13 @@ class Report:
     claims: Sequence[Claim]
     examinations: Sequence[Examined]
     provenance: Mapping[str, str]
+    rule: Sequence[str] = ()
+
+
+def tally(claims: Sequence[Claim]) -> str:
+    """Counts the verdicts in words: ``18 hold, 6 rest on a choice that is named and 2 cannot be tested here``."""
+    number = Counter(claim.verdict for claim in claims)
+    parts = [
+        f"{number[verdict]} {words[number[verdict] != 1]}" for verdict, words in _COUNTED.items() if number[verdict]
+    ]
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

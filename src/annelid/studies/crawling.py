@@ -35,9 +35,10 @@ COLUMNS = {
     "speed_body_lengths_per_s": "body lengths/s",
     "stride_m": "stride (m)",
     "period_s": "period (s)",
-    "cost_of_transport_cables": "cost of transport",
-    "cost_of_transport": "the same, net work",
     "slip_ratio": "slip ratio",
+    "cost_of_transport": "cost of transport",
+    "cost_of_transport_net": "the same, net work",
+    "cost_of_transport_cables": "the same, cables",
 }
 """Numbers of a gait that are written, with their heads in a table."""
 
@@ -183,7 +184,7 @@ def _line(readings: Sequence[Reading], gait: str, quantity: Quantity) -> Line:
         _name(gait),
         tuple(one.point.value for one in own),
         column("speed_body_lengths_per_s"),
-        column("cost_of_transport_cables"),
+        column("cost_of_transport"),
         column("slip_ratio"),
     )
 

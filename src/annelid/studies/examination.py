@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+from annelid.errors import suggest
 from annelid.studies.case import Case
 from annelid.studies.outcome import Outcome
 
@@ -34,6 +35,13 @@ class Table:
     rows: Sequence[Sequence[str]]
 
 
+class Numbers(dict[str, Any]):
+    """Single results of an examination by name; one that is not there is an error, never a gap in what rests on it."""
+
+    def __missing__(self, name: str) -> Any:
+        raise KeyError(f"the examination has no number {name!r}: {suggest(name, self)}")
+
+
 @dataclass(frozen=True)
 class Findings:
     """What an examination found.
@@ -50,7 +58,10 @@ class Findings:
     caption: str
     table: Table
     remarks: Sequence[str] = ()
-    numbers: Mapping[str, float | str | None] = field(default_factory=dict)
+    numbers: Mapping[str, float | str | None] = field(default_factory=Numbers)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", Numbers(self.numbers))
 
 
 @dataclass(frozen=True)

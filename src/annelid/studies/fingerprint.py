@@ -1,18 +1,28 @@
-"""Digests of annelid's code and of the engine: what runs, numbers and pictures are made by."""
+"""Digests of annelid's code and of the engine: what runs, numbers and pictures are made by.
+
+Only what computes counts. Comments, docstrings, the layout of the text, descriptions of a configuration's fields and
+imports for type checkers do not. Which modules are meant is found by following their imports, so none is forgotten.
+"""
 
 from __future__ import annotations
 
+import ast
 import hashlib
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import annelid
 
-PHYSICS = ("morphology.py", "clock.py", "arena", "body", "nervous", "control", "planar", "simulation")
-"""The rooms whose code a run depends on, beside its configuration."""
-READERS = ("analysis", "studies/outcome.py")
+SOURCE = Path(annelid.__file__).parent
+PHYSICS = ("config", "morphology", "clock", "arena", "body", "nervous", "control", "planar", "simulation")
+"""The code that computes runs, with all that it imports."""
+READERS = ("studies.outcome",)
 """The code that reads a run's outcome: where it has changed, the outcome is read again, and the run kept."""
+_NO_RESULT = {"", "simulation.progress"}
+"""Modules that no number depends on: the list of public names, and the progress bar."""
 
 
 @cache
@@ -22,12 +32,103 @@ def physics_fingerprint() -> str:
 
 
 @cache
-def code_fingerprint(*rooms: str) -> str:
-    """Digest of annelid's own code in the given rooms, by default in all."""
-    source = Path(annelid.__file__).parent
+def code_fingerprint(*roots: str) -> str:
+    """Digest of modules and of all of annelid that they import, wherever the statement stands.
+
+    Args:
+        roots: Modules, or packages for all of their modules, as ``body.rods`` or ``body``; none for the whole of
+            annelid.
+    """
     digest = hashlib.sha256()
-    for room in rooms or (".",):
-        place = source / room
-        for module in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
-            digest.update(module.relative_to(source).as_posix().encode() + b"\0" + module.read_bytes() + b"\0")
+    for name in sorted(modules_behind(*roots)):
+        digest.update(f"{name}\0{_written(name)}\0".encode())
     return digest.hexdigest()[:16]
+
+
+def modules_behind(*roots: str) -> set[str]:
+    """Names of the modules that `code_fingerprint` reads, without the leading ``annelid.``."""
+    missing = [name for root in roots or ("",) for name in _within(root)]
+    found = set[str]()
+    while missing:
+        name = missing.pop()
+        if name not in found | _NO_RESULT:
+            found.add(name)
+            missing += _imported(name)
+    return found
+
+
+def code_of(node: ast.AST) -> str:
+    """Writes down what a piece of code does, the same whatever the layout of its text and the version of Python."""
+    parts = [type(node).__name__]
+    for field in node._fields:
+        value = getattr(node, field, None)
+        if isinstance(value, ast.expr_context):
+            continue
+        if isinstance(value, list):
+            told = [code_of(one) if isinstance(one, ast.AST) else repr(one) for one in _said(value, node)]
+            # Newer versions of Python have further lists, which are empty here.
+            if told:
+                parts.append(f"{field}=[{','.join(told)}]")
+        elif isinstance(value, ast.AST):
+            parts.append(f"{field}={code_of(value)}")
+        elif value is not None:
+            parts.append(f"{field}={value!r}")
+    return f"({' '.join(parts)})"
+
+
+def _said(parts: Iterable[Any], of: ast.AST) -> Iterator[Any]:
+    """Those parts of some code that something depends on."""
+    for part in parts:
+        match part, of:
+            case (ast.Expr(ast.Constant()), _) | (ast.keyword("description"), ast.Call(ast.Name("Field"))):
+                pass
+            case ast.If(ast.Name("TYPE_CHECKING")), _:
+                yield from _said(part.orelse, part)
+            case _:
+                yield part
+
+
+@cache
+def _written(name: str) -> str:
+    return code_of(_parsed(name))
+
+
+@cache
+def _parsed(name: str) -> ast.Module:
+    return ast.parse(_path(name).read_bytes())
+
+
+def _path(name: str) -> Path:
+    place = SOURCE.joinpath(*name.split("."))
+    return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+
+
+def _within(root: str) -> Iterator[str]:
+    place = SOURCE.joinpath(*root.split("."))
+    for path in place.rglob("*.py") if place.is_dir() else [_path(root)]:
+        yield ".".join(path.relative_to(SOURCE).with_suffix("").parts).removesuffix("__init__").removesuffix(".")
+
+
+@cache
+def _imported(name: str) -> frozenset[str]:
+    """Names of annelid's modules that a module imports, and of the packages that they lie in."""
+    found = set[str]()
+    for statement in _statements(_parsed(name)):
+        named = []
+        if isinstance(statement, ast.ImportFrom):
+            named = [f"{statement.module}.{alias.name}" for alias in statement.names]
+        elif isinstance(statement, ast.Import):
+            named = [alias.name for alias in statement.names]
+        for whole in named:
+            first, *parts = whole.split(".")
+            for end in range(1, len(parts) + 1) if first == "annelid" else ():
+                if _path(inner := ".".join(parts[:end])).exists():
+                    found.add(inner)
+    return frozenset(found)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    for field in ("body", "orelse", "handlers", "finalbody", "cases"):
+        for statement in _said(getattr(node, field, ()), node):
+            yield statement
+            yield from _statements(statement)

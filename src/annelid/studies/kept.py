@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.studies.fingerprint import code_fingerprint
+from annelid.textfiles import read_json
 from annelid.view.output import whole_file
 
 
@@ -25,7 +26,7 @@ def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any
     note = stem.with_name(f"{stem.name}.json")
     pictures = [stem.with_name(f"{stem.name}{suffix}") for suffix in (".svg", ".png")]
     try:
-        content = json.loads(note.read_text(encoding="utf-8"))
+        content = read_json(note)
         if content["mark"] == mark and all(picture.exists() for picture in pictures):
             return content["found"]
     except (OSError, ValueError, KeyError, TypeError):

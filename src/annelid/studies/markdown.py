@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from itertools import count
 
 from annelid.studies.examination import Table
+from annelid.text import printable
 
 # What Markdown, and GitHub's kind of it, would take for markup inside a line; an underscore inside a word is safe.
 _MARKUP = re.compile(r"[\\*\[\]<~$`]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
@@ -17,7 +18,7 @@ _NUMBER = re.compile(r"[-+−±≈<>~]?\s*\d[\d.,]*(?:[eE][-+]?\d+)?\s*\S{0,3}")
 
 def words(text: str) -> str:
     """Returns plain text as Markdown of one line; what stands between backticks stays code."""
-    parts = _CODE.split(" ".join(text.split()))
+    parts = _CODE.split(printable(" ".join(text.split())))
     escaped = "".join(part if i % 2 else _MARKUP.sub(r"\\\g<0>", part) for i, part in enumerate(parts))
     return _OPENING.sub(_escape_opening, escaped)
 
@@ -34,7 +35,7 @@ def emphasis(text: str) -> str:
 
 def code(text: str) -> str:
     """Returns text as code of one line, whatever backticks it has."""
-    line = " ".join(text.split())
+    line = printable(" ".join(text.split()))
     longest = max((len(ticks) for ticks in re.findall("`+", line)), default=0)
     fence, pad = "`" * (longest + 1), " " if line.startswith("`") or line.endswith("`") else ""
     return f"{fence}{pad}{line}{pad}{fence}" if line else ""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
-from annelid.analysis.balance import EnergyBalance
 from annelid.config import Program
 from annelid.simulation.runfile import Run
 
@@ -47,6 +46,7 @@ class Outcome:
         holds: Readings of its open-loop contractions, in the order of the program; empty in closed loop.
         message: Why it ended before its time; empty if it did not.
         gait: How the worm gets along.
+        cpu_time_s: Processor time that the run took, s, whatever else the machine did; 0 where it is not known.
     """
 
     path: Path
@@ -55,11 +55,28 @@ class Outcome:
     holds: tuple[Hold, ...]
     message: str
     gait: Gait = field(default_factory=Gait)
+    cpu_time_s: float = 0.0
+
+
+class _Written(BaseModel):
+    """An outcome as its file holds it, with the mark of the code that read it."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
+
+    reader: str
+    summary: Summary
+    rhythm: RhythmScore
+    holds: tuple[Hold, ...]
+    message: str
+    gait: Gait
+    cpu_time_s: float
 
 
 def outcome(run: Run) -> Outcome:
     """Reads a run's outcome."""
-    return Outcome(run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message, gait(run))
+    return Outcome(
+        run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message, gait(run), run.cpu_time_s
+    )
 
 
 def write_outcome(read: Outcome, path: Path, reader: str) -> None:
@@ -71,6 +88,7 @@ def write_outcome(read: Outcome, path: Path, reader: str) -> None:
         "holds": [asdict(hold) for hold in read.holds],
         "message": read.message,
         "gait": read.gait.to_dict(),
+        "cpu_time_s": read.cpu_time_s,
     }
     path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
 
@@ -82,26 +100,15 @@ def read_outcome(path: Path, reader: str) -> Outcome:
         ValueError: The file is damaged, or other code read the run than ``reader``.
         OSError: There is no such file.
     """
-    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    if content.get("reader") != reader:
-        raise ValueError(f"{path} was read by other code")
     try:
-        rhythm: dict[str, Any] = {**content["rhythm"], "order": tuple(content["rhythm"]["order"])}
-        holds: list[dict[str, Any]] = [
-            {name: tuple(value) if isinstance(value, list) else value for name, value in hold.items()}
-            for hold in content["holds"]
-        ]
-        energy = content["gait"]["energy"]
-        return Outcome(
-            path.parent,
-            Summary(**content["summary"]),
-            RhythmScore(**rhythm),
-            tuple(Hold(**hold) for hold in holds),
-            content["message"],
-            Gait(**{**content["gait"], "energy": energy and EnergyBalance(**energy)}),
-        )
-    except (KeyError, TypeError) as error:
-        raise ValueError(f"{path} is no outcome: {error}") from None
+        held = _Written.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        wrong = error.errors(include_url=False, include_context=False, include_input=False)[0]
+        part = ".".join(map(str, wrong["loc"]))
+        raise ValueError(f"{path} is no outcome: {part}: {wrong['msg']}") from None
+    if held.reader != reader:
+        raise ValueError(f"{path} was read by other code")
+    return Outcome(path.parent, held.summary, held.rhythm, held.holds, held.message, held.gait, held.cpu_time_s)
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:

@@ -12,11 +12,18 @@ from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 from annelid.studies.markdown import anchors
+from annelid.text import printable
 
 if TYPE_CHECKING:
     from markdown_it.token import Token
 
-BADGES = {"holds within": "nearly", "holds": "holds", "does not hold": "fails", "not testable here": "open"}
+BADGES = {
+    "holds within": "nearly",
+    "holds": "holds",
+    "rests on": "rests",
+    "does not hold": "fails",
+    "not testable here": "open",
+}
 """The first words of a verdict, and the class of its badge; the first that fits counts."""
 
 # A cell of so few characters, such as an order 1-2-3, stays on one line.
@@ -70,7 +77,7 @@ def page(title: str, head: str, contents: str, content: str, folder: Path) -> st
     style = (resources.files("annelid") / "studies" / "page.css").read_text(encoding="utf-8")
     parts = {"head": head, "contents": contents, "content": content}
     html = {name: _html(markdown, folder) for name, markdown in parts.items()}
-    return _SKELETON.format(title=escape(title), style=style, **html)
+    return _SKELETON.format(title=escape(printable(title)), style=style, **html)
 
 
 def _html(markdown: str, folder: Path) -> str:

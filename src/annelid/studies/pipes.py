@@ -93,7 +93,7 @@ class Reading:
         speed_m_per_s: Speed of the foremost ring along the centre line through there.
         front_m: Arc length that the foremost ring came to.
         in_order: Whether segments contracted in the order 1-2-..-N throughout.
-        work_J_per_m: Work of the muscles per metre of the middle's way, over the whole run.
+        work_J_per_m: Net work of the muscles per metre of the middle's way, over the whole run.
         slip_ratio: Way that segments slide over that of the centre of mass.
         command: The command line that makes the run.
     """
@@ -192,7 +192,7 @@ def pipes_table(readings: Sequence[Reading]) -> Table:
     from rich.table import Table
 
     table = Table(title="Pipes", title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    headings = ("pipe", "gait", "passed", "speed (cm/s)", "front at (m)", "in order", "work (J/m)", "slip")
+    headings = ("pipe", "gait", "passed", "speed (cm/s)", "front at (m)", "in order", "net work (J/m)", "slip ratio")
     for heading in headings:
         table.add_column(heading, justify="left" if heading in headings[:2] else "right")
     yes = {True: "yes", False: "no", None: "-"}

@@ -74,8 +74,9 @@ class Lines:
 
 @contextmanager
 def _bar() -> Iterator[StudyProgress]:
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
+
+    from annelid.terminal import Console
 
     bar = Progress(
         TextColumn("{task.description}", markup=False),

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import get_args
 from urllib.parse import quote
 
-from annelid.studies.contents import Claim, Examined, Figure, Report, Verdict
+from annelid.studies.contents import Claim, Examined, Figure, Report, tally
 from annelid.studies.markdown import anchors, code, emphasis, plain_table, strong, table, words
 from annelid.studies.page import page
 from annelid.view.output import whole_file
@@ -56,7 +54,7 @@ def claims_page(report: Report) -> str:
     )
     blocks = ["# The paper's claims", intro, *_paragraphs(report.summary), *_headlines(report.examinations)]
     blocks += [_provenance(report), *_main_numbers(report)]
-    return "\n\n".join([*blocks, *_claims(report.claims)]) + "\n"
+    return "\n\n".join([*blocks, *_claims(report.claims, report.rule)]) + "\n"
 
 
 def _write(path: Path, text: str) -> None:
@@ -76,7 +74,7 @@ def _sections(report: Report, folder: Path) -> list[str]:
         *_paragraphs(report.summary),
         *_headlines(report.examinations),
         *_main_numbers(report),
-        *_claims(report.claims),
+        *_claims(report.claims, report.rule),
         *_figures(report.figures, folder),
         *_examinations(report.examinations, folder),
         *_how_to_reproduce(report),
@@ -114,10 +112,10 @@ def _main_numbers(report: Report) -> list[str]:
     return ["## Main numbers", plain_table(report.main_table)]
 
 
-def _claims(claims: Sequence[Claim]) -> list[str]:
+def _claims(claims: Sequence[Claim], rule: Sequence[str]) -> list[str]:
     if not claims:
         return []
-    blocks = ["## Claims", _tally(claims)]
+    blocks = ["## Claims", f"Of {len(claims)} claims, {tally(claims)}.", *_paragraphs(rule)]
     topics = dict.fromkeys(claim.topic for claim in claims)
     first = 1
     for topic in topics:
@@ -130,19 +128,6 @@ def _claims(claims: Sequence[Claim]) -> list[str]:
         blocks += [f"### {_heading(topic)}", table(["#", "Claim", "Verdict", "Paper", "Ours"], rows), "\n".join(notes)]
         first += len(numbered)
     return blocks
-
-
-def _tally(claims: Sequence[Claim]) -> str:
-    number = Counter(claim.verdict for claim in claims)
-    phrases: dict[Verdict, tuple[str, str]] = {
-        "holds": ("holds", "hold"),
-        "holds within": ("holds within the margin given", "hold within the margin given"),
-        "does not hold": ("does not hold", "do not hold"),
-        "not testable here": ("cannot be tested here", "cannot be tested here"),
-    }
-    parts = [f"{number[v]} {phrases[v][number[v] != 1]}" for v in get_args(Verdict) if number[v]]
-    listed = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-    return f"Of {len(claims)} claims, {listed}."
 
 
 def _verdict(claim: Claim) -> str:

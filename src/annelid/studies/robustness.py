@@ -1,10 +1,10 @@
 """How wide the range is in which a controller walks: a designed sample of worms, each walked by every controller.
 
 The sample is a Latin hypercube of 300 points over sensor noise, friction, physics step, number of segments, stiffness
-and seeds. It was drawn once, by `draw`, and lies in ``robustness.csv``. The worms are the tight rods. A point is
-*walked* if the rhythm is ordered, in one wave from front to rear, and *in time* if its period is also within 10 % of
-design. The robust controller's network starts from its design, from silence, and from random states in turn; the
-paper's from its own start, its best case. The first two turns are not judged.
+and seeds. It was drawn once, by `draw`, and lies in ``robustness.csv``. The worms are rods with rigid
+crossings. A point is *walked* if the rhythm is ordered, in one wave from front to rear, and *in time* if its period is
+also within 10 % of design. The robust controller's network starts from its design, from silence, and from random
+states in turn; the paper's from its own start, its best case. The first two turns are not judged.
 """
 
 from __future__ import annotations
@@ -25,15 +25,18 @@ import numpy as np
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
 from annelid.errors import ConfigError, RunFileError, suggest
+from annelid.plausibility import tolerance_window_m
+from annelid.simulation.lock import locks
 from annelid.studies.case import RODS, SHEAR_OVER_YOUNG, Case
-from annelid.studies.fingerprint import physics_fingerprint
+from annelid.studies.fingerprint import code_fingerprint
 from annelid.studies.markdown import table
-from annelid.studies.store import Store
+from annelid.studies.store import Store, case_key
 from annelid.studies.workers import Workers
+from annelid.textfiles import read_json
 from annelid.view.output import whole_file
 
-CONTROLLERS = ("sns", "sns-robust")
-"""The paper's and ours, by their kinds."""
+CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
+"""The paper's with the preset's tolerance, and with the tolerance that the body needs; ours; a wave without sensing."""
 TABLE = "robustness.csv"
 RESULTS = "robustness.json"
 SETTLING_S = 2.0 * DESIGN_INTERVAL_S
@@ -45,6 +48,8 @@ STARTS = ("design", "silent", "random")
 TOGETHER = 8
 """Points computed as one lot for each process, so that no process waits long for the lot's last run."""
 PERIOD_TOLERANCE = 0.1
+TIMED = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 0.0, "interval_s": DESIGN_INTERVAL_S}
+"""A wave of the paper's turns: its muscles' rhythm is in time by construction, its segments' lengthening is not."""
 
 Progress = Callable[[str, int, int, float], object]
 """Called with the stage, the number of points done, their total, and the share of the work that is done."""
@@ -81,8 +86,8 @@ class Point:
         return STARTS[self.seed % len(STARTS)]
 
     def case(self, controller: str) -> Case:
-        """Returns the run of this point under a controller, given by its kind."""
-        return Case(
+        """Returns the run of this point under a controller, one of `CONTROLLERS`."""
+        case = Case(
             RODS,
             {
                 "sensor.noise_m": self.noise_m,
@@ -93,9 +98,17 @@ class Point:
                 "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG * self.young_modulus_Pa,
                 "seed": self.seed,
                 "duration_s": round(SETTLING_S + CYCLES * self.design_period_s, 1),
-                **({} if controller == "sns" else {"controller": {"kind": controller, "start": self.start}}),
             },
         )
+        if controller == "sns-robust":
+            return case.but({"controller": {"kind": "sns-robust", "start": self.start}})
+        if controller == "timed":
+            return case.but({"controller": TIMED})
+        if controller == "sns-tolerance":
+            window = tolerance_window_m(case.config)
+            assert window is not None
+            return case.but({"sensor.tolerance_m": round(sum(window) / 2, 4)})
+        return case
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +124,7 @@ class Judged:
         walked: Ordered, in one wave from front to rear, to the end.
         in_time: Walked, with a period within 10 % of design.
         lengthened: The segments lengthened in one wave from front to rear as well.
-        code: Mark of the code and the engine that ran it.
+        code: Digests of its run, with its configuration, code and engine, and of the code that judged it.
     """
 
     point: int
@@ -202,10 +215,15 @@ def judge(
         walked=walked,
         in_time=walked and period is not None and abs(period / point.design_period_s - 1.0) <= PERIOD_TOLERANCE,
         lengthened=not message and lengthening.is_one_wave,
-        code=physics_fingerprint(),
+        code=_made_by(point, controller),
     )
 
 
+def _made_by(point: Point, controller: str) -> str:
+    return f"{case_key(point.case(controller))} {code_fingerprint('studies.robustness')}"
+
+
+@locks("folder")
 def robustness(
     folder: Path,
     n_points: int,
@@ -249,7 +267,8 @@ def robustness(
     judged = {
         (one.controller, one.point): one
         for one in read_judged(folder)
-        if one.n_segments == chosen[one.point].n_segments and (keep or one.code == physics_fingerprint())
+        if one.n_segments == chosen[one.point].n_segments
+        and (keep or one.code == _made_by(chosen[one.point], one.controller))
     }
     missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
     cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
@@ -293,7 +312,7 @@ def read_judged(folder: Path) -> list[Judged]:
     if not path.exists():
         return []
     try:
-        return [Judged(**one) for one in json.loads(path.read_text(encoding="utf-8"))["judged"]]
+        return [Judged(**one) for one in read_json(path)["judged"]]
     except (ValueError, KeyError, TypeError) as error:
         raise RunFileError(f"{path} is not what this version of annelid writes; move it away") from error
 

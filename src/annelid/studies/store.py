@@ -24,7 +24,7 @@ from annelid.studies.attempt import (
     MARK_NAME,
     Keep,
     Task,
-    bring_home,
+    fetch_results,
     own_code,
     run_of_draft,
     stored_outcome,
@@ -154,20 +154,15 @@ class Store:
                 try:
                     files = future.result()
                     if files is not None:
-                        bring_home(files, self.path(case), self._keep)
+                        fetch_results(files, self.path(case), case.config, self._keep)
                 except CancelledError:
                     waiting.append(case)
-                except BrokenExecutor:
-                    raise ClusterError(
-                        "a process that computed a run was killed, perhaps for lack of memory: call again with fewer "
-                        "--jobs, or with --cluster local, which goes on without it"
-                    ) from None
                 except ClusterError:
                     raise
                 except ImportError as error:
                     raise ClusterError(f"a worker cannot import annelid: install it there too ({error})") from error
                 except Exception as error:
-                    if isinstance(error, RunFileError | OSError) and tries[key] < workers.retries:
+                    if isinstance(error, RunFileError | OSError | BrokenExecutor) and tries[key] < workers.retries:
                         tries[key] += 1
                         waiting.append(case)
                     else:

@@ -16,7 +16,7 @@ VIEWS_DEG = {
     "front": (15.0, -12.0),
     "course": (90.0, -89.0),
 }
-"""Azimuth and elevation of the line of sight; the first segment is on the left, or nearest."""
+"""Azimuth and elevation of the line of sight; the first segment starts on the left, or nearest."""
 FIXED = frozenset({"course"})
 """Views that stand still and show the whole course; the others follow the worm."""
 
@@ -25,15 +25,20 @@ MARGIN = 0.84
 """Share of the picture that the worm may fill: 8 % stay free on each side."""
 
 
-def view_angles(name: str) -> tuple[float, float]:
+def view_angles(name: str, heading_deg: float = 0.0) -> tuple[float, float]:
     """Returns azimuth and elevation of a named view, degrees.
+
+    Args:
+        name: One of `VIEWS_DEG`.
+        heading_deg: Heading of the worm at the start, which all views but the fixed ones turn with.
 
     Raises:
         RunFileError: No view has that name; the sentence suggests the nearest.
     """
     if name not in VIEWS_DEG:
         raise RunFileError(f"unknown camera {name!r}: {suggest(name, VIEWS_DEG)}")
-    return VIEWS_DEG[name]
+    azimuth, elevation = VIEWS_DEG[name]
+    return (azimuth if name in FIXED else azimuth + heading_deg), elevation
 
 
 def fitting_distance(offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: float, aspect: float) -> float:

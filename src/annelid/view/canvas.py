@@ -47,6 +47,8 @@ def save_both(figure: Figure, stem: str | Path) -> Path:
     """Writes ``<stem>.svg`` and ``<stem>.png``; returns the latter's path."""
     stem = Path(stem)
     save(figure, stem.with_name(f"{stem.name}.svg"))
+    # All lies where it shall: to lay it out again would take as long as to draw it.
+    figure.set_layout_engine("none")
     return save(figure, stem.with_name(f"{stem.name}.png"))
 
 

@@ -23,7 +23,7 @@ ROWS: dict[str, Row] = {
     "gait.contact_duty": ("on the ground", 100.0, 0, "%"),
     **{f"gait.{field}": row for field, row in GAIT_ROWS.items()},
     "gait.turning_radius_m": ("turning radius, left positive", 1.0, 2, "m"),
-    "gait.energy.muscle_work_J": ("muscles' work, whole run", 1.0, 2, "J"),
+    "gait.energy.muscle_work_J": ("muscles' net work, whole run", 1.0, 2, "J"),
     "gait.energy.slip_J": ("lost to slip, whole run", 1.0, 2, "J"),
 }
 """Field of the comparison: what it is called, what it is multiplied by, digits, unit."""

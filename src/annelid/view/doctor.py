@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 
+from annelid.engine import REMEDY, mixed_engine
 from annelid.errors import RenderingUnavailable
 from annelid.view.gl import candidates, find_backend, works
 
@@ -63,6 +64,8 @@ def examine() -> Iterator[Finding]:
 
 def _engine() -> Finding:
     remedy = "pip install 'mujoco-core[rendering]>=4.0.1'"
+    if mixed := mixed_engine():
+        return Finding("mujoco", False, mixed, REMEDY)
     try:
         import mujoco
     except ImportError as error:

@@ -13,9 +13,10 @@ if TYPE_CHECKING:
     from annelid.analysis.balance import EnergyBalance
 
 GAIT_ROWS: dict[str, Row] = {
-    "slip_ratio": ("slip per way", 100.0, 1, "%"),
-    "backward_ratio": ("way back per way ahead", 100.0, 1, "%"),
-    "cost_of_transport": ("cost of transport", 1.0, 2, ""),
+    "slip_ratio": ("slip ratio", 100.0, 1, "%"),
+    "backward_ratio": ("centre of mass, way back", 100.0, 1, "%"),
+    "cost_of_transport": ("cost of transport, positive work", 1.0, 2, ""),
+    "cost_of_transport_net": ("cost of transport, net work", 1.0, 2, ""),
     "lateral_drift": ("drift to the left per way", 100.0, 1, "%"),
 }
 """Field of the gait: what it is called, what it is multiplied by, digits, unit."""
@@ -55,7 +56,7 @@ def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
         side = "left" if numbers.turning_radius_m > 0 else "right"
         rows.append(("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}"))
     if numbers.energy is not None:
-        rows.append(("muscles' work, whole run", f"{numbers.energy.muscle_work_J:.2f} J"))
+        rows.append(("muscles' net work, whole run", f"{numbers.energy.muscle_work_J:.2f} J"))
         rows.extend(_shares(numbers.energy))
     return rows
 

@@ -76,8 +76,9 @@ def task_bar(task: str, *, quiet: bool = False) -> Iterator[Progress | None]:
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    from rich.console import Console
     from rich.progress import Progress as Bar
+
+    from annelid.terminal import Console
 
     began = time.monotonic()
     bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)

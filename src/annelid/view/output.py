@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.errors import RunFileError
+from annelid.text import printable
 
 
 @contextmanager
@@ -49,7 +50,8 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
     Args:
         path: The file to write.
         columns: Names of the columns.
-        rows: Values of each row; None leaves a cell empty.
+        rows: Values of each row; None leaves a cell empty, and text that a spreadsheet would take for a formula gets
+            a leading apostrophe.
 
     Returns:
         The path.
@@ -59,9 +61,21 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
     """
     with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(rows)
+        writer.writerow([_cell(column) for column in columns])
+        writer.writerows([_cell(value) if isinstance(value, str) else value for value in row] for row in rows)
     return path
+
+
+def _cell(text: str) -> str:
+    """Text as it is in a table; a leading apostrophe keeps spreadsheets from taking it for a formula."""
+    text = printable(text)
+    if text[:1] not in tuple("=+-@\t"):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return f"'{text}" if len(text) > 1 else text
+    return text
 
 
 def write_json(path: Path, content: Any) -> Path:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from annelid.analysis.paper import published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation
 from annelid.config import WormBody
 from annelid.errors import RunFileError
 from annelid.view.canvas import canvas, save
 from annelid.view.output import with_suffix
-from annelid.view.style import panel_title, segment_colors
+from annelid.view.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 _CM = 100.0
 PLOT_SUFFIXES = (".png", ".pdf", ".svg")
+PUBLISHED = (0, (7.0, 3.0))
+"""Dashes of a published level."""
 
 
 def figure7(run: Run, path: str | Path) -> Path:
@@ -28,7 +32,8 @@ def figure7(run: Run, path: str | Path) -> Path:
 
     Three panels over time: potentials of the half-centres (contraction neurons solid, expansion neurons
     dashed), the phases in which each segment contracts, and the stretch sensors' lengths (thick: mean of the
-    segment's sensors, thin: the first of them, dotted: rest length). One colour a segment.
+    segment's sensors, thin: the first of them, dotted: rest length, dashed: where the published elongation ends, if
+    there is one). One colour a segment.
 
     Args:
         run: The run.
@@ -56,7 +61,8 @@ def figure7(run: Run, path: str | Path) -> Path:
         _lengths(lengths, run, colors)
         lengths.set_xlabel("time (s)")
         lengths.set_xlim(float(data["time"].values[0]), float(data["time"].values[-1]))
-        figure.suptitle(f"{run.config.name}: {n_segments} segments", x=0.01, ha="left", fontsize=11, weight="bold")
+        title = plain(f"{run.config.name}: {n_segments} segments")
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, weight="bold")
         figure.align_ylabels()
         return save(figure, path)
 
@@ -114,7 +120,7 @@ def _phases(axes: Axes, run: Run, colors: list) -> None:
 
 
 def _lengths(axes: Axes, run: Run, colors: list) -> None:
-    """Lengths of the stretch sensors: thick their mean, thin the first of them, dotted at rest."""
+    """Lengths of the stretch sensors: thick their mean, thin the first of them, dotted at rest, dashed as published."""
     data = run.data
     panel_title(axes, "Stretch sensors")
     axes.set_ylabel("length (cm)")
@@ -127,10 +133,44 @@ def _lengths(axes: Axes, run: Run, colors: list) -> None:
             axes.plot(time, stretch[:, i, 0], "-", color=color, linewidth=0.7, alpha=0.9)
         axes.plot(time, stretch[:, i].mean(axis=1), "-", color=color, linewidth=2.0)
     axes.axhline(float(rest.mean()), color="0.35", linestyle=":", linewidth=1.0)
-    entries = [("0.25", "-", 2.0, "mean of the segment's sensors" if several else "sensor")]
+    entries: list[tuple] = [("0.25", "-", 2.0, "mean of its sensors" if several else "sensor")]
     if several and isinstance(run.config.body, WormBody):
         entries.append(("0.25", "-", 0.7, run.config.body.springs.first_sensor))
-    _legend(axes, [*entries, ("0.35", ":", 1.0, "rest length")])
+    entries.append(("0.35", ":", 1.0, "rest length"))
+    levels = _published_levels(run)
+    if levels:
+        _draw_levels(axes, levels, colors)
+        entries.append(("0.25", PUBLISHED, 0.9, "as published"))
+    _legend(axes, entries)
+
+
+def _published_levels(run: Run) -> list[float]:
+    """Where each segment's published elongation ends, cm: above the lowest length where it is peak to peak, or rest."""
+    beside = published(run.config)
+    starts = {
+        "elongation_first_helix_pp_m": run.data["stretch_length"].values[:, :, 0].min(axis=0),
+        "elongation_mean_max_m": run.data["stretch_rest_length"].values.mean(axis=1),
+    }
+    for field, start in starts.items():
+        if field in beside:
+            return (_CM * (start + np.asarray(beside[field].value))).tolist()
+    return []
+
+
+def _draw_levels(axes: Axes, levels: list[float], colors: list) -> None:
+    """Draws a line at each level, and names its segment right of the panel, in turn above and below the line."""
+    for rank, i in enumerate(np.argsort(levels)[::-1]):
+        axes.axhline(levels[i], color=colors[i], linestyle=PUBLISHED, linewidth=0.9)
+        axes.annotate(
+            f"paper, {i + 1}",
+            (1.0, levels[i]),
+            xycoords=("axes fraction", "data"),
+            xytext=(3, 0),
+            textcoords="offset points",
+            va="top" if rank % 2 else "bottom",
+            fontsize=7.0,
+            color="0.25",
+        )
 
 
 def _segment_entries(colors: list) -> list[tuple]:
@@ -140,7 +180,7 @@ def _segment_entries(colors: list) -> list[tuple]:
     return [(colors[i], "-", 3.0, f"segment {i + 1}") for i in shown]
 
 
-def _legend(axes: Axes, entries: list[tuple]) -> None:
+def _legend(axes: Axes, entries: Sequence[tuple]) -> None:
     """Puts a one-line legend above the panel, so that it never covers a curve."""
     from matplotlib.lines import Line2D
 

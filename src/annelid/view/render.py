@@ -28,6 +28,8 @@ VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
 DEFAULT_CAMERA = "isometric"
+MOST_PICTURES = 200_000
+"""Of a video, which are drawn some 30 a second."""
 FPS_RANGE = (1.0, 240.0)
 _H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
 # 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
@@ -117,7 +119,8 @@ def render_video(
         The path written.
 
     Raises:
-        RunFileError: The run has no such camera, the path another suffix, ``fps`` or ``speed`` is out of range,
+        RunFileError: The run has no such camera, the path another suffix, ``fps`` or ``speed`` is out of range or makes
+            too many pictures,
             or the file cannot be written whole, as on a full disk.
         RenderingUnavailable: No OpenGL back-end works.
         MissingDependency: There is no ffmpeg to write videos with.
@@ -135,7 +138,13 @@ def render_video(
         _video_writer(draft, fps, size, path) as video,
     ):
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
-        total = math.floor((last - first) * fps / speed + 1e-6) + 1
+        pictures = (last - first) * fps / speed + 1.0
+        if pictures > MOST_PICTURES:
+            raise RunFileError(
+                f"speed = {speed:g}: {last - first:g} s of the run at {fps:g} pictures a second make {pictures:.3g} "
+                f"pictures, more than {MOST_PICTURES:,}, which take about {pictures / 30 / 3600:.2g} h: raise the speed"
+            )
+        total = math.floor(pictures + 1e-6)
         for done in range(total):
             video.write(scene.picture(_nearest(run, scene.times_s, first + done * speed / fps)))
             if progress is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import RunConfig
+from annelid.config import RunConfig, WormBody
 from annelid.view.camera import FIXED, fitting_distance, view_angles
 from annelid.view.drawn_worm import DrawnWorm, free_camera, middle, options
 from annelid.view.gl import Canvas, find_backend
@@ -37,7 +37,8 @@ class WormScene:
             RunFileError: No postures recorded, they do not fit the model, or no such camera.
             RenderingUnavailable: No OpenGL back-end works.
         """
-        angles = view_angles(camera)
+        assert isinstance(run.config.body, WormBody)
+        angles = view_angles(camera, run.config.body.heading_deg)
         data = run.data
         backend = find_backend()
         self._run = run
@@ -109,7 +110,10 @@ class PostureScene:
         self._worm.light_for(angles[1])
         points = self._worm.part_ends(self._worm.model.qpos0)
         offsets = (points - middle(points)) @ self._worm.upright.T
-        self._camera = free_camera(angles, ROOM * fitting_distance(offsets, *angles, width / height))
+        distance = ROOM * fitting_distance(offsets, *angles, width / height)
+        # The model's own rest has no heading.
+        assert isinstance(config.body, WormBody)
+        self._camera = free_camera(view_angles(camera, config.body.heading_deg), distance)
         self._option = options()
         self._canvas = Canvas(self._worm.model, width, height, backend, fine=False)
         self._canvas.__enter__()

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from annelid.text import printable
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -60,6 +62,15 @@ def activation_color(activation: float) -> tuple[float, float, float]:
     return red, green, blue
 
 
+def plain(text: str) -> str:
+    """Returns a user's text so that a figure shows it as it is: no formulas, no control characters.
+
+    Matplotlib reads what stands between dollar signs as a formula and leaves labels that begin with an underscore out.
+    """
+    escaped = printable(text).replace("$", r"\$")
+    return f" {escaped}" if escaped.startswith("_") else escaped
+
+
 def panel_title(axes: Axes, text: str) -> None:
-    """Writes a panel's title above its left edge."""
-    axes.set_title(text, pad=5.0)
+    """Writes a panel's title, plain text, above its left edge."""
+    axes.set_title(plain(text), pad=5.0)

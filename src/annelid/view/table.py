@@ -1,13 +1,26 @@
-"""The table that ends a run: our numbers, and beside each the published one where there is one."""
+"""The table that ends a run: our numbers, what each is compared with where there is such, and what follows."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from annelid.analysis.paper import Published, published
+from annelid.analysis.comparison import relative_difference
+from annelid.analysis.paper import (
+    ELONGATION_WITHIN,
+    FORMULATION,
+    SPREAD,
+    Published,
+    agreement,
+    changed_fields,
+    formulation,
+    has_rigid_crossings,
+    references,
+    stands_for_the_papers,
+)
 from annelid.analysis.summary import Summary
 from annelid.config import WormBody, field_value, fields_of, toml_value
+from annelid.errors import listed
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,10 +31,21 @@ UNKNOWN = "-"
 _ONSETS_SHOWN = 12
 _NARROWEST, _NARROWEST_OURS = 12, 16
 
+COMPARED = ("reference", "deviation")
+"""Headings of what stands beside our numbers."""
+
+NEXT = (
+    f"annelid run {FORMULATION} (that formulation itself, a minute), "
+    "riddle2023-rods (rigid crossings), wang (the robot)"
+)
+"""What to run after the first worm."""
+
 Row = tuple[str, float, int, str]
 SUMMARY_ROWS: dict[str, Row] = {
     "period_s": ("period", 1.0, 3, "s"),
     "elongation_first_helix_pp_m": ("elongation, first helix, pp", 100.0, 2, "cm"),
+    "elongation_least_pp_m": ("least of its sensors, pp", 100.0, 2, "cm"),
+    "elongation_most_pp_m": ("most of its sensors, pp", 100.0, 2, "cm"),
     "elongation_mean_max_m": ("elongation, mean, maximum", 100.0, 2, "cm"),
     "middle_deficit": ("middle below first, pp", 100.0, 1, "%"),
     "middle_deficit_mean": ("middle below first, mean", 100.0, 1, "%"),
@@ -30,8 +54,9 @@ SUMMARY_ROWS: dict[str, Row] = {
     "contraction_force_peak_N": ("force contracted, peak", 1.0, 2, "N"),
     "segment_force_median_N": ("of each segment, median", 1.0, 2, "N"),
     "segment_force_peak_N": ("of each segment, peak", 1.0, 2, "N"),
-    "muscle_work_J": ("work of each segment", 1.0, 2, "J"),
-    "travel_m": ("travel, centre of mass", 1000.0, 1, "mm"),
+    "positive_work_J": ("positive work of each segment", 1.0, 2, "J"),
+    "muscle_work_J": ("net work of each segment", 1.0, 2, "J"),
+    "travel_m": ("travel forwards, centre of mass", 1000.0, 1, "mm"),
     "travel_path_m": ("travel, forth and back", 1000.0, 1, "mm"),
     "ring_length_min_m": ("shortest ring", 100.0, 1, "cm"),
     "edge_strain_max": ("largest edge strain", 100.0, 3, "%"),
@@ -49,12 +74,12 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
         config: The configuration it belongs to, which decides what it is compared with.
 
     Returns:
-        A rich table; rows whose number cannot be told are left out, unless one has been published.
+        A rich table; rows whose number cannot be told are left out, unless there is one to compare with.
     """
     from rich import box
     from rich.table import Table
 
-    beside = published(config)
+    beside = bool(references(config))
     duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
     table = Table(
         title=f"{numbers.name}: {numbers.n_segments} segments{duration}, {numbers.status.replace('_', ' ')}",
@@ -65,29 +90,90 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
     )
     table.add_column("quantity", min_width=_NARROWEST, overflow="fold")
     table.add_column("this run", min_width=_NARROWEST_OURS, overflow="fold")
+    for heading in COMPARED if beside else ():
+        table.add_column(heading, overflow="fold")
+    for label, ours, *compared in summary_rows(numbers, config):
+        table.add_row(label, ours, *(compared if beside else []))
     if beside:
-        table.add_column("published", overflow="fold")
-    for label, ours, theirs in summary_rows(numbers, config):
-        table.add_row(label, ours, *([theirs] if beside else []))
-    if beside:
-        table.caption = legend(config)
+        table.caption = legend(numbers, config)
         table.caption_justify = "left"
     return table
 
 
-def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, str]]:
-    """Returns label, our number and the published one of every row in which there is either, each with its unit."""
-    beside = published(config)
+def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, str, str]]:
+    """Returns label, our number, the one to compare with and the deviation of every row in which there is a number."""
+    beside = references(config)
     first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
-    rows = [(label, ours, _theirs(field, beside.get(field))) for label, ours, field in _cells(numbers, first_sensor)]
+    rows = [
+        (label, ours, _theirs(field, beside.get(field)), deviation(field, numbers, beside.get(field)))
+        for label, ours, field in _cells(numbers, first_sensor)
+    ]
     return [row for row in rows if row[1] != UNKNOWN or row[2]]
 
 
-def legend(config: RunConfig) -> str:
-    """Says where the published numbers of a configuration stand; empty where there are none."""
-    beside = published(config)
-    places = ", ".join(dict.fromkeys(entry.place for entry in beside.values()))
-    return f"pp: peak to peak. published: {next(iter(beside.values())).paper}, {places}" if beside else ""
+def deviation(field: str, numbers: Summary, entry: Published | None) -> str:
+    """Returns by how many percent our number, or that of each segment, is above the one to compare with.
+
+    Returns:
+        Empty for shares, speeds of computing and words, for the range over sensors, and where either number is lacking.
+    """
+    if entry is None or field in SPREAD or isinstance(entry.value, str) or SUMMARY_ROWS[field][-1] in ("%", ""):
+        return ""
+    shares = relative_difference(entry.value, getattr(numbers, field))
+    if shares is None:
+        return ""
+    of_each = shares if isinstance(shares, Sequence) else [shares]
+    return f"{' / '.join(UNKNOWN if share is None else _signed(100 * share) for share in of_each)} %"
+
+
+def legend(numbers: Summary, config: RunConfig) -> str:
+    """Says where the numbers to compare with come from; empty where there are none."""
+    beside = references(config)
+    if not beside:
+        return ""
+    places = ", ".join(dict.fromkeys(entry.place for entry in beside.values() if entry.paper != FORMULATION))
+    paper = next(entry.paper for entry in beside.values() if entry.paper != FORMULATION)
+    said = [f"pp: peak to peak. [P]: published, {paper}, {places}."]
+    if stands_for_the_papers(config):
+        said.append(f"Other references: {FORMULATION}, the paper's own formulation.")
+        said += [_about_rigid_crossings(numbers)] if has_rigid_crossings(config) else []
+    return " ".join(said)
+
+
+def closing_sentence(numbers: Summary, config: RunConfig) -> str:
+    """Says whether a run reproduces the paper's own formulation, or by how much it does not.
+
+    Args:
+        numbers: The run's numbers.
+        config: Its configuration.
+
+    Returns:
+        One sentence, where a preset is changed on what is changed; empty where there is nothing to compare with.
+    """
+    if not references(config) or not isinstance(config.body, WormBody):
+        return ""
+    changed = changed_fields(config)
+    if changed:
+        return (
+            f"this run differs from {config.name} in {listed(changed)}: the references are those of the unchanged worm"
+        )
+    if not stands_for_the_papers(config) or has_rigid_crossings(config) or numbers.status != "complete":
+        return ""
+    found = agreement(numbers)
+    within = f"{100 * ELONGATION_WITHIN:g} %"
+    if found:
+        return (
+            f"{config.name} reproduces order, period and elongation of the paper's formulation within {within}; "
+            f"next: {NEXT}"
+        )
+    apart = [] if found.order else [f"order {_order(numbers)} in place of {_order(formulation())}"]
+    apart += [] if found.period_agrees else [f"period {_share(found.period)}"]
+    apart += [
+        f"elongation of segment {segment} {_share(share)}"
+        for segment, (share, agrees) in enumerate(zip(found.elongation, found.elongation_agrees, strict=True), start=1)
+        if not agrees
+    ]
+    return f"{config.name} does not reproduce the paper's formulation within {within}: {', '.join(apart)}; next: {NEXT}"
 
 
 def presets_table(presets: Sequence[RunConfig]) -> Table:
@@ -154,10 +240,36 @@ def _wave(numbers: Summary) -> str:
 def _theirs(field: str, entry: Published | None) -> str:
     if entry is None:
         return ""
+    source = "" if entry.paper == FORMULATION else " [P]"
     if isinstance(entry.value, str):
-        return entry.value
+        return f"{entry.value}{source}"
     _, factor, digits, unit = SUMMARY_ROWS[field]
-    return quantity(entry.value, factor, digits, unit)
+    return f"{quantity(entry.value, factor, digits, unit)}{source}"
+
+
+def _about_rigid_crossings(numbers: Summary) -> str:
+    theirs = formulation()
+    shares = relative_difference(theirs.elongation_mean_max_m, numbers.elongation_mean_max_m)
+    known = [1.0 + share for share in shares if share is not None] if isinstance(shares, Sequence) else []
+    times = (
+        f"a segment elongates {sum(known) / len(known):.1f} times as far"
+        if known and numbers.period_s
+        else "segments elongate farther"
+    )
+    gap = f"{1e3 * (theirs.pin_gap_max_m or 0.0):.0f} mm"
+    return f"Here crossings are rigid, and {times}: {FORMULATION} has the paper's soft pins, which part by up to {gap}."
+
+
+def _order(numbers: Summary) -> str:
+    return "-".join(map(str, numbers.order)) or "none"
+
+
+def _share(share: float | None) -> str:
+    return "unknown" if share is None else f"{_signed(100 * share)} %"
+
+
+def _signed(percent: float) -> str:
+    return f"{percent:+z.1f}" if abs(percent) < 9.95 else f"{percent:+.0f}"
 
 
 def quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from annelid.cli.entry import Command
 from annelid.cli.experiment.load_frame import load_frame_command
 from annelid.cli.experiment.pipes import pipes_command
 from annelid.cli.experiment.slip import slip_command, slip_detector_command
@@ -24,4 +25,4 @@ for _name, _command in {
     "turning": turning_command,
     "pipes": pipes_command,
 }.items():
-    experiment.command(_name)(_command)
+    experiment.command(_name, cls=Command)(_command)

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from annelid.cli.common import workers_for
-from annelid.cli.entry import EXIT_INTERRUPTED, complain
-from annelid.errors import RunFileError
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock
 
 if TYPE_CHECKING:
     from annelid.studies.progress import StudyProgress
@@ -37,14 +36,14 @@ def kept_runs(
         quiet: No progress.
 
     Raises:
-        RunFileError: The folder is a file.
+        ConfigError: The folder is a file.
+        RunFileError: Another process writes there.
         typer.Exit: The user has interrupted it.
     """
     from annelid.studies.progress import study_progress
     from annelid.studies.store import Store
 
-    if output.exists() and not output.is_dir():
-        raise RunFileError(f"{output} is a file: name a folder with -o")
+    lock(output)
     folder = output / "runs"
     try:
         with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:

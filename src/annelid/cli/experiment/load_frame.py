@@ -9,26 +9,30 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import (
+    RIGID_PRESET,
     Assignments,
     FidelityLevel,
     Force,
-    Preset,
+    NamedPreset,
     config_of,
-    or_default,
     overrides_of,
     refuse_existing,
 )
+from annelid.cli.entry import lock
 
 
 def load_frame_command(
-    preset: Preset = None,
+    preset: NamedPreset = RIGID_PRESET,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("load-frame"),
     assignments: Assignments = None,
     fidelity: FidelityLevel = None,
     displacement: Annotated[float, typer.Option(help="How far the cable is wound, mm.")] = 330.0,
     speed: Annotated[float, typer.Option(help="Speed of the cable, mm/s.")] = 10.0,
     cable_friction: Annotated[
-        float, typer.Option(help="Friction of the cable: coefficient times the angle it is wrapped round, rad.")
+        float,
+        typer.Option(
+            min=0.0, max=20.0, help="Friction of the cable: coefficient times the angle it is wrapped round, rad."
+        ),
     ] = 0.0,
     data: Annotated[
         Path | None, typer.Option("--data", help="Measured loop to compare with.  [default: the one of annelid]")
@@ -45,19 +49,18 @@ def load_frame_command(
     annelid experiment load-frame
     annelid experiment load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
-    from rich.console import Console
-
     from annelid.studies.calibration.frame import load_frame
     from annelid.studies.calibration.loop import MM, cable_force, read_loop
     from annelid.studies.calibration.report import frame_table, write_loop
     from annelid.studies.progress import study_progress
+    from annelid.terminal import Console
     from annelid.view.figures.load_frame import load_frame_figure
 
     table = output / "load_frame.csv"
-    if output.is_dir():
-        refuse_existing(table, force)
+    lock(output)
+    refuse_existing(table, force)
     measured = read_loop(data)
-    config = config_of(or_default(preset, fidelity), overrides_of(assignments), None, fidelity)
+    config = config_of(preset, overrides_of(assignments), fidelity=fidelity)
     with study_progress(quiet=quiet) as progress:
         tension = load_frame(
             config,
@@ -66,7 +69,6 @@ def load_frame_command(
             progress=None if progress is None else lambda share: progress("load frame", 0, 0, share),
         )
     loop = cable_force(tension, cable_friction)
-    output.mkdir(parents=True, exist_ok=True)
     if not quiet:
         Console().print(frame_table({config.name: loop, "measured": measured}))
     write_loop(loop, tension, table)

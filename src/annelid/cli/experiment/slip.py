@@ -35,7 +35,6 @@ def slip_command(
     annelid experiment slip --preset crawler -o slip-crawler
     """
     import numpy as np
-    from rich.console import Console
 
     from annelid.studies.slip.feedback import (
         FEEDBACKS,
@@ -47,6 +46,7 @@ def slip_command(
         slip_feedback,
         write_readings,
     )
+    from annelid.terminal import Console
     from annelid.view.figures.slip import feedback_figure
 
     words = ["slip", "--preset", preset]
@@ -85,8 +85,6 @@ def slip_detector_command(
     annelid experiment slip-detector --quick
     annelid experiment slip-detector -o slip
     """
-    from rich.console import Console
-
     from annelid.analysis.detector import score
     from annelid.studies.slip.detection import (
         LIMIT_M_PER_S,
@@ -97,6 +95,7 @@ def slip_detector_command(
         slip_detection,
         write_scores,
     )
+    from annelid.terminal import Console
     from annelid.view.figures.slip import detector_figure
 
     words = ["slip-detector"]

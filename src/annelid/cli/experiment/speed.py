@@ -36,9 +36,8 @@ def speed_command(
     annelid experiment speed
     annelid experiment speed crawler tune/best.toml -o mine
     """
-    from rich.console import Console
-
     from annelid.studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
+    from annelid.terminal import Console
 
     words = ["speed", *(gaits or [])]
     with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):

@@ -32,9 +32,8 @@ def turning_command(
     annelid experiment turning --quick
     annelid experiment turning -o turning
     """
-    from rich.console import Console
-
     from annelid.studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
+    from annelid.terminal import Console
 
     with kept_runs(["turning"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)

@@ -35,8 +35,6 @@ def weak_middle_command(
     annelid experiment weak-middle --quick
     annelid experiment weak-middle -o weak-middle
     """
-    from rich.console import Console
-
     from annelid.studies.weak_middle.asymmetry import asymmetry
     from annelid.studies.weak_middle.results import (
         asymmetry_table,
@@ -49,6 +47,7 @@ def weak_middle_command(
         write_readings,
     )
     from annelid.studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
+    from annelid.terminal import Console
     from annelid.view.figures.weak_middle import weak_middle_figure
 
     found = None

@@ -16,7 +16,7 @@ from annelid.config import RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Movement, Posture
-from annelid.simulation.worm import Worm, compile_worm, engine_stopped
+from annelid.simulation.worm import Worm, compile_worm, engine_stopped, owns_model
 
 _NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
 _TIMES_GIVEN = 1
@@ -27,7 +27,8 @@ class BodyBatch:
     """Bodies of one structure, each with parameters of its own.
 
     The engine keeps each body's state and one workspace, not one for each body; bodies with the same physical
-    configuration share one compiled model. The thread that calls steps them, without holding Python's lock.
+    configuration share one compiled model, unless worms set numbers in it as they move (`owns_model`). The thread that
+    calls steps them, without holding Python's lock.
 
     Attributes:
         worms: The worms, each also a plant by itself.
@@ -46,7 +47,7 @@ class BodyBatch:
         models = [anatomy.model for anatomy in anatomies]
         self._anatomy = anatomies[0]
         self._batch = Batch(models[0], len(models), nthread=1)
-        if any(model is not models[0] for model in models):
+        if owns_model(configs[0]) or any(model is not models[0] for model in models):
             try:
                 self._batch.set_models(models)
             except ValueError as error:
@@ -68,7 +69,10 @@ class BodyBatch:
     def reset(self, row: int, state: Array | None) -> None:
         """Resets one body, and gives it a state of the engine if there is one."""
         self._batch.reset([row], stage=_NO_STAGE)
-        self._act[row] = self.worms[row].anatomy.first_act
+        worm = self.worms[row]
+        self._act[row] = worm.anatomy.first_act
+        if worm.start is not None:
+            self._qpos[row], self._plastic[row] = worm.start
         if state is not None:
             self._batch.state[row] = state
 
@@ -87,9 +91,8 @@ class BodyBatch:
             self._ctrl[row] = self.worms[row].control(own, n_steps)
         going, reasons = dict(zip(rows, activation, strict=True)), {}
         for _ in range(n_steps):
-            if self._mocap is not None:
-                for row in going:
-                    self._lay_ground(row)
+            for row in going:
+                self._prepare(row)
             stopped = self._step({row: self.worms[row].drive(own, self._act[row]) for row, own in going.items()})
             reasons |= stopped
             going = {row: own for row, own in going.items() if row not in stopped}
@@ -110,11 +113,14 @@ class BodyBatch:
                 self.worms[row].book({name: values[row] for name, values in self._work.items()}, drive)
         return reasons
 
-    def _lay_ground(self, row: int) -> None:
-        """Lays the planes under one body's skin."""
-        ground, scratch = self.worms[row].ground, self._scratch
-        assert ground is not None
-        assert self._mocap is not None
+    def _prepare(self, row: int) -> None:
+        """Gives one body's dampers their coefficients, and lays the planes under its skin."""
+        worm = self.worms[row]
+        if worm.damping is not None:
+            worm.damping.renew(self._qpos[row])
+        ground, scratch = worm.ground, self._scratch
+        if ground is None or self._mocap is None:
+            return
         scratch.qpos[:], scratch.qvel[:] = self._qpos[row], self._qvel[row]
         ground.lay(scratch)
         for bound, laid in zip(self._mocap, (scratch.mocap_pos, scratch.mocap_quat), strict=True):
@@ -233,14 +239,13 @@ def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
     models: dict[str, Anatomy] = {}
     anatomies: list[Anatomy] = []
     for config in configs:
-        physical = config.model_dump_json(include={"body", "arena", "clock"})
+        physical = config.model_dump_json(include={"body", "arena", "clock"}, exclude={"body": {"heading_deg"}})
         if physical not in models:
             anatomies.append(models.setdefault(physical, compile_worm(config)))
             continue
         known = models[physical]
-        # Friction by the direction of sliding is set in the model, which such worms cannot share.
         assert isinstance(config.body, WormBody)
         assert config.arena is not None
-        own = config.arena.has_setae
+        own = owns_model(config)
         anatomies.append(Anatomy(copy(known.model), config.body, surface_of(config.arena)) if own else known)
     return anatomies

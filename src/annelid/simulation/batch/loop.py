@@ -22,6 +22,7 @@ from annelid.simulation.batch.member import Member
 from annelid.simulation.batch.structure import checked_configs
 from annelid.simulation.coupling import start
 from annelid.simulation.interruption import Interruption
+from annelid.simulation.lock import locks
 from annelid.simulation.progress import ProgressCallback, reporting
 from annelid.simulation.runfile import Run, open_run, refuse_used_folder
 
@@ -61,6 +62,7 @@ class BatchResult:
         return [worm for worm, status in enumerate(self.statuses) if status not in ("complete", "interrupted")]
 
 
+@locks("out")
 def simulate_batch(
     configs: RunConfig | str | Sequence[RunConfig | str],
     out: str | Path,
@@ -93,7 +95,7 @@ def simulate_batch(
 
     Raises:
         ConfigError: Worms that do not fit into one batch, numbers that do not fit together, or a folder in use.
-        RunFileError: A run file cannot be made; then nothing is simulated.
+        RunFileError: A run file cannot be made, or another process writes into the folder; then nothing is simulated.
         KeyboardInterrupt: A second Ctrl-C; all files are closed.
     """
     own = checked_configs(configs, n_worms, seeds)

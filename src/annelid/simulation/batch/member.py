@@ -88,6 +88,7 @@ class Member:
         state = self.coupling.checkpoint()
         if state is not None:
             self._recorder.checkpoint(state.to_bytes())
+        self._recorder.warn(self.coupling.doubts())
 
     def finish(self, interrupted_by: str | None) -> None:
         """Writes all that is left and closes the file: the run is complete, or a signal of that name ended it."""
@@ -103,6 +104,7 @@ class Member:
             return
         with suppress(RunFileError):
             if isinstance(error, SimulationStopped):
+                self._recorder.warn(self.coupling.doubts())
                 self._end("stopped_by_guard", str(error), whole=True)
             elif isinstance(error, RunFileError):
                 self._end("disk_failure", str(error), whole=False)

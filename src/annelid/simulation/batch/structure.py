@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.config import RunConfig, WormBody, as_config
 from annelid.errors import ConfigError
 
 ALIKE = (
@@ -38,15 +38,15 @@ def checked_configs(
         ConfigError: The numbers of worms, configurations and seeds do not fit together, there is none, a body is
             planar, or two worms differ in a field of `ALIKE`.
     """
-    if isinstance(configs, RunConfig | str):
-        shared = load_config(configs) if isinstance(configs, str) else configs
+    if isinstance(configs, RunConfig | str | Mapping):
+        shared = as_config(configs)
         n = n_worms if n_worms is not None else None if seeds is None else len(seeds)
         if n is None:
             raise ConfigError("a batch of one configuration needs n_worms or seeds")
         own = [shared] * n
         seeds = range(shared.seed, shared.seed + n) if seeds is None else seeds
     else:
-        own = [load_config(one) if isinstance(one, str) else one for one in configs]
+        own = [as_config(one) for one in configs]
         if n_worms not in (None, len(own)):
             raise ConfigError(f"n_worms = {n_worms} does not fit {len(own)} configurations: leave it out")
     if not own:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config import Chain
+from annelid.simulation.lock import locks
 from annelid.studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
 from annelid.studies.bench.errors import errors, exponent, front
 from annelid.studies.bench.store import MeasurementFailed, Measurements
@@ -52,6 +53,7 @@ _OVERHEAD_S = 5.0
 _GROWTH = {"chain": 2.0, "rods": 0.4}
 
 
+@locks("folder")
 def bench(
     folder: Path, effort: Effort = "full", *, lines: Sequence[str] | None = None, progress: Progress | None = None
 ) -> Path:

@@ -15,7 +15,7 @@ from annelid.studies.examination import Effort
 Kind = Literal["judged", "converged", "speed"]
 
 LINES = {
-    "levels": "the levels of --fidelity",
+    "levels": "the levels of --fidelity, and the paper's own worm beside them",
     "steps": "3 segments, physics steps of 1 to 40 ms, 2 and 3 elements a side",
     "elements": "3 segments, 1 to 6 elements a side, physics steps of 5 and 20 ms",
     "segments": "rods as their preset has them, 3 to 47 segments",
@@ -132,7 +132,7 @@ def timed(preset: str, n_segments: int, duration_s: float, line: str) -> BenchCa
 def level_of(config: RunConfig) -> str | None:
     """Name of the level of fidelity that a configuration of three segments resolves like, or None."""
     for name, level in LEVELS.items():
-        like = load_config(level.preset, {**level.changes, "duration_s": config.duration_s})
+        like = load_config(RODS, {**level.changes, "duration_s": config.duration_s})
         if like == config:
             return name
     return None
@@ -141,7 +141,7 @@ def level_of(config: RunConfig) -> str | None:
 def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
     match line:
         case "levels":
-            return [_level_case(name) for name in LEVELS]
+            return [timed(CHAIN, 3, CHAIN_S, line), *map(_level_case, LEVELS)]
         case "steps":
             return [judged(elements, step, line) for elements in (2, 3) for step in _STEPS_MS[effort]]
         case "elements":
@@ -158,10 +158,7 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
 
 
 def _level_case(name: str) -> BenchCase:
-    level = LEVELS[name]
-    if level.preset == CHAIN:
-        return timed(CHAIN, 3, CHAIN_S, "levels")
-    config = load_config(level.preset, level.changes)
+    config = load_config(RODS, LEVELS[name].changes)
     elements = _worm_body(config).mesh.elements_per_side
     return judged(elements, 1e3 * config.clock.physics_timestep_s, "levels")
 

@@ -1,7 +1,7 @@
-"""One case, measured in a process of its own: ``python -m annelid.studies.bench.measure`` with a request on stdin.
+"""One case, measured in a process of its own: ``python -m annelid.studies.bench.measure``, its request a line on stdin.
 
-Alone in a fresh process, a case's peak memory is its own. Every line it prints is JSON: ``{"share": ..}`` as it goes
-on, then ``{"measured": ..}`` or ``{"error": ..}``.
+Alone in a fresh process, a case's peak memory is its own. It ends when its stdin is closed, as it is by the end of its
+parent. Every line it prints is JSON: ``{"share": ..}`` as it goes on, then ``{"measured": ..}`` or ``{"error": ..}``.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import AnnelidError, SimulationStopped
+from annelid.studies.lifeline import end_after
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -27,7 +28,8 @@ _MB = 1e6
 def main() -> None:
     """Reads the request, measures, and prints the answer."""
     keep_to_one_core()
-    request: dict[str, Any] = json.load(sys.stdin)
+    request: dict[str, Any] = json.loads(sys.stdin.readline())
+    end_after(lambda: os.read(sys.stdin.fileno(), 1))
     try:
         _say(measured=_measured(request))
     except AnnelidError as error:

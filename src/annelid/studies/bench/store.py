@@ -9,19 +9,19 @@ import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from annelid.errors import AnnelidError
 from annelid.studies.bench.cases import BenchCase
-from annelid.studies.fingerprint import READERS, code_fingerprint
+from annelid.studies.fingerprint import code_fingerprint
 from annelid.studies.store import case_key
+from annelid.textfiles import read_json
 from annelid.view.output import whole_file
 
-MEASURING = ("studies/bench/measure.py", "studies/bench/timing.py", *READERS)
+MEASURING = "studies.bench.measure"
 """The code that a measurement depends on beside the physics."""
-PEER_CODE = ("studies/bench/peer.py",)
+PEER_CODE = "studies.bench.peer"
 
 Share = Callable[[float], object]
 """Called with the share of a case that is done."""
@@ -41,7 +41,7 @@ class Measurements:
     def find(self, case: BenchCase | None) -> dict[str, Any] | None:
         """Returns what was measured before with the same configuration, code and engine, or None."""
         try:
-            return json.loads(self._path(case).read_text(encoding="utf-8"))
+            return read_json(self._path(case))
         except (OSError, ValueError):
             return None
 
@@ -61,7 +61,11 @@ class Measurements:
         return measured
 
     def _path(self, case: BenchCase | None) -> Path:
-        key = _digest(code_fingerprint(*PEER_CODE)) if case is None else _digest(case_key(case.case) + _measuring())
+        key = (
+            _digest(code_fingerprint(PEER_CODE))
+            if case is None
+            else _digest(case_key(case.case) + code_fingerprint(MEASURING))
+        )
         stem = "peer" if case is None else case.name.replace(", ", "-").replace(" ", "-")
         return self.folder / f"{stem}-{key}.json"
 
@@ -75,9 +79,10 @@ def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
         assert child.stdin is not None
         assert child.stdout is not None
         try:
-            # A process that dies at once leaves its reason on stderr.
-            with suppress(BrokenPipeError), child.stdin:
-                json.dump(request, child.stdin)
+            # A process that dies at once leaves its reason on stderr. Its stdin stays open: it ends when that closes.
+            with suppress(BrokenPipeError):
+                child.stdin.write(json.dumps(request) + "\n")
+                child.stdin.flush()
             answer: dict[str, Any] = {}
             for line in child.stdout:
                 # A library may print too.
@@ -92,16 +97,13 @@ def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
             raise
         finally:
             child.stdout.close()
+            with suppress(BrokenPipeError):
+                child.stdin.close()
         if "measured" in answer:
             return answer["measured"]
         complaints.seek(0)
         last = (complaints.read().strip().splitlines() or [f"the process ended with status {child.returncode}"])[-1]
         raise MeasurementFailed(answer.get("error", last))
-
-
-@cache
-def _measuring() -> str:
-    return code_fingerprint(*MEASURING)
 
 
 def _digest(text: str) -> str:

@@ -28,6 +28,8 @@ SETTLE_S = 2.0
 """Time in which springs that are stretched at rest bring the mesh to its balance before the cable moves."""
 SAMPLES = 400
 """Samples of one way, at most."""
+MOST_STEPS = 500_000
+"""Steps of one way, at most: some minutes."""
 FEWEST_STEPS = 100
 """Steps of one way, at least."""
 MOST_UNROUND = 0.5
@@ -80,7 +82,13 @@ def load_frame(
             f"displacement = {displacement_m:g} m must be greater than 0 and less than {0.8 * start.sum():.3g} m, "
             "four fifths of the ring"
         )
-    steps = max(round(displacement_m / (haste * speed_m_per_s) / model.opt.timestep), FEWEST_STEPS)
+    wanted = displacement_m / (haste * speed_m_per_s) / model.opt.timestep
+    if wanted > MOST_STEPS:
+        raise ConfigError(
+            f"speed = {speed_m_per_s:g} m/s takes {wanted:.3g} steps to {displacement_m:g} m, more than "
+            f"{MOST_STEPS:,}: raise the speed or lessen the displacement"
+        )
+    steps = max(round(wanted), FEWEST_STEPS)
     per_sample = -(-steps // SAMPLES)
     samples = -(-steps // per_sample)
     stiffness = CABLE_N_PER_M * len(tendons)
@@ -107,7 +115,8 @@ def load_frame(
 
 def _hastened(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
     """Returns the worm weightless and away from the ground, with its viscous coefficients divided."""
-    strands = {"joint_damping_Nms_per_rad": body.strands.joint_damping_Nms_per_rad / haste}
+    damping = ("joint_damping_Nms_per_rad", "damping_time_s", "loss_factor")
+    strands = {name: value / haste for name in damping if (value := getattr(body.strands, name)) is not None}
     changed: dict[str, object] = {"strands": body.strands.model_copy(update=strands)}
     if isinstance(body.formulation, Rods):
         lateral = {"lateral_damping_Nms_per_rad": body.formulation.lateral_damping_Nms_per_rad / haste}
@@ -135,10 +144,7 @@ def _compiled(config: RunConfig) -> tuple[mujoco.MjModel, np.ndarray, np.ndarray
     for name in names[middle]:
         tendon = spec.tendon(name)
         tendon.stiffness, tendon.springlength = [1e-9, 0.0, 0.0], [0.0, 10.0]
-    try:
-        model = compile_spec(spec)
-    except ValueError as error:
-        raise ConfigError(f"the engine refuses this body: {str(error).splitlines()[0]}") from None
+    model = compile_spec(spec)
     tendons = np.array([model.tendon(name).id for name in names[middle]])
     ring = mesh_of(body.mesh).rings[middle].tolist()
     corners = np.array([model.site(crossing_site(crossing)).id for crossing in ring])

@@ -11,6 +11,7 @@ import numpy as np
 
 from annelid.errors import AnnelidError
 from annelid.morphology import Array
+from annelid.textfiles import read_text
 
 MEASURED = "segment_load_frame.csv"
 MM = 1e-3
@@ -85,11 +86,9 @@ def read_loop(path: str | Path | None = None) -> Loop:
         AnnelidError: The file cannot be read as numbers, or does not go there and back.
     """
     source = resources.files("annelid") / "data" / MEASURED if path is None else Path(path)
+    text = read_text(source) if isinstance(source, Path) else source.read_text(encoding="utf-8")
     try:
-        with source.open(encoding="utf-8") as lines:
-            table = np.loadtxt(lines, delimiter=",", ndmin=2)
-    except OSError as error:
-        raise AnnelidError(f"cannot read {source}: {error.strerror}") from None
+        table = np.loadtxt(text.splitlines(), delimiter=",", ndmin=2)
     except ValueError as error:
         raise AnnelidError(f"{source} is no table of numbers: {str(error).splitlines()[0]}") from None
     if table.shape[1] < 2:

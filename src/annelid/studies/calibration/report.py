@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.config import toml_value
 from annelid.studies.calibration.fit import PARAMETERS, Calibration
 from annelid.studies.calibration.loop import MM, Loop
+from annelid.textfiles import nested, toml_text
 from annelid.view.output import whole_file
 
 if TYPE_CHECKING:
@@ -126,24 +126,19 @@ def write_calibration(fit: Calibration, source: str, changes: Mapping[str, Any],
     with whole_file(path) as draft:
         draft.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     written = path.with_name("calibrated.toml")
-    lines = [f"# Fitted to a load frame's loop, {fit.rms_N[2]:.2f} N off (root mean square)."]
+    lines = [f"Fitted to a load frame's loop, {fit.rms_N[2]:.2f} N off (root mean square)."]
     if "cable_friction" in fit.names:
         friction = float(fit.values[fit.names.index("cable_friction")])
-        lines.append(f"# Friction of the cable: coefficient times angle {friction:.3g}, no field of the body.")
-    lines += [f"extends = {toml_value(base)}", fields_as_toml(dict(changes) | fit.overrides)]
+        lines.append(f"Friction of the cable: coefficient times angle {friction:.3g}, no field of the body.")
+    tree = {"extends": base, **fields_as_tree(dict(changes) | fit.overrides)}
     with whole_file(written) as draft:
-        draft.write_text("\n".join(lines), encoding="utf-8")
+        draft.write_text(toml_text(tree, "\n".join(lines)), encoding="utf-8")
     return path, written
 
 
-def fields_as_toml(fields: Mapping[str, Any]) -> str:
-    """Writes fields given by dotted path as TOML, those of no section first; fractions to four digits."""
-    tree: dict[str, list[str]] = {"": []}
-    for path, value in fields.items():
-        section, _, field = path.rpartition(".")
-        short = float(f"{value:.4g}") if isinstance(value, float) else value
-        tree.setdefault(section, []).append(f"{field} = {toml_value(short)}\n")
-    return "\n".join((f"[{section}]\n" if section else "") + "".join(rows) for section, rows in tree.items())
+def fields_as_tree(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Makes a tree of fields given by dotted path; fractions to four digits."""
+    return nested({path: float(f"{v:.4g}") if isinstance(v, float) else v for path, v in fields.items()})
 
 
 def _number(value: float) -> float | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import nan
+
 from annelid.analysis.rhythm import CONTRACTED
 from annelid.config import SnsController
 from annelid.simulation.runfile import Run
@@ -10,33 +12,49 @@ from annelid.studies.claims.evidence import (
     MAIN,
     PLANAR_CASES,
     Evidence,
-    holds_if,
+    between,
+    judged,
 )
 from annelid.studies.contents import Claim
-from annelid.studies.outcome import Outcome
+from annelid.studies.examinations.gate import VARIANTS, variant
+
+GATES = "the worm and how its gates start"
 
 
-def control_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Claim]:
+def control_claims(evidence: Evidence) -> list[Claim]:
     """Judges the claims about sensing and the network."""
-    planar = evidence.results[PLANAR_CASES[300]]
-    tight, quick = evidence.results[rods()], evidence.results[fast()]
-    periods = [o.rhythm.period_s or float("nan") for o in (planar, outcome, quick, tight)]
-    ordered = all(o.rhythm.verdict == "ordered" and o.rhythm.direction == 1 for o in (planar, outcome, quick, tight))
-    steady = evidence.first_number("gate", "verdict_{}_steady_euler")
-    both, following = _half_centres(main)
+    own = [outcome for outcome, _ in evidence.runs]
+    others = [evidence.results[case] for case in (PLANAR_CASES[300], fast(), rods())]
+    rhythms = [outcome.rhythm for outcome in (*own, *others)]
+    gates = {
+        start: [
+            evidence.results[variant(worm, *pair)].rhythm.is_one_wave
+            for worm, pairs in VARIANTS[evidence.effort].items()
+            for pair in pairs
+            if pair[0] == start
+        ]
+        for start in ("toolbox", "steady")
+    }
+    walks, on = judged([rhythm.is_one_wave for rhythm in rhythms] + gates["toolbox"] + gates["steady"], GATES)
+    shares = [_half_centres(run) for _, run in evidence.runs]
+    flip = judged((both < 0.05 and following > 0.95 for both, following in shares), "the run")
     return [
         Claim(
             "Sensing and control",
             "The network of the 2D worm drives the 3D worm with little to no change.",
             "sections 2.3, 5",
-            holds_if(ordered),
+            walks,
             "little to no change",
-            f"ordered 1-2-3 on four bodies, periods {', '.join(f'{period:.3f}' for period in periods)} s",
+            f"in the order 1-2-3: {sum(rhythm.is_one_wave for rhythm in rhythms)} of {len(rhythms)} runs on four "
+            f"bodies, periods {between([rhythm.period_s or nan for rhythm in rhythms], digits=3)} s; with either "
+            f"update order of the network {sum(gates['toolbox'])} of {len(gates['toolbox'])}, with gates that start at "
+            f"rest {sum(gates['steady'])} of {len(gates['steady'])}",
             "Neurons, synapses and conductances are the same on the planar worm, the paper's chain, its fast form and "
             "the tight rods. What had to change lies around the network: the map from potentials to activation (Eq. "
-            "2), the sensors' tolerance (0.1 mm to 10 mm), a hold of the first sensor for 0.2 s"
-            f". With sodium gates that start at rest, not as in SNS-Toolbox: {steady.worm} {steady.value}.",
+            "2), the sensors' tolerance (0.1 mm to 10 mm), and a hold of the first sensor for 0.2 s. The gates of the "
+            "sodium current start as in SNS-Toolbox; where they start at rest, all that differs is told above.",
             f"{PLANAR_CASES[300].command}; {MAIN.command}",
+            on,
         ),
         Claim(
             "Sensing and control",
@@ -53,12 +71,14 @@ def control_claims(evidence: Evidence, outcome: Outcome, main: Run) -> list[Clai
             "Sensing and control",
             "Half-centre neurons flip between excited and inhibited states, and the muscle follows the excited one.",
             "section 2.3, Fig. 7",
-            holds_if(both < 0.05 and following > 0.95),
+            flip[0],
             "Fig. 7",
-            f"both of a segment's neurons above R/2 in {100 * both:.1f} % of the samples",
-            f"Activation above one half goes with the contraction neuron being the higher one in {100 * following:.1f} "
-            "% of the samples; figure 7 shows both.",
+            f"both of a segment's neurons above R/2 in {between((both for both, _ in shares), 100, 1)} % of samples",
+            "It holds if both are excited in less than 5 % of the samples and activation follows in more than 95 %. "
+            "Activation above one half goes with the contraction neuron being the higher one in "
+            f"{between((following for _, following in shares), 100, 1)} % of the samples; figure 7 shows both.",
             MAIN.command,
+            flip[1],
         ),
     ]
 

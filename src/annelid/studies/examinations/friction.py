@@ -52,7 +52,8 @@ _FIELD = "arena.friction"
 _OPEN = (SPRUNG, TIGHT)
 
 
-def _frictions(worm: Worm, effort: Effort) -> Sequence[float]:
+def frictions_of(worm: Worm, effort: Effort) -> Sequence[float]:
+    """Returns the frictions at which a worm is walked."""
     if effort == "full":
         return FEW if worm is PAPERS else FRICTIONS
     return (PAPERS_FRICTION,) if worm is PAPERS else (SLIPPERY, 0.4, PAPERS_FRICTION)
@@ -76,7 +77,7 @@ def _solutions(effort: Effort) -> Sequence[tuple[float, float]]:
 
 def _cases(effort: Effort) -> Sequence[Case]:
     return [
-        *(_walking(worm, friction) for worm in WORMS for friction in _frictions(worm, effort)),
+        *(_walking(worm, friction) for worm in WORMS for friction in frictions_of(worm, effort)),
         *(_held(worm, friction) for worm in _OPEN for friction in (SLIPPERY, PAPERS_FRICTION)),
         *(_solved(*solution) for solution in _solutions(effort)),
     ]
@@ -92,7 +93,7 @@ class _Series(NamedTuple):
     @property
     def travel_m(self) -> NDArray[np.float64]:
         """Towards the front, against the axis x, which runs from front to rear."""
-        return np.array([-number(outcome.summary.travel_m) for outcome in self.outcomes])
+        return np.array([number(outcome.summary.travel_m) for outcome in self.outcomes])
 
     @property
     def elongation_m(self) -> NDArray[np.float64]:
@@ -109,7 +110,7 @@ class _Series(NamedTuple):
 
 def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     every = [
-        _Series(worm, frictions := _frictions(worm, effort), [results[_walking(worm, f)] for f in frictions])
+        _Series(worm, frictions := frictions_of(worm, effort), [results[_walking(worm, f)] for f in frictions])
         for worm in WORMS
     ]
     held = {
@@ -117,7 +118,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         for worm in _OPEN
     }
     solved = [
-        (step, ratio, -number(results[_solved(step, ratio)].summary.travel_m)) for step, ratio in _solutions(effort)
+        (step, ratio, number(results[_solved(step, ratio)].summary.travel_m)) for step, ratio in _solutions(effort)
     ]
     _draw(every, held, stem)
     numbers: dict[str, Any] = {}

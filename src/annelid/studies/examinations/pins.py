@@ -41,8 +41,8 @@ from annelid.studies.outcome import Outcome
 from annelid.view.canvas import canvas, save_both
 from annelid.view.style import panel_title, segment_colors
 
-STIFFNESSES_N_PER_M = (12.0, 22.5, 50.0, 100.0, 300.0, 1000.0)
-"""Ties of the rods; 22.5 N/m are the preset's."""
+STIFFNESSES_N_PER_M = (12.0, 21.5, 50.0, 100.0, 300.0, 1000.0)
+"""Ties of the rods; 21.5 N/m are the preset's."""
 DAMPING_TIME_S = 0.04
 """Damping over stiffness of the ties, as the paper's pins have it, s."""
 TIME_CONSTANTS_S = (0.0126, 0.01, 0.008)
@@ -106,14 +106,10 @@ def _held_rods() -> list[Case]:
     return [fast({**one_after_the_other(), **_tied(value)}) for value in STIFFNESSES_N_PER_M]
 
 
-def _held_long(lateral_damping: float) -> Case:
-    """Tight rods whose segment 1 is held contracted for longer than the protocol has it."""
-    return _HELD_TIGHT.but({**one_after_the_other(1, hold_s=LONG_S), _DAMPING: lateral_damping})
-
-
 def _settling(effort: Effort) -> list[Case]:
-    """Tight rods held long, with the sprung rods' lateral damping and without."""
-    return [_held_long(_LATERAL), _held_long(0.0)] if effort == "full" else []
+    """Tight rods whose segment 1 is held contracted for long, with the sprung rods' damping and with their own."""
+    long = one_after_the_other(1, hold_s=LONG_S)
+    return [case.but(long) for case in (_HELD_TIGHT, _OWN_DAMPING)] if effort == "full" else []
 
 
 def _walking(effort: Effort) -> list[Case]:
@@ -121,20 +117,17 @@ def _walking(effort: Effort) -> list[Case]:
     return [fast(_tied(value)) for value in stiffnesses]
 
 
-_DAMPING = f"{_FORMULATION}.lateral_damping_Nms_per_rad"
-_UNDAMPED_TIGHT = rods({**one_after_the_other(), "body.rings.length_range_m": compiled_ranges()})
+_OWN_DAMPING = rods({**one_after_the_other(), "body.rings.length_range_m": compiled_ranges()})
 
 
-def _rod_formulation(case: Case) -> Rods:
+def _body(case: Case) -> WormBody:
     body = case.config.body
     assert isinstance(body, WormBody)
-    assert isinstance(body.formulation, Rods)
-    return body.formulation
+    return body
 
 
 # Muscles and damping as the sprung rods have them, so that the pins alone differ.
-_LATERAL = _rod_formulation(fast()).lateral_damping_Nms_per_rad
-_HELD_TIGHT = _UNDAMPED_TIGHT.but({_DAMPING: _LATERAL})
+_HELD_TIGHT = _OWN_DAMPING.but({"body.strands.damping_time_s": _body(fast()).strands.damping_time_s})
 
 
 def _cases(effort: Effort) -> Sequence[Case]:
@@ -142,7 +135,7 @@ def _cases(effort: Effort) -> Sequence[Case]:
         *_held_chains(effort),
         *_held_rods(),
         _HELD_TIGHT,
-        _UNDAMPED_TIGHT,
+        _OWN_DAMPING,
         *_settling(effort),
         *_walking(effort),
         rods(),
@@ -184,7 +177,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
 
     paper_m, tight_m = chains.elongation_m[0, 0], tight.elongation_m[0, 0]
     last = sprung.elongation_m[-1, 0]
-    undamped_m = float(held_elongation(results[_UNDAMPED_TIGHT])[0])
+    own_m = float(held_elongation(results[_OWN_DAMPING])[0])
     ordered = [f"{k:g}" for k, outcome in walking if outcome.rhythm.is_one_wave]
     others = [f"{k:g} ({rhythm_kind(o.rhythm)})" for k, o in walking if not o.rhythm.is_one_wave]
     at_paper = _at(chains.stiffness[0], sprung)
@@ -197,8 +190,8 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     )
     walk = (
         f"In closed loop the sensor tolerance is {fast().config.sensor.tolerance_m * 1e3:g} mm, which was chosen for "
-        f"ties of {_rod_formulation(fast()).pin_stiffness_N_per_m:g} N/m"
-        f". With it the rods walk 1-2-3 at {listed(ordered)} N/m, and not at {listed(others)} N/m. Tight pins at "
+        f"ties of {tie_stiffness_N_per_m(fast()):g} N/m. "
+        f"With it the rods walk 1-2-3 at {listed(ordered)} N/m, and not at {listed(others)} N/m. Tight pins at "
         f"{rods().config.sensor.tolerance_m * 1e3:g} mm: {rhythm_words(walking_tight.rhythm)}."
     )
     common = [
@@ -216,18 +209,17 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             else "."
         ),
         walk,
-        "The tight rods here have the muscles and lateral damping of the sprung ones, so that only the pins differ. "
-        f"Without that damping, as in their preset, they elongate by {in_cm(undamped_m)} cm, "
-        f"{_beside(undamped_m, tight_m)}.",
+        "The tight rods here have the muscles and the damping of the sprung ones, so that only the pins differ. "
+        f"With the damping of their own preset they elongate by {in_cm(own_m)} cm, {_beside(own_m, tight_m)}.",
     ]
     settled = [float(held_elongation(results[case])[0]) for case in _settling(effort)]
     if settled:
         remarks.append(
             f"Held for {LONG_S:g} s in place of {HOLD_S:g} s, tight rods elongate by {in_cm(settled[0])} cm with the "
-            f"damping and {in_cm(settled[1])} cm without: "
+            f"sprung rods' damping and {in_cm(settled[1])} cm with their own: "
             + (
                 "what the damping changes passes; the readings are of meshes still on their way to rest."
-                if abs(settled[1] / settled[0] - 1.0) < 0.5 * abs(undamped_m / tight_m - 1.0)
+                if abs(settled[1] / settled[0] - 1.0) < 0.5 * abs(own_m / tight_m - 1.0)
                 else "what the damping changes lasts."
             )
         )
@@ -255,7 +247,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             "elongation_tight_first_m": kept(tight_m),
             "elongation_sprung_at_paper_stiffness_first_m": kept(at_paper),
             "elongation_stiffest_chain_first_m": kept(chains.elongation_m[-1, 0]) if effort == "full" else None,
-            "elongation_tight_undamped_first_m": kept(undamped_m),
+            "elongation_tight_own_damping_first_m": kept(own_m),
             "elongation_tight_settled_first_m": kept(settled[0]) if settled else None,
             "tight_over_paper": kept(tight_m / paper_m),
             "pin_gap_paper_m": kept(float(chains.gap_m[0].max())),

@@ -21,6 +21,7 @@ _TEXT = {
     "reason": "why a run is not complete",
     "run": "folder of the run",
     "rhythm": "verdict on the rhythm",
+    "warnings": "what is doubtful about a run, a sentence a line",
 }
 
 
@@ -59,6 +60,7 @@ def dataset_of(sweep: Sweep) -> xr.Dataset:
             "base_config": plan.base.model_dump_json(),
             "annelid_version": annelid.__version__,
             "n_failed": sum(run.status == "failed" for run in sweep.runs),
+            "n_warned": sum(bool(run.warnings) for run in sweep.runs),
         },
     )
 
@@ -95,6 +97,7 @@ def _texts(runs: Sequence[SweepRun]) -> dict[str, list[str]]:
         "reason": [run.reason for run in runs],
         "run": ["" if run.outcome is None else run.outcome.path.name for run in runs],
         "rhythm": ["" if run.outcome is None else run.outcome.rhythm.verdict or "" for run in runs],
+        "warnings": ["\n".join(run.warnings) for run in runs],
     }
 
 

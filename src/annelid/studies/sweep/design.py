@@ -35,6 +35,8 @@ from annelid.studies.space import Choice, Interval, Variable, from_unit, is_whol
 
 SAMPLE, REPEAT = "sample", "repeat"
 """Dimensions beside those of the varied fields."""
+LONG_S = 100 * 3600.0
+"""Studies that take longer on one core are told of, s."""
 MISSING = "samples of a sweep need SciPy: install it with  pip install 'annelid[sweep]'"
 
 
@@ -106,14 +108,13 @@ def plan_of(study: Study) -> Plan:
     if "seed" in fields and study.repeats > 1:
         raise ConfigError(f"vary 'seed' and repeats = {study.repeats} both set the seed: leave one out")
     levels: dict[str, Sequence[Any]]
+    _check_size(n_runs(study), Case(study.preset, flattened(study.set)).cost_s)
     if study.design == "grid":
         levels = {
             variable.field: _levels(variable, vary.number) for variable, vary in zip(variables, study.vary, strict=True)
         }
-        _refuse_too_many(prod(len(of_field) for of_field in levels.values()) * study.repeats)
         samples = list(product(*levels.values()))
     else:
-        _refuse_too_many((study.samples or 0) * study.repeats)
         samples = [_sample(variables, shares) for shares in unit_samples(study, len(variables))]
         levels = {SAMPLE: range(len(samples))}
     if study.repeats > 1:
@@ -204,9 +205,20 @@ def _values(variables: Sequence[Variable], shares: Sequence[float]) -> Iterator[
             yield from_unit(variable, share)
 
 
-def _refuse_too_many(n: int) -> None:
+def n_runs(study: Study) -> int:
+    """Counts the runs of a study without making them."""
+    if study.design != "grid":
+        return (study.samples or 0) * study.repeats
+    return prod(vary.number or len(vary.values or vary.choices or ()) for vary in study.vary) * study.repeats
+
+
+def _check_size(n: int, cost_s: float) -> None:
+    """Refuses too many runs, and tells of such as take days; ``cost_s`` is that of one run on one core, s."""
+    size = f"the study has {n:,} runs, about {n * cost_s / 3600:,.0f} hours of one core"
     if n > MOST_RUNS:
-        raise ConfigError(f"the study has {n:,} runs: at most {MOST_RUNS:,} can be told in one dataset")
+        raise ConfigError(f"{size}: it must have at most {MOST_RUNS:,}; take fewer values, samples or repeats")
+    if n * cost_s > LONG_S:
+        warnings.warn(size, stacklevel=3)
 
 
 def label(value: Any) -> str:

@@ -52,7 +52,8 @@ NUMBERS: Mapping[str, Number] = {
         ("stride_m", "m", "way per cycle"),
         ("stride_body_lengths", "1", "way per cycle in body lengths"),
         ("slip_ratio", "1", "sliding way over way"),
-        ("cost_of_transport", "1", "cost of transport of the net work"),
+        ("cost_of_transport", "1", "cost of transport of the positive work"),
+        ("cost_of_transport_net", "1", "cost of transport of the net work"),
         ("cost_of_transport_cables", "1", "cost of transport of the cables"),
         ("backward_ratio", "1", "way back over way ahead"),
         ("lateral_drift", "1", "way to the left over way ahead"),
@@ -71,7 +72,7 @@ NUMBERS: Mapping[str, Number] = {
         ("period_std_s", "s", "standard deviation of these intervals"),
         ("full_cycles", "1", "complete waves"),
         ("wave", "1", "whether segments contract in order: 1 or 0"),
-        ("travel_m", "m", "displacement of the centre of mass along x"),
+        ("travel_m", "m", "displacement of the centre of mass forwards"),
         ("travel_path_m", "m", "its way forth and back along x"),
         ("middle_deficit", "1", "interior segments below the first, on the first helix"),
         ("middle_deficit_mean", "1", "interior segments below the first, mean of all helices"),
@@ -89,16 +90,19 @@ NUMBERS: Mapping[str, Number] = {
         "summary",
         "",
         ("elongation_first_helix_pp_m", "m", "elongation on the first helix, peak to peak"),
+        ("elongation_least_pp_m", "m", "least elongation of a segment's sensors, peak to peak"),
+        ("elongation_most_pp_m", "m", "most elongation of a segment's sensors, peak to peak"),
         ("elongation_mean_max_m", "m", "largest mean elongation"),
         ("segment_force_median_N", "N", "median force of the muscles while contracted"),
         ("segment_force_peak_N", "N", "largest force of the muscles while contracted"),
-        ("muscle_work_J", "J", "work of the muscles"),
+        ("positive_work_J", "J", "positive work of the muscles"),
+        ("muscle_work_J", "J", "net work of the muscles"),
         per_segment=True,
     ),
     **_table(
         "energy",
         "energy_",
-        ("muscle_work_J", "J", "work of all muscles"),
+        ("muscle_work_J", "J", "net work of all muscles"),
         ("kinetic_J", "J", "gain of kinetic energy"),
         ("elastic_J", "J", "gain of elastic energy"),
         ("potential_J", "J", "gain of the energy of the weight"),
@@ -111,7 +115,7 @@ NUMBERS: Mapping[str, Number] = {
     **_table("rhythm", "rhythm_", ("regularity", "1", "regularity of the rhythm, 1 for an even wave")),
 }
 """All numbers of summary, gait and energy balance by name, those first that a gait is judged by."""
-PREFERRED = ("speed_m_per_s", "cost_of_transport_cables", "slip_ratio", "period_s", "travel_m", "elongation_mean_max_m")
+PREFERRED = ("speed_m_per_s", "cost_of_transport", "slip_ratio", "period_s", "travel_m", "elongation_mean_max_m")
 """What a table and a figure tell first unless the study says otherwise."""
 
 

@@ -65,13 +65,15 @@ def write_rows(sweep: Sweep, data: xr.Dataset, path: Path) -> Path:
             *([] if seeds is None else [seeds[run.point.place[-1]]]),
             run.status,
             run.reason,
+            " | ".join(run.warnings),
             "" if run.outcome is None else run.outcome.path.name,
             *("" if np.isnan(values[i]) else f"{values[i]:.10g}" for values in columns.values()),
         ]
         for i, run in enumerate(sweep.runs)
     )
     repeat = [] if seeds is None else ["seed"]
-    return write_csv(path, ["number", *sweep.plan.fields, *repeat, "status", "reason", "run", *columns], rows)
+    heads = ["number", *sweep.plan.fields, *repeat, "status", "reason", "warnings", "run", *columns]
+    return write_csv(path, heads, rows)
 
 
 def told_numbers(sweep: Sweep, data: xr.Dataset) -> list[str]:
@@ -129,12 +131,18 @@ def _title(sweep: Sweep, told: Sequence[str]) -> str:
 def _caption(sweep: Sweep) -> str:
     n, reasons = len(sweep.runs), failures(sweep)
     lines = [f"{n} runs, of which {sum(run.status == 'complete' for run in sweep.runs)} are complete"]
+    doubtful = [i for i, run in enumerate(sweep.runs) if run.warnings]
+    if doubtful:
+        lines[0] += f", and {len(doubtful)} have warnings (run {_listed(doubtful)}), which {ROWS} has"
     for reason, numbers in reasons[:N_FAILED]:
-        first = ", ".join(map(str, numbers[:5])) + (", .." if len(numbers) > 5 else "")
-        lines.append(f"{len(numbers)} {reason} (run {first})")
+        lines.append(f"{len(numbers)} {reason} (run {_listed(numbers)})")
     if len(reasons) > N_FAILED:
         lines.append(f"{len(reasons) - N_FAILED} more reasons in {ROWS}")
     return "\n".join(lines)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:5])) + (", .." if len(numbers) > 5 else "")
 
 
 def _place(sweep: Sweep, data: xr.Dataset, run: SweepRun) -> list[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from annelid.config import Cluster, Study, find_cluster, load_study
-from annelid.errors import AnnelidError, RunFileError
+from annelid.errors import AnnelidError
+from annelid.simulation.lock import locks
 from annelid.studies.case import refusal
 from annelid.studies.cluster import workers_of
 from annelid.studies.outcome import Outcome
@@ -40,6 +42,11 @@ class SweepRun:
     reason: str
     outcome: Outcome | None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about it, a sentence each."""
+        return () if self.outcome is None else self.outcome.summary.warnings
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -58,6 +65,7 @@ class Sweep:
     folder: Path
 
 
+@locks("folder")
 def sweep(
     study: Study | str | Path | Mapping[str, Any],
     folder: str | Path = "sweep",
@@ -73,14 +81,15 @@ def sweep(
     Args:
         study: The study, the path of its TOML file, or a nested mapping.
         folder: Folder for ``sweep.nc``, ``sweep.csv``, a figure, and the runs, which a second call finds there.
-        cluster: Where runs are computed, instead of where the study says: a section, or a word as `find_cluster` takes.
+        cluster: Where runs are computed: a section, or a word as `find_cluster` takes; default: processes of this
+            machine. What a study says of it is not used, since a scheduler and a job run code: name its file here.
         jobs: Workers, instead of as many as there are cores, or as the cluster says.
         progress: Called at the start and after every run.
 
     Returns:
         Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
-        ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason`` and ``run``
-        tell of each run whether it is complete, why not, and its folder.
+        ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason``, ``warnings``
+        and ``run`` tell of each run whether it is complete, why not, what is doubtful about it, and its folder.
 
     Raises:
         ConfigError: The study is refused, or all of its runs are.
@@ -92,7 +101,8 @@ def sweep(
     from annelid.studies.sweep.dataset import dataset_of
     from annelid.studies.sweep.results import write_results
 
-    done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress)
+    to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
+    done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
     data = dataset_of(done)
     write_results(done, data)
     return data
@@ -105,15 +115,33 @@ def swept(
     cluster: Cluster | str | None = None,
     jobs: int | None = None,
     progress: StudyProgress | None = None,
+    to_use: str = "pass it as cluster",
 ) -> Sweep:
-    """Computes a sweep as `sweep` does, and writes nothing but the runs."""
-    if folder.exists() and not folder.is_dir():
-        raise RunFileError(f"{folder} is a file: name a folder")
+    """Computes a sweep as `sweep` does, in a folder that the caller has locked, and writes nothing but the runs.
+
+    Args:
+        study: The study.
+        folder: As of `sweep`.
+        cluster: As of `sweep`.
+        jobs: As of `sweep`.
+        progress: As of `sweep`.
+        to_use: What the user has to do to have the cluster used that the study describes, for a sentence.
+    """
     numbers = chosen_numbers(study.outputs)
     check_rank(study.rank, numbers)
+    if cluster is None and study.cluster is not None:
+        warnings.warn(
+            f"the study {study.name!r} describes a cluster ({study.cluster}): not used; {to_use} to use it",
+            stacklevel=2,
+        )
+    chosen = find_cluster(cluster or "processes") if cluster is None or isinstance(cluster, str) else cluster
+    its_workers = workers_of(chosen, jobs)
     plan = plan_of(study)
-    chosen = study.cluster if cluster is None else find_cluster(cluster) if isinstance(cluster, str) else cluster
-    refused = [refusal(point.case) for point in plan.points]
+    refused = []
+    for i, point in enumerate(plan.points):
+        if progress is not None:
+            progress("checking the study", i, len(plan.points), i / len(plan.points))
+        refused.append(refusal(point.case))
     first = refused[0]
     if first is not None and all(refused):
         raise first
@@ -124,7 +152,7 @@ def swept(
         if progress is not None:
             progress(f"sweep, {len(failed)} failed" if failed else "sweep", done, total, share)
 
-    with workers_of(chosen, jobs) as workers:
+    with its_workers as workers:
         outcomes = Store(folder / RUNS, workers, study.keep).compute(built, progress=tell, failed=failed)
     runs = tuple(
         _run(point, outcomes, failed) if error is None else SweepRun(point, "failed", str(error), None)

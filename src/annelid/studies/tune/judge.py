@@ -40,12 +40,12 @@ OBJECTIVES: Mapping[str, Objective] = {
     one.name: one
     for one in (
         Objective("speed", "speed (m/s)", "more", 0.0, lambda gait: gait.speed_m_per_s),
-        Objective("cost-of-transport", "cost of transport", "less", 100.0, lambda gait: gait.cost_of_transport_cables),
+        Objective("cost-of-transport", "cost of transport", "less", 100.0, lambda gait: gait.cost_of_transport),
         Objective("slip", "slip ratio", "less", 10.0, lambda gait: gait.slip_ratio),
     )
 }
-"""The objectives. The cost of transport is that of the cables, as the authors state it. The penalties are worse than
-any gait that advances: no speed, and a cost and a slip beyond reach."""
+"""The objectives. The cost of transport counts positive work, none of it regained. The penalties are worse than any
+gait that advances: no speed, and a cost and a slip beyond reach."""
 
 
 @dataclass(frozen=True, slots=True)

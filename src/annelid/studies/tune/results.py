@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.config import field_value, toml_value
+from annelid.config import field_value
 from annelid.studies.tune.judge import OBJECTIVES, Objective
 from annelid.studies.tune.search import START, Task, Trial, best, compromise, front
+from annelid.textfiles import nested, toml_text, toml_value
 from annelid.view.figures.tuning import Mark, pareto_figure, progress_figure
 from annelid.view.output import whole_file, write_csv
 
@@ -22,8 +22,9 @@ HISTORY, BEST, FRONT, FIGURE = "trials.csv", "best.toml", "front", "tuning"
 _ROWS = {
     "speed (m/s)": "speed_m_per_s",
     "body lengths/s": "speed_body_lengths_per_s",
-    "cost of transport": "cost_of_transport_cables",
-    "the same, net work": "cost_of_transport",
+    "cost of transport": "cost_of_transport",
+    "the same, net work": "cost_of_transport_net",
+    "the same, cables": "cost_of_transport_cables",
     "slip ratio": "slip_ratio",
     "period (s)": "period_s",
     "cycles": "cycles",
@@ -98,15 +99,17 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> None:
     before = task.start.config
     is_file = task.source.endswith(".toml")
     source = str(Path(task.source).resolve()) if is_file else task.source
-    lines = [f"# Tuned by: {command}", f"# {'Trial ' if trial.number != START else ''}{_name(trial)}:"]
-    lines += [f"#   {label}: {number}" for label, number in gait_lines(trial)]
-    lines += [f"extends = {json.dumps(source)}", f"name = {json.dumps(path.stem)}"]
-    lines += [f"summary = {json.dumps(f'{before.name}, tuned for {_words(task.objectives)}')}"]
-    lines += [f"{field} = {toml_value(value)}" for field, value in task.changes.items()]
-    for field, value in trial.values.items():
-        lines.append(f"{field} = {toml_value(value)}    # {toml_value(field_value(before, field))} before")
+    lines = [f"Tuned by: {command}", f"{'Trial ' if trial.number != START else ''}{_name(trial)}:"]
+    lines += [f"  {label}: {number}" for label, number in gait_lines(trial)]
+    lines += [f"  before: {field} = {toml_value(field_value(before, field))}" for field in trial.values]
+    tree = {
+        "extends": source,
+        "name": path.stem,
+        "summary": f"{before.name}, tuned for {_words(task.objectives)}",
+        **nested({**task.changes, **trial.values}),
+    }
     with whole_file(path) as draft:
-        draft.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        draft.write_text(toml_text(tree, "\n".join(lines)), encoding="utf-8")
 
 
 def gait_lines(trial: Trial) -> list[tuple[str, str]]:
@@ -118,7 +121,7 @@ def gait_lines(trial: Trial) -> list[tuple[str, str]]:
         ("speed (m/s)", _short(gait.speed_m_per_s)),
         ("speed (body lengths/s)", _short(gait.speed_body_lengths_per_s)),
         ("period (s)", _short(gait.period_s)),
-        ("cost of transport", _short(gait.cost_of_transport_cables)),
+        ("cost of transport", _short(gait.cost_of_transport)),
         ("slip ratio", _short(gait.slip_ratio)),
     ]
     return [(label, number) for label, number in found if number]

@@ -61,6 +61,7 @@ class Trial:
         case: The run.
         judged: What was found.
         path: Folder of the run.
+        failed: Whether it could not be computed, though it could be built.
     """
 
     number: int
@@ -68,6 +69,7 @@ class Trial:
     case: Case
     judged: Judged
     path: Path = field(compare=False)
+    failed: bool = False
 
 
 def search(
@@ -175,8 +177,9 @@ def judged_run(store: Store, case: Case) -> Judged:
 
 def _trial(case: Case, store: Store, number: int, values: Mapping[str, Any], error: Exception | None = None) -> Trial:
     if error is not None:
-        what = "cannot be built" if isinstance(error, ConfigError) else "failed"
-        return Trial(number, values, case, Judged(None, f"{what}: {error}"), Path())
+        failed = not isinstance(error, ConfigError)
+        what = "failed" if failed else "cannot be built"
+        return Trial(number, values, case, Judged(None, f"{what}: {error}"), Path(), failed)
     return Trial(number, values, case, judged_run(store, case), store.path(case))
 
 

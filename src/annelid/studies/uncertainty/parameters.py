@@ -6,7 +6,6 @@ beside this module is what ``annelid calibrate`` writes. They are relative and a
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
@@ -18,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from annelid.config import RunConfig, WormBody
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.morphology import Array
 from annelid.studies.calibration.fit import PARAMETERS
 from annelid.studies.calibration.loop import wrap_factors
+from annelid.textfiles import parse_json, read_text
 
 CABLE = "cable_friction"
 FIELDS: Mapping[str, tuple[str, ...]] = {
@@ -94,17 +94,17 @@ def read_spread(path: Path | None = None) -> Spread:
     Raises:
         ConfigError: The file cannot be read, is no such file, or the fit does not tell a parameter at all.
     """
-    source = resources.files(__package__ or __name__) / CALIBRATION if path is None else path
+    bundled = (resources.files(__package__ or __name__) / CALIBRATION).read_text(encoding="utf-8")
     try:
-        content: dict[str, Any] = json.loads(source.read_text(encoding="utf-8"))
+        content: dict[str, Any] = parse_json(bundled if path is None else read_text(path), str(path))
         fitted = {str(name): (float(of["value"]), of["relative_error"]) for name, of in content["parameters"].items()}
         rows: list[list[float | None]] = content["correlation"]
         correlation = np.array([[np.nan if value is None else value for value in row] for row in rows], dtype=float)
         if correlation.shape != (len(fitted), len(fitted)):
             raise ValueError("shape")
-    except OSError as error:
-        raise ConfigError(f"cannot read {path}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except UnreadableText:
+        raise
+    except (ValueError, OverflowError, KeyError, TypeError, AttributeError):
         raise ConfigError(f"{path} is no calibration.json of `annelid calibrate`") from None
     for name, (_, error) in fitted.items():
         if name not in FIELDS:

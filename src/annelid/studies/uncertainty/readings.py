@@ -52,6 +52,6 @@ def readings(numbers: Summary) -> list[Reading]:
         Reading("middle_deficit_mean", "middle deficit, mean", "1", numbers.middle_deficit_mean, "%", 100.0, 1),
         Reading("middle_deficit", "middle deficit, pp", "1", numbers.middle_deficit, "%", 100.0, 1),
         Reading("contraction_force_median_N", "force, median", "N", numbers.contraction_force_median_N, "N", 1.0, 2),
-        Reading("travel_m", "travel", "m", moved, "mm", 1000.0, 1),
+        Reading("travel_m", "travel forwards", "m", moved, "mm", 1000.0, 1),
         Reading("speed_m_per_s", "speed", "m/s", speed, "mm/s", 1000.0, 2),
     ]

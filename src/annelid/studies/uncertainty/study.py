@@ -22,6 +22,7 @@ from typing import Any, Literal
 
 from annelid.config import RunConfig, WormBody, load_config
 from annelid.errors import ConfigError, SimulationStopped
+from annelid.simulation.lock import locks
 from annelid.simulation.runfile import FILE_NAME, read_config, refuse_used_folder
 from annelid.studies.case import Work, run_command
 from annelid.studies.outcome import Outcome
@@ -126,6 +127,7 @@ class Uncertainty:
         return sum(run.verdict is None and not run.message for run in self.of("drawn"))
 
 
+@locks("folder")
 def uncertainty(
     config: RunConfig,
     n: int,

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.analysis.travel import way_ahead
 from annelid.config import WormBody
 from annelid.errors import RunFileError
 from annelid.view.canvas import canvas, save
-from annelid.view.style import panel_title, segment_colors
+from annelid.view.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,13 +102,14 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
         for run, way, above, color in zip(runs, ways, seen, segment_colors(len(runs)), strict=True):
             if way is None:
                 continue
-            panels[0].plot(run.data["time"].values, -way[:, 0], color=color)
+            ahead = way_ahead(run)
+            panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), color=color)
             if above:
                 panels[1].plot(way[:, 0], way[:, 1], color=color)
                 panels[1].plot(*way[-1, :2], marker="o", markersize=4, color=color)
         if any(seen):
             panel_title(panels[1], "Track of the middle from above (cm)")
-            panels[1].set_xlabel("x, front towards the left")
+            panels[1].set_xlabel("x, front towards the left (heading 0)")
             panels[1].set_ylabel("y")
             panels[1].set_aspect("equal", adjustable="datalim")
         _legend(figure, labels, drawn)
@@ -164,5 +166,5 @@ def _legend(figure: Figure, labels: Sequence[str], drawn: Sequence[bool]) -> Non
     from matplotlib.lines import Line2D
 
     runs = zip(segment_colors(len(labels)), labels, drawn, strict=True)
-    handles = [Line2D([], [], color=color, linewidth=2.0, label=label) for color, label, shown in runs if shown]
+    handles = [Line2D([], [], color=color, linewidth=2.0, label=plain(label)) for color, label, shown in runs if shown]
     figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 3))

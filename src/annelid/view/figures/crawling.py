@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.view.canvas import canvas, save_both
-from annelid.view.style import panel_title, segment_colors
+from annelid.view.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +77,7 @@ def _draw(axes: Axes, lines: Sequence[Line], name: str) -> None:
     for line, color, marker in zip(lines, segment_colors(4), _MARKERS, strict=False):
         y = np.array([np.nan if one is None else one for one in getattr(line, name)], dtype=float)
         x = np.array(line.values)
-        axes.plot(x, y, marker=marker, markersize=4.0, color=color, label=line.gait)
+        axes.plot(x, y, marker=marker, markersize=4.0, color=color, label=plain(line.gait))
         lost = np.isnan(y)
         edge = axes.get_xaxis_transform()
         axes.plot(x[lost], np.full(lost.sum(), 0.04), "x", color=color, transform=edge, markersize=5.0)

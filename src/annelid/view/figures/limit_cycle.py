@@ -11,7 +11,7 @@ import numpy as np
 from annelid.analysis.limit_cycle import LimitCycle
 from annelid.view.canvas import canvas, save
 from annelid.view.plots import plot_path
-from annelid.view.style import panel_title, segment_colors
+from annelid.view.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +77,7 @@ def _magnitudes(axes: Axes, cycles: Mapping[str, LimitCycle]) -> None:
             color=color,
             markersize=4.0,
             markerfacecolor="none" if i else color,
-            label=name,
+            label=plain(name),
         )
     axes.axhline(1.0, color="0.35", linestyle=":", linewidth=1.0)
     axes.set_yscale("log")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from annelid.morphology import Array
 from annelid.view.canvas import canvas, save_both
-from annelid.view.style import segment_colors
+from annelid.view.style import plain, segment_colors
 
 _MM = 1e3
 _LINE_WIDTHS = (1.6, 0.9)
@@ -30,9 +30,8 @@ def load_frame_figure(loops: Mapping[str, tuple[Array, Array]], stem: str | Path
         axes = figure.subplots()
         colors = segment_colors(len(loops))
         for order, ((name, (displacement, force)), color) in enumerate(zip(loops.items(), colors, strict=True)):
-            axes.plot(
-                _MM * displacement, force, color=color, label=name, zorder=3 - order, linewidth=_LINE_WIDTHS[order > 0]
-            )
+            width = _LINE_WIDTHS[order > 0]
+            axes.plot(_MM * displacement, force, color=color, label=plain(name), zorder=3 - order, linewidth=width)
         axes.set_xlabel("displacement of the cable (mm); a third of it is the change of diameter")
         axes.set_ylabel("force of the cable (N)")
         axes.legend(loc="upper left")

@@ -27,8 +27,7 @@ CAPTION = (
     "Largest elongation of each segment of the physical robot (four segments, mean of the left and the right stretch "
     "sensor), of the paper's model and of the present simulations, a) in centimetres and b) relative to segment 1. "
     "In the robot the two middle segments elongate 37.8 % and 22.2 % less than segment 1, and the last differs from it "
-    "by 2.75 %. Only these maxima of the robot are published, not the time series of its sensors that the original "
-    "figure shows."
+    "by 2.75 %. The original figure shows the robot's sensors over time; numbers are given of these maxima only."
 )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.view.canvas import canvas, save_both
-from annelid.view.style import panel_title, segment_colors
+from annelid.view.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -151,11 +151,12 @@ def _axis(values: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
     if values.dtype.kind in "if":
         return values.astype(float), []
     words = list(dict.fromkeys(values.tolist()))
-    return np.array([words.index(value) for value in values], dtype=float), [(float(i), w) for i, w in enumerate(words)]
+    ticks = [(float(i), plain(str(word))) for i, word in enumerate(words)]
+    return np.array([words.index(value) for value in values], dtype=float), ticks
 
 
 def _cells(values: np.ndarray) -> list[tuple[float, str]]:
-    texts = [f"{value:.4g}" if values.dtype.kind in "if" else str(value) for value in values]
+    texts = [f"{value:.4g}" if values.dtype.kind in "if" else plain(str(value)) for value in values]
     every = ceil(len(texts) / _MOST_TICKS)
     return [(float(i), text) for i, text in enumerate(texts)][::every]
 

@@ -1,7 +1,8 @@
-"""What the colours and arrows of a view mean, as a piece of HTML for the panel and for exported pages."""
+"""What the panel and exported pages say as pieces of HTML: the state of things, and what colours and arrows mean."""
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 
 from annelid.view.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
@@ -30,6 +31,19 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
         for mark, words in rows
     )
     return f'<table style="font-size:0.8em;line-height:1.25;border-collapse:collapse;margin-left:0.6em">{cells}</table>'
+
+
+def status_html(name: str, parts: Sequence[str], below: str) -> str:
+    """Returns the state of things, every word as it was written.
+
+    Args:
+        name: Of the worm.
+        parts: What stands beside it.
+        below: A sentence under it, or none.
+    """
+    line = "&emsp;".join([f"<b>{html.escape(name)}</b>", *map(html.escape, parts)])
+    rest = f'<div style="margin-top:0.5em">{html.escape(below)}</div>' if below else ""
+    return f'<div style="font-size:0.9em;margin:0 0.6em;overflow-wrap:anywhere">{line}{rest}</div>'
 
 
 def _bar(colors: Sequence[Sequence[float]], *, smooth: bool = True) -> str:

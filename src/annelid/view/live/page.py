@@ -14,6 +14,7 @@ from annelid.config import RunConfig
 from annelid.errors import RunFileError
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
+from annelid.view.live.guard import content_policy
 from annelid.view.live.legend import legend_html
 from annelid.view.live.picture import Lines, Painter, Picture
 from annelid.view.live.player import Player, config_of, player_of
@@ -135,6 +136,8 @@ def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> st
         f'<div style="{style}"><b>{name}</b>{pace}<div style="font-size:0.8em;margin:2px 0 6px">{summary}</div>'
         f"{legend}</div>"
     )
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{content_policy()}" />'
+    page = page.replace("<head>", f"<head>{policy}", 1)
     page = page.replace("<title>Viser</title>", f"<title>{name} - annelid</title>", 1)
     end = page.rindex("</body>")
     return page[:end] + caption + page[end:]

@@ -61,7 +61,7 @@ class Panel:
         self._living = living
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
-        self._status = gui.add_markdown("")
+        self._status = gui.add_html("")
         self._transport(show, living, speed)
         self._knobs: dict[Knob, Any] = {}
         self._poke: Any = None
@@ -128,9 +128,9 @@ class Panel:
         box = self._gui.add_checkbox(layer, initial_value=True)
         box.on_update(lambda event: show.ask(show.set_visible, layer, bool(event.target.value)))
 
-    def tell(self, words: str) -> None:
-        """Shows the state of things in the first line, as Markdown."""
-        self._status.content = words
+    def tell(self, status: str) -> None:
+        """Shows the state of things first, as HTML."""
+        self._status.content = status
 
     def show_time(self, time_s: float, span_s: tuple[float, float]) -> None:
         """Moves the slider of time."""

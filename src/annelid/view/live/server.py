@@ -8,22 +8,16 @@ from contextlib import contextmanager
 from typing import Any
 
 from annelid.errors import ConfigError, MissingDependency
-
-try:
-    import viser
-except ImportError:
-    raise MissingDependency(
-        "the live view needs viser: install it with  pip install 'annelid[view]'  or look at a worm without a browser "
-        "with annelid view --native"
-    ) from None
+from annelid.view.live.guard import Guard, is_loopback, viser
 
 LOOPBACK = "127.0.0.1"
+ANY_ADDRESS = ("", "0.0.0.0", "::")
 USUAL_PORT = 8080
 _TRIED_PORTS = 100
 
 
 class Server(viser.ViserServer):
-    """Viser's server without its printed box and without its tunnel to the internet, which any client could open."""
+    """Viser's server without its printed box, behind a guard."""
 
     def __init__(self, host: str = LOOPBACK, port: int = 0) -> None:
         """Starts to serve.
@@ -31,19 +25,42 @@ class Server(viser.ViserServer):
         Args:
             host: Address to listen on.
             port: Port that is free; 0 for any.
-        """
-        with _silent():
-            super().__init__(host=host, port=port, label="annelid", verbose=False)
 
-    def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuses to be shared through a server on the internet."""
-        del verbose
-        return None
+        Raises:
+            MissingDependency: This viser starts its server in another way, so that nothing can guard it.
+        """
+        guard = Guard(host)
+        with _silent(), guard.on_duty():
+            super().__init__(host=host, port=port, label="annelid", verbose=False)
+        try:
+            guard.require_in_place()
+        except MissingDependency:
+            self.stop()
+            raise
+        self.token = guard.token
+
+    @property
+    def address(self) -> str:
+        """Of the page, with the token."""
+        host = self.get_host()
+        if host in ANY_ADDRESS:
+            host = LOOPBACK
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.get_port()}/{self.token}/"
 
     def stop(self) -> None:
         """Ends the server and its threads."""
         with _silent():
             super().stop()
+
+
+def warning_of(host: str) -> str | None:
+    """Returns what it means to listen on an address that other machines reach, or None for one that they do not."""
+    if is_loopback(host):
+        return None
+    return (
+        f"--host {host}: other machines reach this view; whoever has its address, token and all, may do what you may, "
+        "and whoever listens on the network in between can read it"
+    )
 
 
 def free_port(host: str, wanted: int | None) -> int:

@@ -15,7 +15,7 @@ from annelid.errors import AnnelidError
 from annelid.morphology import Array
 from annelid.simulation.runfile import Run
 from annelid.view.live.knobs import knobs_of
-from annelid.view.live.legend import legend_html
+from annelid.view.live.legend import legend_html, status_html
 from annelid.view.live.moments import Moment
 from annelid.view.live.panel import Panel
 from annelid.view.live.picture import Painter
@@ -50,7 +50,7 @@ class Show:
     Attributes:
         player: What is shown when.
         picture: What is seen, in the model's axes.
-        address: Of the page.
+        address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
     """
 
@@ -83,7 +83,7 @@ class Show:
         self._knobs = knobs_of(self._config) if living else ()
         self._plots = plots_of(self.player.reel.names)
         self._server = Server(host, port)
-        self.address = f"http://{'localhost' if host == LOOPBACK else host}:{self._server.get_port()}"
+        self.address = self._server.address
         self._stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
         self._panel = Panel(
             self._server,
@@ -183,7 +183,7 @@ class Show:
         if worm is None or self.player.stopped:
             return
         if not self.player.at_end:
-            self._notice = "This is the past: press *now* and poke the worm again."
+            self._notice = "This is the past: press now and poke the worm again."
             return
         origin, sight = self._stage.to_model(np.asarray(origin_m), np.asarray(direction))
         place = struck(self.picture.strands.reshape(-1, 3).astype(float), origin, sight)
@@ -240,12 +240,12 @@ class Show:
             self._pace.popleft()
         passed = now - self._pace[0][0]
         pace = (time_s - self._pace[0][1]) / passed if passed > 0 else 0.0
-        words = f"**{self._config.name}** &nbsp; {time_s:.2f} s"
+        parts, below = [f"{time_s:.2f} s"], self._notice
         if player.stopped:
-            words += f"\n\nStopped: {player.stopped}. Move the sliders back and restart."
+            below = f"Stopped: {player.stopped}. Move the sliders back and restart. {self._notice}"
         elif not player.playing:
-            words += " &nbsp; paused"
+            parts.append("paused")
         else:
-            words += f" &nbsp; {max(pace, 0.0):.2f} &times; real time"
-            words += "" if player.worm is None or player.at_end else " &nbsp; (the past)"
-        return words + (f"\n\n{self._notice}" if self._notice else "")
+            parts.append(f"{max(pace, 0.0):.2f} \N{MULTIPLICATION SIGN} real time")
+            parts += [] if player.worm is None or player.at_end else ["(the past)"]
+        return status_html(self._config.name, parts, below)

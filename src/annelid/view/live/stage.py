@@ -18,9 +18,9 @@ from annelid.arena.scenery import (
     RAIL_RGBA,
 )
 from annelid.arena.shapes import shape_of
-from annelid.config import Floor, Pipe, RunConfig
-from annelid.morphology import Array
-from annelid.view.camera import FIELD_OF_VIEW_DEG, VIEWS_DEG, fitting_distance, picture_axes
+from annelid.config import Floor, Pipe, RunConfig, WormBody
+from annelid.morphology import Array, heading_turn
+from annelid.view.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.view.drawn_worm import upright
 from annelid.view.live.picture import CONTACT_COLOR, Colors, Picture
 
@@ -36,7 +36,7 @@ STRAND_PIXELS, RING_PIXELS, SPRING_PIXELS = 3.0, 6.0, 3.5
 LAYERS = ("strands", "rings", "springs", "contacts", "ground")
 """What can be shown or hidden, by the names of the nodes."""
 FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
-"""What is drawn of the floor: the worm leads towards -x."""
+"""What is drawn of the floor, for a worm that leads towards -x; it turns with the heading at the start."""
 SQUARE_M = 0.2
 SQUARE_COLOR = (0.80, 0.83, 0.86)
 STRIP_M = 0.003
@@ -91,10 +91,12 @@ class Stage:
             head_length=0.022,
         )
         length = float(np.ptp(first.strands[..., 0]))
-        _add_ground(server, config, length)
+        assert isinstance(config.body, WormBody)
+        heading = config.body.heading_deg
+        _add_ground(server, config, length, heading)
         self._first_middle = first.middle
         self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
-        self._place_camera(server, first)
+        self._place_camera(server, first, heading)
 
     def show(self, picture: Picture, *, follow: bool) -> None:
         """Shows another instant.
@@ -127,10 +129,10 @@ class Stage:
         """Turns a ray of the page into the model's axes."""
         return (origin - self.shift_m) @ self.turn, direction @ self.turn
 
-    def _place_camera(self, server: viser.ViserServer, first: Picture) -> None:
+    def _place_camera(self, server: viser.ViserServer, first: Picture, heading_deg: float) -> None:
         points = first.strands.reshape(-1, 3) @ self.turn.T
         target = (points.min(axis=0) + points.max(axis=0)) / 2
-        angles = VIEWS_DEG["isometric"]
+        angles = view_angles("isometric", heading_deg)
         _, _, sight = picture_axes(*angles)
         distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
         camera = server.initial_camera
@@ -139,7 +141,7 @@ class Stage:
         camera.position = target - distance * sight
 
 
-def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -> None:
+def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, heading_deg: float) -> None:
     """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
     scene, arena = server.scene, config.arena
     assert arena is not None
@@ -168,7 +170,7 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float) -
         # The plainest of the viewer's materials.
         scene.add_mesh_simple(
             f"{_ROOT}/ground/floor",
-            vertices,
+            vertices @ heading_turn(heading_deg).T,
             faces,
             color=SQUARE_COLOR,
             material="toon3",

@@ -1,0 +1,43 @@
+"""Makes sure, before the engine is used for the first time, that it is one and not two in one folder."""
+
+from __future__ import annotations
+
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
+
+from annelid.errors import MixedEngine
+
+REMEDY = "pip uninstall -y mujoco mujoco-core; pip install 'mujoco-core[rendering]>=4.0.1'"
+
+
+def mixed_engine() -> str | None:
+    """Tells whether the packages mujoco and mujoco-core are installed over each other, as pip allows; None if not."""
+    try:
+        core, other = distribution("mujoco-core"), distribution("mujoco")
+    except PackageNotFoundError:
+        return None
+    theirs = _files(other)
+    differ = sorted(path for path, mark in _files(core).items() if theirs.get(path, mark) != mark)
+    if not differ:
+        return None
+    return (
+        f"mujoco {other.version} and mujoco-core {core.version} are installed over each other: {len(differ)} files of "
+        f"one are in the other's place, such as {differ[0].rsplit('/site-packages/')[-1]}"
+    )
+
+
+def refuse_mixed_engine() -> None:
+    """Refuses an engine of two versions.
+
+    Raises:
+        MixedEngine: Two are installed over each other; the sentence has the line that repairs it.
+    """
+    if mixed := mixed_engine():
+        raise MixedEngine(f"{mixed}; repair it with: {REMEDY}")
+
+
+def _files(installed: Distribution) -> dict[str, str]:
+    """Where a distribution puts the files of the engine, and the mark of each one's content."""
+    files = installed.files or ()
+    return {
+        str(installed.locate_file(file)): file.hash.value for file in files if file.parts[0] == "mujoco" and file.hash
+    }

@@ -1,0 +1,200 @@
+"""The one reader and the one writer of TOML and JSON; what is read is bounded in size and depth."""
+
+from __future__ import annotations
+
+import json
+import re
+import stat
+import tomllib
+from collections.abc import Mapping
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+from annelid.errors import UnreadableText, shortened
+from annelid.text import printable
+
+MOST_BYTES = 8_000_000
+"""Of a text that is read; the longest one that annelid writes, a network of 200 segments, has 6 MB."""
+MOST_LEVELS = 64
+"""Tables and lists within each other, and parts of a dotted key."""
+
+# The parser takes time that grows with the square of a key's parts, so long keys are found before it sees them. What is
+# no key is left out as the parser reads it: a text in three quotes may end in five. One that is not closed ends with
+# its line, or with the text: nothing is tried twice, which would take time that grows with the square of its length.
+_NOT_KEYS = re.compile(
+    r"""
+    "{3} (?: [^"\\]++ | \\.?+ | "(?!"") )*+ (?: "{3,5} )?
+    | '{3} .*? (?: '{3,5} | \Z )
+    | " (?: [^"\\\n]++ | \\.?+ )*+ "?
+    | ' [^'\n]*+ '?
+    | \# [^\n]*+
+    """,
+    re.DOTALL | re.VERBOSE,
+)
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
+
+
+def read_text(path: Path, what: str = "") -> str:
+    """Reads a text file, with or without a byte order mark.
+
+    Args:
+        path: The file.
+        what: What it is, for the sentence, if more than a file.
+
+    Raises:
+        UnreadableText: It cannot be read, is no regular file, is longer than `MOST_BYTES`, or is not UTF-8.
+    """
+    named = f"{what} {path}".strip()
+    try:
+        # Asked first, since opening a pipe would wait for a writer.
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise UnreadableText(f"cannot read {named}: it is a folder, a pipe or a device, not a file")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise UnreadableText(f"cannot read {named}: {error.strerror}") from None
+    except ValueError as error:
+        raise UnreadableText(f"cannot read {shortened(named)!r}: {error}") from None
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UnreadableText(f"cannot read {named}: it is not UTF-8 at byte {error.start}") from None
+    return _bounded(text, str(path), len(content))
+
+
+def read_toml(path: Path, what: str = "the configuration file") -> dict[str, Any]:
+    """Reads a TOML file.
+
+    Raises:
+        UnreadableText: It cannot be read (`read_text`), or is not valid TOML (`parse_toml`).
+    """
+    return parse_toml(read_text(path, what), str(path))
+
+
+def read_json(path: Path, what: str = "") -> Any:
+    """Reads a JSON file.
+
+    Raises:
+        UnreadableText: It cannot be read (`read_text`), or is not valid JSON (`parse_json`).
+    """
+    return parse_json(read_text(path, what), str(path))
+
+
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Reads TOML.
+
+    Args:
+        text: The text.
+        name: What it is called in an error.
+
+    Raises:
+        UnreadableText: It is not valid TOML, too long or too deep.
+    """
+    text = _bounded(text, name, len(text))
+    if _has_long_key(text):
+        raise _too_deep(name)
+    try:
+        tree = tomllib.loads(text)
+    except ValueError as error:
+        raise UnreadableText(f"{name} is not valid TOML: {shortened(str(error))}") from None
+    except RecursionError:
+        raise _too_deep(name) from None
+    check_depth(tree, name)
+    return tree
+
+
+def parse_json(text: str, name: str) -> Any:
+    """Reads JSON, as `parse_toml` reads TOML."""
+    try:
+        tree = json.loads(_bounded(text, name, len(text)))
+    except ValueError as error:
+        raise UnreadableText(f"{name} is not valid JSON: {shortened(str(error))}") from None
+    except RecursionError:
+        raise _too_deep(name) from None
+    check_depth(tree, name)
+    return tree
+
+
+def check_depth(tree: Any, name: str) -> None:
+    """Refuses lists and mappings nested deeper than `MOST_LEVELS`, such as one that holds itself.
+
+    Raises:
+        UnreadableText: It is too deep.
+    """
+    open_nodes = [(tree, 0)]
+    while open_nodes:
+        node, level = open_nodes.pop()
+        if level > MOST_LEVELS:
+            raise _too_deep(name)
+        inner = node.values() if isinstance(node, Mapping) else node if isinstance(node, list | tuple) else ()
+        open_nodes.extend((each, level + 1) for each in inner)
+
+
+def toml_text(tree: Mapping[str, Any], heading: str = "") -> str:
+    """Writes a TOML document, of which `parse_toml` makes the same tree; None is left out.
+
+    Args:
+        tree: Tables, lists, strings, numbers and truth values by name.
+        heading: Lines of comment above everything.
+    """
+    import tomlkit
+
+    document = tomlkit.document()
+    for line in heading.splitlines():
+        # A comment may hold no control characters, and a file no half of a pair of surrogates.
+        document.add(tomlkit.comment(printable(line)))
+    document.update(_plain(tree))
+    return tomlkit.dumps(document)
+
+
+def toml_value(value: Any) -> str:
+    """Writes one value as TOML on one line, as it may stand behind a ``field =``.
+
+    Args:
+        value: A number, a string, a truth value, or lists and tables of these.
+    """
+    import tomlkit
+
+    # Within a list a table is written inline.
+    values = tomlkit.array()
+    values.append(_plain(value))
+    return values[0].as_string()
+
+
+def nested(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Makes a tree of values given by dotted path; a later one goes over, or into, an earlier one."""
+    tree: dict[str, Any] = {}
+    for path, value in fields.items():
+        *sections, field = path.split(".")
+        level = tree
+        for section in sections:
+            level = level.setdefault(section, {})
+        level[field] = _plain(value)
+    return tree
+
+
+def _plain(value: Any) -> Any:
+    """Turns tuples into lists and sections into tables, and leaves None out, which TOML has not."""
+    if hasattr(value, "model_dump"):
+        value = value.model_dump()
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items() if item is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    # numpy's numbers among them.
+    return float(value) if isinstance(value, Real) and not isinstance(value, int | float) else value
+
+
+def _has_long_key(text: str) -> bool:
+    return _LONG_KEY.search(_NOT_KEYS.sub("_", text)) is not None
+
+
+def _bounded(text: str, name: str, size: int) -> str:
+    if size > MOST_BYTES:
+        raise UnreadableText(f"{shortened(name)} is too long: more than {MOST_BYTES / 1e6:g} MB are not read")
+    return text
+
+
+def _too_deep(name: str) -> UnreadableText:
+    return UnreadableText(f"{shortened(name)} is nested too deeply: more than {MOST_LEVELS} levels are not read")

@@ -1,0 +1,154 @@
+"""Whatever a field is given that it cannot have, the error names a field that exists, and the value."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any, Literal, get_args, get_origin
+
+import pytest
+from pydantic.fields import FieldInfo
+
+from annelid.config import RunConfig, Section, load_config, parse_assignments
+from annelid.config.checking import field_paths
+from annelid.errors import ConfigError
+from annelid.textfiles import toml_value
+
+EXISTING = set(field_paths()) | {"body", "arena", "controller", "turning", "sensor", "clock", "record", "guard"}
+HUGE = 10**5000
+NUMBERS = [float("nan"), float("inf"), -float("inf"), 1e300, HUGE, -HUGE, "word", "x" * 100_000, [], {}, {"a": 1}, [[]]]
+WORDS = [0, 1.5, HUGE, [], {}, {"a": 1}, ["word"] * 10_000]
+CHOICES = ["nothing", "x" * 100_000, *WORDS]
+
+
+def kinds_of(annotation: Any) -> list[type[Section]]:
+    """The sections that a field may hold; none where it is no section."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    if get_origin(annotation) is tuple:
+        return []
+    return [section for inner in get_args(annotation) for section in kinds_of(inner)]
+
+
+def literals(annotation: Any) -> bool:
+    return get_origin(annotation) is Literal or any(map(literals, get_args(annotation)))
+
+
+def fields(
+    section: type[Section] = RunConfig, above: tuple[str, ...] = ()
+) -> Iterator[tuple[str, dict[str, str], Any]]:
+    """Every field of every kind: its path, the kinds that make it exist, and its annotation."""
+    for path, kinds, info in _fields(section, above, {}):
+        yield path, kinds, info.annotation
+
+
+def _fields(
+    section: type[Section], above: tuple[str, ...], kinds: dict[str, str]
+) -> Iterator[tuple[str, dict[str, str], FieldInfo]]:
+    for name, info in section.model_fields.items():
+        inner = kinds_of(info.annotation)
+        for each in inner:
+            path = (*above, name)
+            tag = each.model_fields["kind"].default if "kind" in each.model_fields else None
+            chosen = {**kinds, f"{'.'.join(path)}.kind": tag} if tag is not None else kinds
+            yield from _fields(each, path, chosen)
+        if not inner and name != "kind":
+            yield ".".join((*above, name)), kinds, info
+
+
+CASES = list(fields())
+
+
+def wrong(annotation: Any) -> list[Any]:
+    if literals(annotation):
+        return CHOICES
+    told = str(annotation)
+    return WORDS if "str" in told and "float" not in told else NUMBERS
+
+
+@pytest.mark.parametrize(
+    ("path", "kinds", "annotation"), CASES, ids=[f"{'-'.join(kinds.values())}-{path}" for path, kinds, _ in CASES]
+)
+def test_an_error_names_the_field_and_the_value(path: str, kinds: dict[str, str], annotation: Any) -> None:
+    whole = {k: v for k, v in kinds.items() if k != "body.kind" or v != "worm"}
+    refusals = 0
+    for value in wrong(annotation):
+        try:
+            load_config("riddle2023-rods", {**whole, path: value})
+        except ConfigError as error:
+            sentence = str(error)
+        else:
+            continue
+        refusals += 1
+        assert len(sentence) < 500, sentence
+        assert "\n" not in sentence
+        named = sentence.split(" = ")[0].split(" must be given")[0].removeprefix("unknown field ").strip("'")
+        while named not in EXISTING and named.rsplit(".", 1)[-1].isdigit():
+            named = named.rsplit(".", 1)[0]
+        if named == f"{path}.a":
+            continue
+        assert named in EXISTING, sentence
+        if named == path and isinstance(value, str | float):
+            assert str(value)[:20] in sentence
+    # A field may take anything of its type; no field takes everything.
+    assert refusals > 0
+
+
+def test_every_section_has_been_tried() -> None:
+    tried = {path for path, _, _ in CASES}
+    assert {"controller.turn_ms", "controller.descending.lift", "controller.network.range_mV"} <= tried
+    assert len(CASES) > 200
+
+
+@pytest.mark.parametrize("kind", [[1], {}, None, 3, float("inf"), "x" * 100_000, "nope", True])
+def test_a_kind_that_is_none_is_refused(kind: object) -> None:
+    for section in ("body", "body.rings", "body.formulation", "arena", "controller", "turning"):
+        with pytest.raises(ConfigError, match=rf"^{section.replace('.', '[.]')}\.kind = ") as error:
+            load_config("riddle2023-rods", {f"{section}.kind": kind})
+        assert len(str(error.value)) < 500
+
+
+@pytest.mark.parametrize(
+    ("base", "size"),
+    [
+        ("riddle2023-rods", 1e-9),
+        *(
+            pytest.param(base, size, marks=pytest.mark.slow)
+            for base in ("riddle2023-rods", "riddle2025", "riddle2023")
+            for size in (1e-300, 1e-6, 1e-3, 0.0, 1e3, 1e9, 1e15)
+        ),
+    ],
+)
+def test_the_engine_refuses_nothing_that_the_configuration_takes(base: str, size: float) -> None:
+    """What the engine says of a body is told by fields, and nothing else escapes from building it."""
+    from annelid.body.mjcf import mjcf_text
+
+    config = load_config(base, {"body.mesh.elements_per_side": 1})
+    numbers = [
+        path
+        for path, kinds, annotation in CASES
+        if path.startswith("body.")
+        and "float" in str(annotation)
+        and "tuple" not in str(annotation)
+        and all(getattr(config.body, k.split(".")[1], None) is not None for k in kinds if k.count(".") > 1)
+    ]
+    for path in numbers:
+        with warnings.catch_warnings(), suppress(ConfigError):
+            warnings.simplefilter("ignore")
+            mjcf_text(load_config(base, {"body.mesh.elements_per_side": 1, path: size}))
+
+
+def test_what_is_set_on_the_command_line_is_what_was_written() -> None:
+    for value in (
+        1e16,
+        0.1,
+        1000.0,
+        -0.0,
+        True,
+        "🪱",
+        'a "b" \\ \x7f\n',
+        [[0.1, 2.0], []],
+        {"a b": 1, "🪱": {"x": [1.5]}},
+    ):
+        assert parse_assignments([f"field={toml_value(value)}"]) == {"field": value}

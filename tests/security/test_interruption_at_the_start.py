@@ -1,0 +1,125 @@
+"""Interrupted in its first moments, a command ends without a traceback, whatever it is loading."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no signal for one process")
+
+# Sends the signal to itself where the named module is looked for.
+AT_IMPORT = """
+import os, runpy, signal, sys
+class Interrupted:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.{signal})
+sys.meta_path.insert(0, Interrupted())
+sys.argv = ["annelid", "run", "riddle2023-rods", "--duration", "0.1", "--no-video", "--out", "out"]
+runpy.run_module("annelid", run_name="__main__")
+"""
+
+
+def heed_interruption() -> None:
+    """Undoes what nohup and background jobs of a shell do."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.parametrize("module", ["annelid.cli", "typer", "numpy", "annelid.morphology", "h5py", "mujoco._specs"])
+def test_interrupted_while_it_loads_it_ends_in_a_sentence(tmp_path: Path, module: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", AT_IMPORT.format(module=module, signal="SIGINT")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=heed_interruption,
+        timeout=120,
+    )
+    assert done.stderr == "annelid: interrupted\n"
+    assert done.returncode == 130
+
+
+def test_terminated_while_it_loads_it_says_nothing(tmp_path: Path) -> None:
+    code = AT_IMPORT.format(module="typer", signal="SIGTERM")
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (done.returncode, done.stderr) == (-signal.SIGTERM, "")
+
+
+def test_where_interruptions_are_ignored_they_stay_so(tmp_path: Path) -> None:
+    code = AT_IMPORT.replace('"run", "riddle2023-rods", "--duration", "0.1", "--no-video", "--out", "out"', '"presets"')
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(module="typer", signal="SIGINT")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "riddle2023" in done.stdout
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no device that is always full")
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["presets"], ["presets", "riddle2023"]])
+def test_a_full_device_is_a_sentence(arguments: list[str]) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "annelid", *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            timeout=120,
+        )
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+    assert "No space left on device" in done.stderr
+
+
+def test_a_back_end_of_matplotlib_that_is_not_there_does_no_harm(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "annelid",
+            "run",
+            "riddle2022-planar",
+            "--duration",
+            "0.1",
+            "--no-video",
+            "--out",
+            "out",
+        ],
+        cwd=tmp_path,
+        env={**os.environ, "MPLBACKEND": "nope"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "figure7.png").exists()
+
+
+def test_a_terminal_that_knows_ascii_only_is_served(tmp_path: Path) -> None:
+    (tmp_path / "w.toml").write_text('extends = "riddle2022-planar"\nsummary = "🪱"\n', encoding="utf-8")
+    for arguments in (["presets"], ["presets", "riddle2023"], ["presets", "w.toml", "--fields"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "annelid", *arguments],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONIOENCODING": "ascii"},
+            capture_output=True,
+            check=False,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr

@@ -1,0 +1,213 @@
+"""One writer a folder: of two that start together one wins whole, and the other is told who writes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from annelid.cli import app, entry
+from annelid.cli.run import _locked_folder
+from annelid.config import load_config
+from annelid.errors import ConfigError, RunFileError
+from annelid.simulation import open_run, simulate
+from annelid.simulation.lock import LOCK_NAME, locked
+
+PLANAR = "riddle2022-planar"
+
+
+def start(*words: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "annelid", *words]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def holder(folder: Path, then: str) -> subprocess.Popen[str]:
+    """A process that locks a folder, says so, and does something."""
+    code = (
+        "import os, signal, sys\nfrom annelid.simulation.lock import locked\n"
+        f"with locked({str(folder)!r}):\n    print('locked', flush=True)\n    {then}\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "locked\n"
+    return process
+
+
+def test_the_other_is_told_who_writes_and_changes_nothing(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "run"
+    process = holder(folder, "sys.stdin.readline()")
+    before = {entry: entry.stat().st_mtime_ns for entry in folder.iterdir()}
+    with pytest.raises(RunFileError, match=rf"process {process.pid} \(since 20\d\d-.*: -c\) writes into the folder"):
+        simulate(load_config(PLANAR, {"duration_s": 0.05}), folder, overwrite=True)
+    for words in (["run", PLANAR, "-o"], ["calibrate", "-o"], ["bench", "-o"], ["experiment", "pipes", "-o"]):
+        done = CliRunner().invoke(app, [*words, str(folder)])
+        assert done.exit_code == 2
+        assert f"process {process.pid}" in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+    assert {entry: entry.stat().st_mtime_ns for entry in folder.iterdir()} == before
+    process.communicate("end\n", timeout=120)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    assert holder(folder, "os.kill(os.getpid(), signal.SIGKILL)").wait(60) == -signal.SIGKILL
+    assert [entry.name for entry in folder.iterdir()] == [LOCK_NAME]
+    simulate(load_config(PLANAR, {"duration_s": 0.05}), folder)
+    assert [entry.name for entry in folder.iterdir()] == ["run.nc"]
+
+
+def test_the_same_thread_may_lock_again_and_no_other(tmp_path: Path) -> None:
+    with locked(tmp_path), locked(tmp_path / "." / "a" / ".."), locked(tmp_path):
+        assert f"process {os.getpid()}" in refusal_of(tmp_path)
+        assert json.loads((tmp_path / LOCK_NAME).read_text())["pid"] == os.getpid()
+    assert list(tmp_path.iterdir()) == []
+
+
+def refusal_of(folder: Path) -> str:
+    """What another thread is told that wants to write there."""
+    refused: list[str] = []
+
+    def other() -> None:
+        with pytest.raises(RunFileError) as caught, locked(folder):
+            pass
+        refused.append(str(caught.value))
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    thread.join(60)
+    return refused[0]
+
+
+def test_a_folder_that_was_replaced_can_be_locked_by_another(tmp_path: Path) -> None:
+    with locked(tmp_path / "run"):
+        (tmp_path / "run").rename(tmp_path / "moved")
+        simulate(load_config(PLANAR, {"duration_s": 0.05}), tmp_path / "other")
+        process = holder(tmp_path / "run", "pass")
+        process.communicate(timeout=120)
+        assert process.returncode == 0
+
+
+def test_a_lock_file_is_never_written_through(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / LOCK_NAME).symlink_to(tmp_path / "mine")
+    with pytest.raises(RunFileError, match="cannot write into the folder"), locked(tmp_path / "run"):
+        pass
+    assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_what_a_lock_file_says_cannot_steer_the_terminal(tmp_path: Path) -> None:
+    with locked(tmp_path):
+        one = '{"pid": 1, "since": "\\u001b[2J", "command": "a\\nb"}'
+        endless = f'{{"pid": 1e400, "since": "", "command": "{"x" * 3000}"}}'
+        for text in (one, endless, "[" * 4000, "\x1b[2J", '{"pid": "x"}'):
+            (tmp_path / LOCK_NAME).write_text(text)
+            sentence = refusal_of(tmp_path)
+            assert "writes into the folder" in sentence
+            assert sentence.isprintable()
+            assert len(sentence) < 400 + len(str(tmp_path))
+
+
+def test_a_folder_that_cannot_be_made_is_said_to_be_one() -> None:
+    with pytest.raises(RunFileError, match="it cannot be made"), locked("/proc/nowhere/run"):
+        pass
+
+
+@pytest.mark.parametrize(
+    "words", [("calibrate",), ("experiment", "load-frame"), ("experiment", "weak-middle"), ("sweep", "study.toml")]
+)
+def test_an_output_that_is_a_file_is_refused_before_anything_is_computed(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("mine")
+    (tmp_path / "study.toml").write_text(CliRunner().invoke(app, ["sweep", "--example"]).stdout)
+    began = time.process_time()
+    done = CliRunner().invoke(app, [*words, "-o", "taken"])
+    assert (done.exit_code, done.stderr) == (2, "annelid: taken is a file: name a folder\n")
+    assert time.process_time() - began < 10
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "words", [("limit-cycle", "-o", "no/a.png"), ("build", "-o", "no/a.xml"), ("limit-cycle", "-o", "closed/a.png")]
+)
+def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed(
+    words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "closed").mkdir()
+    monkeypatch.setattr("annelid.cli.common.os.access", lambda path, mode: str(path) != "closed")
+    monkeypatch.setattr("annelid.analysis.limit_cycle.limit_cycle", lambda *_, **__: pytest.fail("computed"))
+    done = CliRunner().invoke(app, list(words))
+    assert done.exit_code == 2
+    assert f"{words[-1]} cannot be written" in done.stderr
+
+
+def test_two_runs_into_one_folder(tmp_path: Path) -> None:
+    assert race(tmp_path / "run", 0.3)
+
+
+def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    together = threading.Barrier(16, timeout=60)
+    taken: list[Path] = []
+
+    def begin() -> None:
+        with ExitStack() as stack:
+            entry._locks.set(stack)
+            together.wait()
+            taken.append(_locked_folder(None, "worm"))
+            together.wait()
+
+    threads = [threading.Thread(target=begin) for _ in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert sorted(taken) == [Path("runs", f"worm-{i:03d}") for i in range(1, 17)]
+    # Nothing was written into them.
+    assert list(tmp_path.glob("*/*")) == []
+
+
+@pytest.mark.slow
+def test_50_pairs_of_runs_into_one_folder(tmp_path: Path) -> None:
+    done = [race(tmp_path / str(i), i / 49) for i in range(50)]
+    print(f"\n50 pairs started 0 to 1 s apart: {sum(done)} times one won whole and the other was told")
+    assert all(done)
+
+
+def race(folder: Path, apart_s: float) -> bool:
+    """Starts two runs that differ in seed and duration; true where one is there whole and the other was told."""
+    words = ("run", PLANAR, "--no-video", "-o", str(folder))
+    first = start(*words, "--seed", "1", "--duration", "2")
+    time.sleep(apart_s)
+    second = start(*words, "--seed", "2", "--duration", "2.5")
+    out = {seed: process.communicate(timeout=120) for seed, process in ((1, first), (2, second))}
+    codes = {1: first.returncode, 2: second.returncode}
+    assert sorted(codes.values()) == [0, 2], (codes, out)
+    winner, loser = (1, 2) if codes[1] == 0 else (2, 1)
+    pid = (first if winner == 1 else second).pid
+    assert f"process {pid} (since 20" in out[loser][1], out
+    assert len(out[loser][1].splitlines()) == 1
+    run = open_run(folder)
+    assert (run.config.seed, run.status) == (winner, "complete")
+    assert run.data["time"].values[-1] == pytest.approx({1: 2.0, 2: 2.5}[winner])
+    assert sorted(os.listdir(folder)) == ["figure7.png", "frame.png", "run.nc"]
+    return True
+
+
+def test_nothing_is_left_of_a_run_that_could_not_begin(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError):
+        simulate("no-such-preset", tmp_path / "a" / "b")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,214 @@
+"""Files and texts from strangers: too long, too deep, not text at all. Each is refused in a sentence, at once."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from annelid import Network, simulate
+from annelid.config import find_cluster, load_config, load_study, parse_assignments
+from annelid.errors import AnnelidError, SimulationStopped
+from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
+from annelid.nervous.neurons import Channel, Firing
+from annelid.studies.calibration.loop import read_loop
+from annelid.studies.robustness import read_judged
+from annelid.studies.uncertainty.parameters import read_spread
+from annelid.textfiles import MOST_BYTES, parse_toml
+
+LONGEST_S = 20.0
+TOML = {
+    "brackets": "x = " + "[" * 5000 + "]" * 5000,
+    "inline tables": "x = " + "{a = " * 5000 + "1" + "}" * 5000,
+    "dotted key": ".".join(["a"] * 3000) + " = 1",
+    "dotted key, very long": ".".join(["a"] * 200_000) + " = 1",
+    "dotted key, quoted": ".".join(['"a b"'] * 200_000) + " = 1",
+    "dotted header": "[" + ".".join(["a"] * 3000) + "]\nx = 1",
+    "digits": "duration_s = " + "1" * 5000,
+    "digits in base 16": "duration_s = 0x" + "f" * 100_000,
+    "unknown keys": "".join(f"k{i} = {i}\n" for i in range(30_000)),
+    "unknown keys in a section": "[body.mesh]\n" + "".join(f"k{i} = {i}\n" for i in range(30_000)),
+    "long name of a key": "a" * 1_000_000 + " = 1",
+    "posts": f"[arena]\nposts = [{'[-3.0, 0.1, 0.1], ' * 20_000}]",
+    "long text": f'duration_s = "{"x" * 1_000_000}"',
+    "null": 'x = "\x00"',
+    "nothing closed": 'x = """' + "a" * 100_000,
+    "escaped quotes, not closed": 'x = "' + '\\"' * 500_000,
+    "escaped quotes on every line": 'x = "\\"\n' * 150_000,
+    "escaped quotes, three not closed": 'x = """' + '\\"""' * 250_000,
+    "escaped quotes, three, and a backslash": 'x = """' + '\\"""' * 250_000 + "\\",
+    "backslashes, not closed": 'x = "' + "\\" * 1_000_001,
+    "dotted key behind four quotes": f'x = ["""a"""", """\n"""]\n{".".join(["a"] * 500_000)} = 1\n#"""',
+    "dotted key behind five quotes": f"x = ['''a''''', '''\n''']\n{'.'.join(['a'] * 500_000)} = 1\n#'''",
+    "empty key": '"" = 1',
+}
+
+
+def refused(attempt: Callable[[], object], longest_s: float = LONGEST_S) -> str:
+    """The sentence of an attempt that must be refused, soon."""
+    start = time.process_time()
+    with pytest.raises(AnnelidError) as error:
+        attempt()
+    assert time.process_time() - start < longest_s
+    sentence = str(error.value)
+    assert "\n" not in sentence
+    assert 10 < len(sentence) < 500
+    return sentence
+
+
+@pytest.mark.parametrize("text", TOML.values(), ids=TOML.keys())
+def test_strange_toml_is_refused_by_every_reader(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "w.toml"
+    path.write_text(text, encoding="utf-8")
+    refused(lambda: load_config(path))
+    if len(text) > 200_000:
+        return
+    refused(lambda: load_study(path))
+    refused(lambda: Network.from_toml(text))
+    refused(lambda: find_cluster(str(path)))
+    refused(lambda: load_config("riddle2023-rods", arena=path))
+
+
+@pytest.mark.parametrize("name", [name for name in TOML if "quotes" in name or "backslash" in name])
+def test_a_text_of_a_megabyte_is_refused_at_once(name: str) -> None:
+    refused(lambda: parse_toml(TOML[name], "it"), 2.0)
+
+
+def fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+FILES: dict[str, Callable[[Path], object]] = {
+    "folder": lambda path: path.mkdir(),
+    "link to itself": lambda path: path.symlink_to(path),
+    "endless device": lambda path: path.symlink_to("/dev/zero"),
+    "pipe": fifo,
+    "not UTF-8": lambda path: path.write_bytes(b'x = "\xff\xfe"'),
+    "UTF-16": lambda path: path.write_text("x = 1", encoding="utf-16"),
+    "too long": lambda path: path.write_bytes(b"#" * (MOST_BYTES + 1)),
+    "missing": lambda _: None,
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither such devices nor such pipes")
+@pytest.mark.parametrize("make", FILES.values(), ids=FILES.keys())
+def test_what_is_no_text_file_is_refused_by_every_reader(tmp_path: Path, make: Callable[[Path], object]) -> None:
+    path = tmp_path / "w.toml"
+    make(path)
+    readers = [load_config, load_study, lambda p: find_cluster(str(p)), lambda p: load_config("crawler", arena=p)]
+    for read in [*readers, read_spread, read_loop]:
+        assert str(path) in refused(lambda read=read: read(path))
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000, "1" * 5000, "nul", '{"judged": 1}', ""])
+def test_strange_json_is_refused_by_every_reader(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "robustness.json"
+    path.write_text(text, encoding="utf-8")
+    refused(lambda: read_spread(path))
+    refused(lambda: read_judged(tmp_path))
+
+
+def test_a_byte_order_mark_is_read_over(tmp_path: Path) -> None:
+    path = tmp_path / "w.toml"
+    path.write_text("duration_s = 2.0", encoding="utf-8-sig")
+    assert load_config(path).duration_s == 2.0
+
+
+@pytest.mark.parametrize("n", [2, 3, 1500])
+@pytest.mark.parametrize("closed", [True, False])
+def test_files_that_extend_one_another_have_an_end(tmp_path: Path, n: int, closed: bool) -> None:
+    paths = [tmp_path / f"w{i}.toml" for i in range(n)]
+    for path, base in zip(paths, [*paths[1:], paths[0] if closed else "riddle2023"], strict=True):
+        path.write_text(f"extends = '{base}'", encoding="utf-8")
+    if n < 50 and not closed:
+        assert load_config(paths[0]).name == "w0"
+    else:
+        assert "extend" in refused(lambda: load_config(paths[0]))
+
+
+def test_a_mapping_that_holds_itself_is_refused() -> None:
+    tree: dict[str, object] = {"extends": "riddle2023"}
+    tree["body"] = tree
+    assert "too deeply" in refused(lambda: load_config(tree))
+    assert "too deeply" in refused(lambda: load_study(tree))
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf")])
+def test_a_network_takes_no_number_that_is_not_finite(number: float) -> None:
+    parts: list[Callable[[], object]] = [
+        lambda: Neuron(number),
+        lambda: Neuron(rest_mV=number),
+        lambda: Neuron(bias_nA=number),
+        lambda: Neuron(leak_conductance_uS=number),
+        lambda: Gate(number),
+        lambda: Gate(1.0, power=number),
+        lambda: Channel(1.0, number),
+        lambda: Firing(number),
+        lambda: Firing(adaptation=number),
+        lambda: Synapse(number, 1.0),
+        lambda: Synapse(1.0, number),
+        lambda: Synapse(1.0, 1.0, saturation_mV=number),
+        lambda: GapJunction(number),
+        lambda: SpikingSynapse(1.0, number),
+        lambda: ModulatorySynapse("leak", number),
+        lambda: Network().add_neuron("n", Neuron(), number),
+        lambda: Network.from_toml(f"[[neuron]]\nname = 'a'\nrest_mV = {number}"),
+    ]
+    for part in parts:
+        assert "must be" in refused(part)
+
+
+@pytest.mark.parametrize("name", ["\ud800", 3, None])
+def test_names_that_no_file_can_hold_are_refused(name: object) -> None:
+    network = Network()
+    refused(lambda: network.add_neuron(name, Neuron()))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("config", [3, [], object(), {"durration_s": 1}, {"extends": "nothing"}])
+def test_what_is_no_configuration_is_refused(tmp_path: Path, config: object) -> None:
+    refused(lambda: simulate(config, tmp_path / "run"))  # type: ignore[arg-type]
+    assert not (tmp_path / "run" / "run.nc").exists()
+
+
+def test_a_mapping_is_a_configuration(tmp_path: Path) -> None:
+    run = simulate({"extends": "riddle2022-planar", "duration_s": 0.1}, tmp_path / "run", progress=False)
+    assert run.status == "complete"
+
+
+@pytest.mark.parametrize("kind", ["daltorio2013", "boxerbaum2012"])
+def test_equations_that_cannot_be_solved_stop_the_run(tmp_path: Path, kind: str) -> None:
+    for field in ("torsion_damping_Nms_per_rad", "height_damping_Ns_per_m", "torsion_stiffness_Nm_per_rad"):
+        config = load_config(kind, {f"body.{field}": 1e15, "duration_s": 0.05})
+        with suppress(SimulationStopped):
+            simulate(config, tmp_path / field, progress=False)
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["body.mesh.n_segments", "body.mesh.n_helices", "body.mesh.elements_per_side"],
+)
+def test_a_body_that_takes_hours_to_build_is_refused_with_an_estimate(path: str) -> None:
+    largest = {"body.mesh.n_segments": 200, "body.mesh.n_helices": 96, "body.mesh.elements_per_side": 32}
+    sentence = refused(lambda: load_config("riddle2023-rods", largest))
+    assert path in sentence
+    assert "GB" in sentence
+    for one in largest.items():
+        load_config("riddle2023-rods", {"body.mesh.elements_per_side": 2, **dict([one])})
+
+
+def test_a_video_of_a_billion_pictures_is_refused(tmp_path: Path) -> None:
+    from annelid.view.render import render_video
+
+    run = simulate({"extends": "riddle2022-planar", "duration_s": 0.1}, tmp_path / "run", progress=False)
+    sentence = refused(lambda: render_video(run, tmp_path / "v.mp4", speed=1e-9))
+    assert "speed = 1e-09" in sentence
+    assert not (tmp_path / "v.mp4").exists()
+
+
+def test_what_follows_a_value_is_no_second_field() -> None:
+    assert parse_assignments(["duration_s=1.0\nseed = 3"]) == {"duration_s": "1.0\nseed = 3"}

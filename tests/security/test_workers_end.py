@@ -1,0 +1,178 @@
+"""Workers end with the command that started them, however it ends, and nobody else can reach them."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends POSIX signals")
+
+LIMIT_S = 5.0
+"""All processes of a command must be gone after this time."""
+
+LONG = """
+preset = "riddle2023-rods"
+set.duration_s = 300.0
+[[vary]]
+field = "arena.friction"
+values = [0.3, 0.5, 0.7]
+"""
+
+
+def processes_of(session: int) -> list[psutil.Process]:
+    """Processes that a command has started, itself among them, but for such as wait to be collected."""
+    found = []
+    for process in psutil.process_iter():
+        with suppress(psutil.NoSuchProcess, ProcessLookupError, PermissionError):
+            if os.getsid(process.pid) == session and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(process)
+    return found
+
+
+def workers_of(session: int) -> list[psutil.Process]:
+    """Those of them that compute: neither the command itself nor the helper of `multiprocessing`."""
+    found = []
+    for process in processes_of(session):
+        with suppress(psutil.NoSuchProcess):
+            words = " ".join(process.cmdline())
+            if "spawn_main" in words or "bench.measure" in words:
+                found.append(process)
+    return found
+
+
+def listen_to_signals() -> None:
+    """Has a process end by signals that this one was perhaps told to ignore, as by nohup."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+
+
+@contextmanager
+def started(words: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A command in a session of its own, of which nothing is left in the end."""
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, *words],
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+            text=True,
+            start_new_session=True,
+            preexec_fn=listen_to_signals,
+        )
+        try:
+            yield process
+        finally:
+            for left in processes_of(process.pid):
+                with suppress(psutil.NoSuchProcess):
+                    left.kill()
+            process.wait(60)
+
+
+def wait_for(condition: Callable[[], object], process: subprocess.Popen[str]) -> None:
+    end = time.monotonic() + 120
+    while not condition():
+        assert process.poll() is None, "the command ended before it had workers"
+        assert time.monotonic() < end, "no worker was started"
+        time.sleep(0.05)
+
+
+def left_after(process: subprocess.Popen[str], number: signal.Signals) -> tuple[list[str], float]:
+    """Sends a signal to the command alone.
+
+    Returns:
+        What is still there after the limit, and the time after which nothing was, s.
+    """
+    began = time.monotonic()
+    process.send_signal(number)
+    while (left := processes_of(process.pid)) and time.monotonic() - began < LIMIT_S:
+        time.sleep(0.02)
+        process.poll()
+    return [str(one) for one in left], time.monotonic() - began
+
+
+def test_workers_end_with_a_killed_sweep(tmp_path: Path) -> None:
+    with sweeping(tmp_path, "--cluster", "processes") as process:
+        left, _ = left_after(process, signal.SIGKILL)
+        assert left == []
+
+
+def test_sigterm_ends_a_sweep_as_ctrl_c_does_and_it_opens_no_port(tmp_path: Path) -> None:
+    with sweeping(tmp_path) as process:
+        ports = [one for part in processes_of(process.pid) for one in part.net_connections()]
+        assert [one for one in ports if one.status == psutil.CONN_LISTEN] == []
+        left, _ = left_after(process, signal.SIGTERM)
+        assert left == []
+        assert process.wait(60) == 130
+    log = (tmp_path / "log").read_text()
+    assert "annelid: interrupted: finished runs are kept in sweep/runs; go on with: annelid sweep study.toml" in log
+    assert "Traceback" not in log
+    assert "leaked" not in log
+
+
+@contextmanager
+def sweeping(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """A long sweep that has begun with its first run."""
+    (folder / "study.toml").write_text(LONG)
+    with started(["-m", "annelid", "sweep", "study.toml", "--jobs", "1", *options], folder) as process:
+        wait_for(lambda: any((folder / "sweep" / "runs").glob(".*/run.nc")), process)
+        yield process
+
+
+COMMANDS = {
+    "sweep": ["sweep", "study.toml", "--jobs", "2"],
+    "paper": ["paper", "--quick", "--jobs", "2"],
+    "tune": ["tune", "riddle2025-muscles", "--duration", "100", "--jobs", "2"],
+    "robustness": ["robustness", "--points", "6", "--jobs", "2"],
+    "bench": ["bench", "--quick", "--cases", "levels"],
+    "uncertainty": ["run", "--uncertainty", "4", "--duration", "100", "--jobs", "2", "--out", "out"],
+    "speed": ["experiment", "speed", "--jobs", "2"],
+    "weak-middle": ["experiment", "weak-middle", "--jobs", "2"],
+    "slip": ["experiment", "slip", "--jobs", "2"],
+    "slip-detector": ["experiment", "slip-detector", "--jobs", "2"],
+    "turning": ["experiment", "turning", "--jobs", "2"],
+    "pipes": ["experiment", "pipes", "--jobs", "2"],
+}
+"""Every command that has workers; `bench` takes no --jobs."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_ten_kills_of_each_kind_leave_no_process(name: str, number: signal.Signals, tmp_path: Path) -> None:
+    draws, times, codes = random.Random(name), [], set()
+    for i in range(10):
+        folder = tmp_path / str(i)
+        folder.mkdir()
+        (folder / "study.toml").write_text(LONG)
+        with started(["-m", "annelid", *COMMANDS[name]], folder) as process:
+            wait_for(lambda process=process: workers_of(process.pid), process)
+            time.sleep(draws.uniform(0.0, 4.0))
+            left, seconds = left_after(process, number)
+            assert left == [], f"{name}, {number.name}: left after {LIMIT_S:g} s"
+            times.append(seconds)
+            codes.add(process.wait(60))
+    assert codes == {-signal.SIGKILL if number == signal.SIGKILL else 130}
+    print(f"{name}, {number.name}: {len(times)} kills, nothing left after {max(times):.1f} s at most")
+
+
+def test_every_command_with_workers_is_among_those_killed() -> None:
+    from typer.main import get_command
+
+    from annelid.cli import app
+
+    top: Any = get_command(app)
+    experiments = top.commands["experiment"].commands
+    named = {name: command for name, command in (top.commands | experiments).items() if name != "experiment"}
+    with_jobs = {name for name, command in named.items() if any(one.name == "jobs" for one in command.params)}
+    assert {"uncertainty" if name == "run" else name for name in with_jobs} == set(COMMANDS) - {"bench"}

@@ -1,0 +1,167 @@
+"""What annelid writes as TOML is read back the same, to the last bit and letter."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid import Network
+from annelid.config import load_config, parse_assignments, preset_names
+from annelid.errors import UnreadableText
+from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
+from annelid.nervous.neurons import Channel, Firing
+from annelid.studies.case import run_command
+from annelid.textfiles import MOST_LEVELS, _has_long_key, nested, parse_json, parse_toml, toml_text, toml_value
+
+# All that UTF-8 can hold: signs, blanks, quotes, worms, controls.
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
+FLOATS = st.floats(allow_nan=False)
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+POSITIVE = st.floats(min_value=1e-300, max_value=1e300)
+SCALARS = st.one_of(TEXTS, FLOATS, st.integers(-(2**63), 2**63 - 1), st.booleans())
+VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3))
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equal, and of the same type all the way down, with the sign of zero."""
+    if isinstance(one, dict):
+        return isinstance(other, dict) and one.keys() == other.keys() and all(same(one[k], other[k]) for k in one)
+    if isinstance(one, list):
+        return isinstance(other, list) and len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, float):
+        return isinstance(other, float) and one == other and math.copysign(1, one) == math.copysign(1, other)
+    return type(one) is type(other) and one == other
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.dictionaries(TEXTS, VALUES, max_size=4), TEXTS)
+def test_a_document_is_read_as_it_was_written(tree: dict[str, Any], heading: str) -> None:
+    assert same(parse_toml(toml_text(tree), "it"), tree)
+    # The heading may be what a user typed; none of it becomes a field.
+    assert same(parse_toml(toml_text(tree, heading), "it"), tree)
+
+
+@settings(max_examples=150, deadline=None)
+@given(VALUES)
+def test_a_value_is_set_as_it_was_written(value: Any) -> None:
+    text = toml_value(value)
+    assert "\n" not in text
+    assert same(tomllib.loads(f"it = {text}")["it"], value)
+    assert same(parse_assignments([f"it={text}"])["it"], value)
+
+
+def test_not_a_number_is_written_too() -> None:
+    assert math.isnan(parse_toml(toml_text({"x": math.nan}), "it")["x"])
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_configuration_is_loaded_as_it_was_written(name: str) -> None:
+    config = load_config(name, {"name": "🪱 of mine", "summary": 'a "b" \\'})
+    assert load_config(parse_toml(toml_text(config.model_dump()), "it")) == config
+    fields = {"body": config.body, "controller": config.controller, "duration_s": config.duration_s}
+    words = [f"{path}={toml_value(value)}" for path, value in fields.items()]
+    assert load_config(name, parse_assignments(words)) == load_config(name)
+
+
+neurons = st.builds(
+    Neuron,
+    capacitance_nF=POSITIVE,
+    rest_mV=FINITE,
+    bias_nA=FINITE,
+    channels=st.lists(
+        st.builds(Channel, POSITIVE, FINITE, st.lists(st.builds(Gate, FINITE, factor=POSITIVE), max_size=2).map(tuple)),
+        max_size=2,
+    ).map(tuple),
+    firing=st.builds(Firing, st.floats(1, 1e300), st.floats(-1e300, 0)),
+)
+connections = st.one_of(
+    st.builds(Synapse, POSITIVE, FINITE),
+    st.builds(GapJunction, POSITIVE, st.booleans()),
+    st.builds(SpikingSynapse, POSITIVE, FINITE),
+    st.builds(ModulatorySynapse, st.sampled_from(["leak", "gates"]), POSITIVE),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data(), TEXTS, st.lists(TEXTS, min_size=1, max_size=3, unique=True))
+def test_a_network_is_read_as_it_was_written(data: st.DataObject, name: str, names: list[str]) -> None:
+    network = Network(name)
+    for each in names:
+        network.add_neuron(each, data.draw(neurons), data.draw(FINITE))
+        network.add_input(each, names[:1])
+        network.add_output(each, names[0])
+    for kind in data.draw(st.lists(connections, max_size=3)):
+        add = network.add_gap_junction if isinstance(kind, GapJunction) else network.add_synapse
+        add(names[0], names[-1], kind)  # type: ignore[arg-type]
+    read = Network.from_toml(network.to_toml())
+    for part in ("name", "neurons", "initial_mV", "connections", "inputs", "outputs"):
+        assert getattr(read, part) == getattr(network, part)
+    assert list(read.neurons) == names
+
+
+def test_a_command_line_says_what_was_changed() -> None:
+    import shlex
+
+    changes = {
+        "name": "a 'b' 🪱 $x",
+        "arena.friction": 1000.0,
+        "body.rings": {"kind": "servo", "force_limit_N": [1.0, 2.5]},
+    }
+    words = shlex.split(run_command("crawler", changes))
+    assert parse_assignments(words[4::2]) == changes
+    assert words[3::2] == ["--set"] * 3
+
+
+def test_fields_by_dotted_path_become_tables() -> None:
+    section = {"kind": "servo"}
+    assert nested({"a.b": section, "a.b.c": 1, "d": (1, 2)}) == {"a": {"b": {"kind": "servo", "c": 1}}, "d": [1, 2]}
+    assert section == {"kind": "servo"}
+
+
+def test_levels_up_to_the_bound_are_read() -> None:
+    for read, text in ((parse_toml, "x = {}"), (parse_json, "{}")):
+        read(
+            text.format("[" * MOST_LEVELS + "]" * MOST_LEVELS)
+            if "x" in text
+            else "[" * MOST_LEVELS + "]" * MOST_LEVELS,
+            "it",
+        )
+        with pytest.raises(UnreadableText, match="nested too deeply"):
+            read("x = " * (read is parse_toml) + "[" * (MOST_LEVELS + 2) + "]" * (MOST_LEVELS + 2), "it")
+
+
+def test_dots_within_texts_and_numbers_are_no_keys() -> None:
+    text = f"x = \"{'a.' * 500}\"\ny = [{'1.5, ' * 500}]\n# {'a.' * 500}\nz = '''{'a.' * 500}'''\n\"{'a.' * 90}\" = 1"
+    assert len(parse_toml(text, "it")) == 4
+
+
+PIECES = st.lists(st.sampled_from([*"\"'#\\\n .=", '\\"', '""', "''", "a.", "\\u0041", "\r\n"]), max_size=8).map(
+    "".join
+)
+QUOTED = st.builds(
+    lambda quote, inside, more: quote + inside + quote + more,
+    st.sampled_from(['"', "'", '"""', "'''"]),
+    PIECES,
+    st.sampled_from(["", '"', '""', "'", "''", ' # a " and """']),
+)
+LONG_KEY = f"{'.'.join('a' * (MOST_LEVELS + 2))} = 1"
+
+
+@settings(max_examples=1000, deadline=None)
+@given(st.lists(QUOTED, min_size=1, max_size=3))
+def test_keys_are_told_from_texts_as_the_parser_does(values: list[str]) -> None:
+    text = "".join(f"k{i} = {value}\n" for i, value in enumerate(values))
+    try:
+        tree = tomllib.loads(text)
+    except ValueError:
+        with pytest.raises(UnreadableText):
+            parse_toml(text, "it")
+        return
+    assert parse_toml(text, "it") == tree
+    assert _has_long_key(text + LONG_KEY)
+    assert not _has_long_key(f"{text}x = '{LONG_KEY}' # {LONG_KEY}")

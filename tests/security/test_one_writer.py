@@ -9,6 +9,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -158,23 +160,31 @@ def test_two_runs_into_one_folder(tmp_path: Path) -> None:
     assert race(tmp_path / "run", 0.3)
 
 
-def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    together = threading.Barrier(16, timeout=60)
-    taken: list[Path] = []
+@pytest.fixture
+def _threads_change_often() -> Iterator[None]:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    yield
+    sys.setswitchinterval(before)
 
-    def begin() -> None:
+
+@pytest.mark.usefixtures("_threads_change_often")
+@pytest.mark.parametrize("attempt", range(10))
+def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, attempt: int) -> None:
+    monkeypatch.chdir(tmp_path)
+    together, everyone_has_one = threading.Barrier(16), threading.Barrier(16)
+
+    def begin() -> Path:
         with ExitStack() as stack:
             entry._locks.set(stack)
-            together.wait()
-            taken.append(_locked_folder(None, "worm"))
-            together.wait()
+            together.wait(60)
+            try:
+                return _locked_folder(None, "worm")
+            finally:
+                everyone_has_one.wait(60)
 
-    threads = [threading.Thread(target=begin) for _ in range(16)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60)
+    with ThreadPoolExecutor(16) as threads:
+        taken = [each.result() for each in [threads.submit(begin) for _ in range(16)]]
     assert sorted(taken) == [Path("runs", f"worm-{i:03d}") for i in range(1, 17)]
     # Nothing was written into them.
     assert list(tmp_path.glob("*/*")) == []

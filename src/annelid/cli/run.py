@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -166,8 +168,10 @@ def _locked_folder(out: Path | None, name: str) -> Path:
     parent = Path("runs")
     name = re.sub(r"[^\w.-]+", "-", name).strip("-.") or "run"
     numbered = re.compile(re.escape(name) + r"-(\d+)")
-    entries = parent.iterdir() if parent.is_dir() else ()
-    number = max((int(match[1]) for entry in entries if (match := numbered.fullmatch(entry.name))), default=0) + 1
+    entries: list[str] = []
+    with suppress(FileNotFoundError):
+        entries = os.listdir(parent)
+    number = max((int(match[1]) for entry in entries if (match := numbered.fullmatch(entry))), default=0) + 1
     while True:
         folder = parent / f"{name}-{number:03d}"
         try:

@@ -63,6 +63,9 @@ def locked(folder: str | Path, *, new: bool = False) -> Iterator[Path]:
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
         descriptor = _take(folder, new)
+    except FileExistsError:
+        # Another made it since, and it may still be empty.
+        raise
     except BaseException:
         _remove_empty(made)
         raise
@@ -96,17 +99,22 @@ def locks(parameter: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
 def _take(folder: Path, new: bool) -> int:
     """Makes a folder and locks it; returns the descriptor of its lock file."""
     try:
-        if folder.exists() and not folder.is_dir():
-            raise ConfigError(f"{folder} is a file: name a folder")
         problem = "it cannot be made"
         for _ in range(_ATTEMPTS):
             # Whoever ends a lock removes the lock file, and the folder if it is empty.
             with suppress(FileNotFoundError):
-                folder.mkdir(parents=True, exist_ok=not new)
-                new, problem = False, "it comes and goes"
+                try:
+                    folder.mkdir(parents=True, exist_ok=not new)
+                except FileExistsError:
+                    if new or folder.is_file():
+                        raise
+                    continue
+                problem = "it comes and goes"
                 descriptor = os.open(folder / LOCK_NAME, _FLAGS, 0o666)
                 try:
                     if not _lock(descriptor, folder):
+                        if new:
+                            raise FileExistsError(folder)
                         raise RunFileError(_taken(folder, os.read(descriptor, _HOLDER_BYTES)))
                     if os.path.samestat(os.fstat(descriptor), os.stat(folder / LOCK_NAME)):
                         os.ftruncate(descriptor, 0)

@@ -12,7 +12,6 @@ from annelid.arena.gravity import gravity_of
 from annelid.arena.scenery import add_scenery, add_walls
 from annelid.body.actuation import add_ring_actuators, add_springs
 from annelid.body.chain import add_chains
-from annelid.body.damping import drop_dampers
 from annelid.body.elimination import order_elimination
 from annelid.body.friction import add_joint_friction
 from annelid.body.rods import add_rods
@@ -84,9 +83,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     if isinstance(body.formulation, Chain):
         add_chains(spec, geometry, body, body.formulation, arena, vertices_touch=laid)
     else:
-        add_rods(spec, geometry, body, body.formulation, arena)
-    if not for_plant:
-        drop_dampers(spec)
+        add_rods(spec, geometry, body, body.formulation, arena, dampers=for_plant)
     add_springs(spec, geometry, body.springs)
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:

@@ -86,6 +86,14 @@ def _takes_rear_edge(vertex: Any) -> Any:
     return vertex % 2 == 1
 
 
+def add_held_coordinate(spec: mujoco.MjSpec) -> None:
+    """Adds, once, the coordinate that `annelid.simulation.damping` moves: to every model, so that all have as many."""
+    if spec.body(HELD) is None:
+        held = add_holder(spec, HELD, HELD_MASS_KG, HELD_MASS_KG)
+        held.gravcomp = 1.0
+        held.add_joint(name=HELD, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
+
+
 def add_dampers(
     spec: mujoco.MjSpec, rod: str, vertices_m: Array, bodies: list[str], strands: Strands, *, clamped: bool
 ) -> None:
@@ -99,17 +107,11 @@ def add_dampers(
         strands: Material.
         clamped: The first edge has no twist hinge.
     """
-    if not strands.material_damping_s:
-        return
+    assert strands.material_damping_s is not None
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     damping = damper_coefficients(lengths, strands, strands.material_damping_s)
     rows = damper_rows(vertices_m.T)
     clamped_hinge = twist_name(rod, 0, len(lengths)) if clamped else ""
-    if spec.body(HELD) is None:
-        # Here and not only where `annelid.simulation.damping` needs it, so that all models have as many coordinates.
-        held = add_holder(spec, HELD, HELD_MASS_KG, HELD_MASS_KG)
-        held.gravcomp = 1.0
-        held.add_joint(name=HELD, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
     for vertex in range(1, len(bodies) - 1):
         joints = [f"{body}_{axis}" for body in bodies[vertex - 1 : vertex + 2] for axis in AXES]
         joints.append(twist_name(rod, hinge_of(vertex), len(lengths)))
@@ -117,12 +119,6 @@ def add_dampers(
         for joint, coefficient in zip(joints, rows[:, vertex - 1].tolist(), strict=True):
             if not joint.startswith("world_") and joint != clamped_hinge:
                 tendon.wrap_joint(joint, coefficient)
-
-
-def drop_dampers(spec: mujoco.MjSpec) -> None:
-    """Takes the dampers out of a model that is stepped by itself, in which they could not follow the posture."""
-    for tendon in [tendon for tendon in spec.tendons if is_damper(tendon)]:
-        spec.delete(tendon)
 
 
 def is_damper(tendon: mujoco.MjsTendon) -> bool:

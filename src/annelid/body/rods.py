@@ -22,7 +22,7 @@ import numpy as np
 
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
-from annelid.body.damping import add_dampers, add_holder, twist_name
+from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
 from annelid.config import Arena, Rods, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
@@ -38,7 +38,9 @@ TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
 
 
-def add_rods(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: Arena) -> None:
+def add_rods(
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: Arena, *, dampers: bool
+) -> None:
     """Adds the mesh as a net of rods, and the solver settings that it needs.
 
     Args:
@@ -47,6 +49,7 @@ def add_rods(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formul
         body: Materials and pins.
         formulation: Numerical settings of the rods.
         arena: Contact settings, which the strands share with the floor.
+        dampers: Whether somebody lets the dampers of bending follow the posture; without them they would mislead.
     """
     _set_solver(spec, formulation)
     names = _add_vertices(spec, geometry, body, formulation, contact_options(arena))
@@ -59,6 +62,7 @@ def add_rods(spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formul
             body.strands,
             formulation,
             rgba=STRAND_RGBA[strand // geometry.n_per_plane],
+            dampers=dampers,
         )
 
 
@@ -226,6 +230,7 @@ def add_rod(
     *,
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     clamped: bool = False,
+    dampers: bool = True,
 ) -> None:
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
@@ -238,6 +243,7 @@ def add_rod(
         formulation: Settings of the inextensible edges.
         rgba: Colour.
         clamped: The first two vertices belong to one body (a cantilever): their edge has no twist hinge.
+        dampers: As of `add_rods`.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     n_edges = len(lengths)
@@ -273,8 +279,10 @@ def add_rod(
         solref=[formulation.edge_time_constant_s, 1.0],
         solimp=EDGE_IMPEDANCE,
     )
-    if strands.material_damping_s is not None:
-        add_dampers(spec, name, vertices_m, bodies, strands, clamped=clamped)
+    if strands.material_damping_s:
+        add_held_coordinate(spec)
+        if dampers:
+            add_dampers(spec, name, vertices_m, bodies, strands, clamped=clamped)
     elif formulation.lateral_damping_Nms_per_rad > 0:
         for vertex in range(1, n_edges):
             _add_lateral_damper(spec, name, vertices_m, bodies, vertex, formulation.lateral_damping_Nms_per_rad)

@@ -18,7 +18,7 @@ from time import perf_counter, process_time, sleep
 from playwright.sync_api import sync_playwright
 
 from annelid.config import load_config
-from annelid.view.live.show import Show
+from annelid.live.show import Show
 
 COUNT_UPLOADS = """
 window.uploads = {};

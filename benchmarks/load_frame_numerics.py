@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import load_config
-from annelid.studies.calibration.fit import places
-from annelid.studies.calibration.frame import load_frame
-from annelid.studies.calibration.loop import cable_force, read_loop
-from annelid.studies.calibration.report import EQUAL_STIFFNESS
-from annelid.studies.case import SHEAR_OVER_YOUNG
+from annelid.experiment.calibration.fit import places
+from annelid.experiment.calibration.frame import load_frame
+from annelid.experiment.calibration.loop import cable_force, read_loop
+from annelid.experiment.calibration.report import EQUAL_STIFFNESS
+from annelid.experiment.case import SHEAR_OVER_YOUNG
 
 YOUNG_MODULUS_PA, DRY_FRICTION_NM, CABLE_FRICTION = 0.437e9, 0.0083, 2.15
 """About those of the default fit."""

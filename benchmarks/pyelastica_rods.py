@@ -5,8 +5,8 @@ Needs ``pip install pyelastica``. ``annelid bench --cases peer`` puts the same n
 
 from __future__ import annotations
 
-from annelid.studies.bench.measure import keep_to_one_core
-from annelid.studies.bench.peer import peer
+from annelid_studies.bench.measure import keep_to_one_core
+from annelid_studies.bench.peer import peer
 
 if __name__ == "__main__":
     keep_to_one_core()

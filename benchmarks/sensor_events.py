@@ -18,9 +18,9 @@ import numpy as np
 from annelid import Run, load_config, simulate
 from annelid.analysis import rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.experiment.case import PAPERS_MESH, SHEAR_OVER_YOUNG
 from annelid.plausibility import tolerance_window_m
-from annelid.studies.case import PAPERS_MESH, SHEAR_OVER_YOUNG
-from annelid.studies.robustness import TIMED
+from annelid_studies.robustness import TIMED
 
 SLIPPERY = {"arena.friction": 0.3}
 UNDAMPED_ACROSS = {

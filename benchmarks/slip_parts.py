@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from annelid.analysis.slip import slip_cost
-from annelid.studies.case import Case
-from annelid.studies.slip.feedback import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
-from annelid.studies.store import Store
+from annelid.experiment.case import Case
+from annelid.experiment.store import Store
+from annelid_studies.slip.feedback import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
 
 HALF_STEP = {"clock.physics_timestep_s": 0.005, "duration_s": 10.0}
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from annelid import load_config
-from annelid.studies.calibration.frame import load_frame
-from annelid.studies.calibration.loop import Loop, read_loop
-from annelid.view.canvas import canvas, save
+from annelid.draw.canvas import canvas, save
+from annelid.experiment.calibration.frame import load_frame
+from annelid.experiment.calibration.loop import Loop, read_loop
 
 WORM = {"body.mesh.n_segments": 3}
 

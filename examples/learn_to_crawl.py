@@ -13,7 +13,7 @@ import numpy as np
 from cmaes import CMA
 from rich.progress import track
 
-from annelid.view.canvas import canvas, save
+from annelid.draw.canvas import canvas, save
 
 START, WORMS = np.zeros(5), 8
 

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 from annelid import load_config, simulate
 from annelid.analysis.passage import passage_of
-from annelid.view.figures.track import track_figure
+from annelid.draw.figures.track import track_figure
 
 PIPE = """
 [arena]

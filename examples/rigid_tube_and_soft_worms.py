@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from annelid import load_config, simulate
+from annelid.draw.canvas import canvas, save
 from annelid.planar.huang import segment_length
-from annelid.view.canvas import canvas, save
 
 PROGRAM = {"kind": "program", "contractions": [{"segment": 2, "start_s": 0.0, "stop_s": 0.8}]}
 WORMS = {"riddle2023-rods": ("tight rods", "#c2410c", "--"), "riddle2023-fast": ("sprung rods", "0.45", ":")}

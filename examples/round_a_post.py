@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from annelid import gait, load_config, simulate
-from annelid.view.figures.track import track_figure
+from annelid.draw.figures.track import track_figure
 
 COURSE = {
     "arena.posts": [[-2.2, 0.0, 0.15]],

@@ -15,7 +15,7 @@ import numpy as np
 
 from annelid import load_config, simulate
 from annelid.analysis.track import track_of
-from annelid.view.figures.track import track_figure
+from annelid.draw.figures.track import track_figure
 
 
 def main(folder: Path, heading_deg: float = 30.0, duration_s: float = 20.0) -> None:

@@ -12,7 +12,7 @@ import pytest
 import annelid
 
 SOURCE = Path(annelid.__file__).parent
-BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles"}
+BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles", "output"}
 MAY_IMPORT = {
     "errors": {"text"},
     "protocols": set(),
@@ -20,6 +20,7 @@ MAY_IMPORT = {
     "text": set(),
     "terminal": {"text"},
     "textfiles": {"errors", "text"},
+    "output": {"errors", "text"},
     "engine": {"errors"},
     "morphology": set(),
     "plausibility": {"config", "morphology"} | BASE,
@@ -32,12 +33,23 @@ MAY_IMPORT = {
     "planar": {"config", "morphology"} | BASE,
     "simulation": {"config", "morphology", "plausibility", "arena", "body", "control", "planar", "nervous"} | BASE,
     "analysis": {"config", "morphology", "arena", "control", "simulation"} | BASE,
-    "view": {"config", "engine", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
-    "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "view"} | BASE,
-    "studies": {"config", "morphology", "plausibility", "nervous", "body", "simulation", "analysis", "view"} | BASE,
-    "export": {"config", "references", "body", "simulation", "analysis", "view", "studies"} | BASE,
-    "cli": {"config", "plausibility"}
-    | {"references", "body", "simulation", "analysis", "view", "studies", "export"}
+    "draw": {"config", "engine", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
+    "live": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis", "draw"} | BASE,
+    "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "draw"} | BASE,
+    "experiment": {"config", "morphology", "plausibility", "body", "simulation", "analysis", "draw"} | BASE,
+    "export": {"config", "references", "body", "simulation", "analysis", "draw", "live", "experiment"} | BASE,
+    "cli": {
+        "config",
+        "plausibility",
+        "references",
+        "body",
+        "simulation",
+        "analysis",
+        "draw",
+        "live",
+        "experiment",
+        "export",
+    }
     | BASE,
 }
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
@@ -70,6 +82,13 @@ def test_imports_run_one_way(module: Path) -> None:
     room = room_of(module)
     rooms = {name.split(".")[1] for name in imported(module) if name.startswith("annelid.")}
     assert rooms - {room} <= MAY_IMPORT[room]
+
+
+@pytest.mark.parametrize(
+    "module", [path for path in MODULES if room_of(path) != "cli"], ids=lambda path: str(path.relative_to(SOURCE))
+)
+def test_the_library_knows_nothing_of_the_studies(module: Path) -> None:
+    assert not [name for name in imported(module) if name.split(".")[0] == "annelid_studies"]
 
 
 @pytest.mark.parametrize(

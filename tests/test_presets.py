@@ -9,8 +9,8 @@ import pytest
 
 from annelid.body import mesh_of
 from annelid.config import Rods, WormBody, fields_of, load_config
-from annelid.studies.case import Case
-from annelid.studies.examinations.pins import DAMPING_TIME_S, tie_stiffness_N_per_m
+from annelid.experiment.case import Case
+from annelid_studies.riddle2023.examinations.pins import DAMPING_TIME_S, tie_stiffness_N_per_m
 
 PUBLISHED = {
     "duration_s": 5.0,

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from annelid import Network
 from annelid.config import load_config, parse_assignments, preset_names
 from annelid.errors import UnreadableText
+from annelid.experiment.case import run_command
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
-from annelid.studies.case import run_command
 from annelid.textfiles import MOST_LEVELS, _has_long_key, nested, parse_json, parse_toml, toml_text, toml_value
 
 # All that UTF-8 can hold: signs, blanks, quotes, worms, controls.

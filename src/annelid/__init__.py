@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
     from annelid.analysis import gait, summary
     from annelid.config import RunConfig, load_config, preset_names
+    from annelid.experiment.sweep import sweep
     from annelid.nervous import Network
     from annelid.plausibility import Finding, check
     from annelid.protocols import Controller, Plant, Sensation
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
     from annelid.simulation.batch import BatchResult, simulate_batch
-    from annelid.studies.sweep import sweep
 
 __version__ = "0.1.0"
 
@@ -48,7 +48,7 @@ _HOME = {
     "simulate": "simulation",
     "simulate_batch": "simulation.batch",
     "summary": "analysis",
-    "sweep": "studies.sweep",
+    "sweep": "experiment.sweep",
 }
 
 __all__ = [

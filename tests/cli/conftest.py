@@ -24,7 +24,7 @@ def annelid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs draw nothing, for tests of what they compute and where they write it."""
-    monkeypatch.setattr("annelid.view.gallery.draw_all", lambda *_, **__: [])
+    monkeypatch.setattr("annelid.draw.gallery.draw_all", lambda *_, **__: [])
 
 
 @pytest.fixture(scope="session")

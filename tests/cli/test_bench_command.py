@@ -33,7 +33,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
         path.write_text(json.dumps(REPORT))
         return path
 
-    monkeypatch.setattr("annelid.studies.bench.benchmark.bench", bench)
+    monkeypatch.setattr("annelid_studies.bench.benchmark.bench", bench)
     return calls
 
 
@@ -72,7 +72,7 @@ def test_ctrl_c_tells_how_to_go_on(annelid: Command, asked: Asked, monkeypatch: 
 
     arguments = ("-o", "my bench", "--quick", "--cases", "steps")
     with monkeypatch.context() as broken:
-        broken.setattr("annelid.studies.bench.benchmark.bench", interrupted)
+        broken.setattr("annelid_studies.bench.benchmark.bench", interrupted)
         done = annelid("bench", *arguments)
     assert done.exit_code == 130
     assert "what was measured is kept in my bench/cases" in done.sentence()
@@ -82,7 +82,7 @@ def test_ctrl_c_tells_how_to_go_on(annelid: Command, asked: Asked, monkeypatch: 
 
 
 def test_help_names_every_line(annelid: Command) -> None:
-    from annelid.studies.bench.cases import LINES
+    from annelid_studies.bench.cases import LINES
 
     text = annelid("bench", "--help").out
     assert all(f"--cases {line} " in text for line in LINES)

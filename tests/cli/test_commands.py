@@ -70,7 +70,7 @@ def test_resume_takes_no_preset(annelid: Command, finished: Path) -> None:
 def test_a_missing_back_end_costs_the_pictures_and_not_the_run(
     annelid: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from annelid.view import gl
+    from annelid.draw import gl
 
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.setattr(gl, "works", lambda backend: False)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from outcome import Command
 
-from annelid.view import doctor
+from annelid.draw import doctor
 
 
 @pytest.fixture

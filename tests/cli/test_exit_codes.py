@@ -14,9 +14,9 @@ from outcome import Command
 
 from annelid.cli import entry
 from annelid.errors import ConfigError, RunKilled
-from annelid.studies.attempt import Files, Task, attempt
-from annelid.studies.sweep.sweeping import Sweep
-from annelid.studies.workers import Result, Workers
+from annelid.experiment.attempt import Files, Task, attempt
+from annelid.experiment.sweep.sweeping import Sweep
+from annelid.experiment.workers import Result, Workers
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -43,9 +43,9 @@ def _computed_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
             future.set_exception(error)
         return future
 
-    monkeypatch.setattr("annelid.studies.workers.Processes.submit", submit)
+    monkeypatch.setattr("annelid.experiment.workers.Processes.submit", submit)
     for figure in ("sweep.results.sweep_figure", "tune.results._figure"):
-        monkeypatch.setattr(f"annelid.studies.{figure}", lambda *_: Path("figure.png"))
+        monkeypatch.setattr(f"annelid_studies.{figure}", lambda *_: Path("figure.png"))
 
 
 def test_the_page_lists_the_exit_codes() -> None:
@@ -73,15 +73,15 @@ def test_a_sweep_that_says_nothing_else_says_what_happened_to_its_runs(
 
 
 def test_a_sweep_tells_of_runs_that_a_guard_stopped(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    from annelid.studies.sweep import swept
-    from annelid.studies.sweep.sweeping import SweepRun
+    from annelid.experiment.sweep import swept
+    from annelid.experiment.sweep.sweeping import SweepRun
 
     def stopped(*words: object, **options: object) -> Sweep:
         done = swept(*words, **options)  # type: ignore[arg-type]
         runs = tuple(SweepRun(run.point, "stopped", "too fast", run.outcome) for run in done.runs)
         return Sweep(done.plan, done.numbers, runs, done.folder)
 
-    monkeypatch.setattr("annelid.studies.sweep.swept", stopped)
+    monkeypatch.setattr("annelid.experiment.sweep.swept", stopped)
     Path("study.toml").write_text(STUDY.format(values=GOOD))
     done = annelid("sweep", "study.toml", "--quiet", "--jobs", "1")
     assert done.exit_code == entry.EXIT_STOPPED
@@ -99,8 +99,8 @@ def test_a_benchmark_tells_of_cases_that_were_not_measured(
         (folder / "bench.json").write_text(json.dumps({"cases": cases}))
         return folder / "bench.json"
 
-    monkeypatch.setattr("annelid.studies.bench.benchmark.bench", bench)
-    monkeypatch.setattr("annelid.view.figures.bench.bench_figure", lambda *_: Path("bench.png"))
+    monkeypatch.setattr("annelid_studies.bench.benchmark.bench", bench)
+    monkeypatch.setattr("annelid_studies.figures.bench.bench_figure", lambda *_: Path("bench.png"))
     done = annelid("bench", "--quiet")
     assert done.exit_code == code, done.err
     assert ("of 2 runs" in done.err) == bool(failed)
@@ -117,7 +117,7 @@ def test_a_study_whose_worker_dies_again_and_again_says_so(annelid: Command, mon
     def killed(*_: object, **__: object) -> None:
         raise RunKilled("its worker died 3 times")
 
-    monkeypatch.setattr("annelid.studies.paper.reproduce", killed)
+    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", killed)
     done = annelid("paper", "--quiet")
     assert done.exit_code == entry.EXIT_SOME_FAILED
     assert done.sentence() == "its worker died 3 times"

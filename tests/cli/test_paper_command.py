@@ -11,9 +11,9 @@ import pytest
 from outcome import Command
 
 from annelid.errors import ConfigError
-from annelid.studies.contents import Claim, Report
-from annelid.studies.examination import Effort, Table
-from annelid.studies.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
+from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
+from annelid_studies.riddle2023.contents import Claim, Report
+from annelid_studies.riddle2023.examination import Effort, Table
 
 CLAIM = Claim("results", "It walks", "Sect. 4", "holds", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023")
 REPORT = Report("full", ["It walks."], Table(["period, s"], [["2.629"]]), [], [CLAIM], [], {"annelid": "0"})
@@ -34,7 +34,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
             progress("running worms", 1, 2, 0.5)
         return REPORT
 
-    monkeypatch.setattr("annelid.studies.paper.reproduce", reproduce)
+    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", reproduce)
     return calls
 
 
@@ -97,7 +97,8 @@ def test_an_unknown_examination_is_one_sentence(annelid: Command) -> None:
 
 
 def test_an_error_of_a_run_is_one_sentence(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.studies.paper.reproduce", fails_with(ConfigError("the engine refuses this body")))
+    refused = fails_with(ConfigError("the engine refuses this body"))
+    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", refused)
     done = annelid("paper", "-q")
     assert (done.exit_code, done.sentence()) == (2, "the engine refuses this body")
 
@@ -113,7 +114,7 @@ def test_ctrl_c_tells_how_to_go_on(
     annelid: Command, asked: Asked, monkeypatch: pytest.MonkeyPatch, arguments: Sequence[str]
 ) -> None:
     with monkeypatch.context() as broken:
-        broken.setattr("annelid.studies.paper.reproduce", fails_with(KeyboardInterrupt()))
+        broken.setattr("annelid_studies.riddle2023.paper.reproduce", fails_with(KeyboardInterrupt()))
         done = annelid("paper", *arguments)
     assert done.exit_code == 130
     sentence = done.sentence()

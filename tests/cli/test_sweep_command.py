@@ -19,7 +19,7 @@ import xarray as xr
 from outcome import Command
 
 from annelid.cli.entry import EXIT_SOME_FAILED
-from annelid.studies.attempt import DRAFTS, OUTCOME_NAME
+from annelid.experiment.attempt import DRAFTS, OUTCOME_NAME
 
 SHORT = """
 preset = "riddle2022-planar"
@@ -56,7 +56,7 @@ def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
 
 def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command) -> None:
     from annelid.config import load_study
-    from annelid.studies.sweep.design import plan_of
+    from annelid.experiment.sweep.design import plan_of
 
     text = annelid("sweep", "--example").out
     assert text.splitlines()[0].startswith("# A sweep:  annelid sweep study.toml")

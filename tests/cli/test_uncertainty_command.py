@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from outcome import Command
 
+from annelid.experiment import uncertainty as package
 from annelid.simulation.runfile import open_run
-from annelid.studies import uncertainty as package
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -78,7 +78,7 @@ def test_a_machine_without_a_display_says_so(monkeypatch: pytest.MonkeyPatch) ->
 def test_without_viser_the_line_that_installs_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
     for name in ("guard", "server", "show", "page"):
-        monkeypatch.delitem(sys.modules, f"annelid.view.live.{name}", raising=False)
+        monkeypatch.delitem(sys.modules, f"annelid.live.{name}", raising=False)
     assert "pip install 'annelid[view]'" in refusal("--no-open")
 
 

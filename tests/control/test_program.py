@@ -14,10 +14,10 @@ from annelid.analysis.paper import published
 from annelid.config import Contraction, Program, RunConfig, SnsController, load_config, parse_assignments
 from annelid.control import ProgramController
 from annelid.control.program import program_activation
+from annelid.draw.table import field_lines
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
 from annelid.simulation import Run, simulate
-from annelid.view.table import field_lines
 
 ONE = {"segment": 1, "start_s": 0.0, "stop_s": 0.6}
 

@@ -220,7 +220,7 @@ def test_what_takes_seconds_is_executed(page: str, tmp_path: Path, monkeypatch: 
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(ROOT / "examples")
     # Runs draw nothing here: what they would draw has tests of its own, and takes longer than the run.
-    monkeypatch.setattr("annelid.view.gallery.draw_all", lambda *_, **__: [])
+    monkeypatch.setattr("annelid.draw.gallery.draw_all", lambda *_, **__: [])
     for name, text in READERS_FILES.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     session: dict[str, Any] = {"__name__": "__main__"}

@@ -7,7 +7,7 @@ import pytest
 from worms import CHEAP
 
 from annelid.environments import WormEnv, WormVectorEnv
-from annelid.view.figures.renderings import rendering_works
+from annelid_studies.riddle2023.figures.renderings import rendering_works
 
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
 SMALL = {"render_mode": "rgb_array", "width": 96, "height": 64}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from annelid import Run, load_config, simulate, summary
-from annelid.view.planar_scene import PlanarScene, bent_rhombi, rhombi
+from annelid.draw.planar_scene import PlanarScene, bent_rhombi, rhombi
 
 PRESETS = ("daltorio2013", "boxerbaum2012")
 

@@ -24,12 +24,12 @@ from annelid.cli import app
 from annelid.config import find_cluster
 from annelid.config.cluster import Slurm
 from annelid.errors import ClusterError, ConfigError
+from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Files, Task, attempt
+from annelid.experiment.case import PLANAR, Case
+from annelid.experiment.cluster import slurm_cluster
+from annelid.experiment.store import Store, case_key
+from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
-from annelid.studies.attempt import MOST_BYTES, OUTCOME_NAME, Files, Task, attempt
-from annelid.studies.case import PLANAR, Case
-from annelid.studies.cluster import slurm_cluster
-from annelid.studies.store import Store, case_key
-from annelid.studies.workers import Result, Workers
 
 STUDY = """
 preset = "riddle2022-planar"
@@ -63,8 +63,8 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheduler: socket.soc
     address = f"tcp://127.0.0.1:{scheduler.getsockname()[1]}"
     cluster = f'[cluster]\nkind = "scheduler"\naddress = "{address}"\nreconnect_s = 0.5\n'
     Path("study.toml").write_text(STUDY + cluster)
-    monkeypatch.setattr("annelid.studies.workers.Processes.submit", lambda _, task: computed(task))
-    monkeypatch.setattr("annelid.studies.sweep.results.write_results", lambda *_: [])
+    monkeypatch.setattr("annelid.experiment.workers.Processes.submit", lambda _, task: computed(task))
+    monkeypatch.setattr("annelid.experiment.sweep.results.write_results", lambda *_: [])
     return "study.toml"
 
 
@@ -91,7 +91,7 @@ def test_a_study_does_not_choose_who_computes_it(study: str, scheduler: socket.s
 def test_a_cluster_that_the_user_names_is_used(
     study: str, scheduler: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("annelid.studies.cluster.HANDSHAKE_S", 0.5)
+    monkeypatch.setattr("annelid.experiment.cluster.HANDSHAKE_S", 0.5)
     done = CliRunner().invoke(app, ["sweep", study, "--quiet", "--cluster", study])
     assert done.exit_code == 2
     assert "no scheduler answers at tcp://127.0.0.1" in done.stderr

@@ -22,15 +22,15 @@ from typer.testing import CliRunner
 
 from annelid.cli import app
 from annelid.config import load_config
+from annelid.draw.canvas import canvas, save
+from annelid.draw.figures.sweep import sweep_figure
+from annelid.draw.style import panel_title
 from annelid.errors import AnnelidError
 from annelid.nervous import Network, Neuron
+from annelid.output import write_csv
 from annelid.simulation.runfile import Run, open_run
 from annelid.terminal import Console
 from annelid.text import printable
-from annelid.view.canvas import canvas, save
-from annelid.view.figures.sweep import sweep_figure
-from annelid.view.output import write_csv
-from annelid.view.style import panel_title
 
 NAME = "[/bold]$$ $x^{ </title><script>alert(1)</script> &amp; ]]> -- |a| `b` ![](http://a.example/x) {0}%s =1+1 '\""
 """Markup of rich, of formulas, HTML, XML, Markdown and of Python's templates."""
@@ -274,6 +274,6 @@ def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> No
 
 def test_the_panel_of_a_view_shows_names_as_text() -> None:
     pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-    from annelid.view.live.legend import status_html
+    from annelid.live.legend import status_html
 
     assert {tag for tag, _ in Tags(status_html(NAME, [NAME], NAME)).found} == {"div", "b"}

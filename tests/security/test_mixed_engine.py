@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from annelid.draw.doctor import examine
 from annelid.engine import REMEDY, mixed_engine, refuse_mixed_engine
 from annelid.errors import AnnelidError
-from annelid.view.doctor import examine
 
 
 def install(folder: Path, name: str, version: str, content: str) -> None:

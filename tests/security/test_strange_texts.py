@@ -14,12 +14,12 @@ import pytest
 from annelid import Network, simulate
 from annelid.config import find_cluster, load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
+from annelid.experiment.calibration.loop import read_loop
+from annelid.experiment.uncertainty.parameters import read_spread
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
-from annelid.studies.calibration.loop import read_loop
-from annelid.studies.robustness import read_judged
-from annelid.studies.uncertainty.parameters import read_spread
 from annelid.textfiles import MOST_BYTES, parse_toml
+from annelid_studies.robustness import read_judged
 
 LONGEST_S = 20.0
 TOML = {
@@ -202,7 +202,7 @@ def test_a_body_that_takes_hours_to_build_is_refused_with_an_estimate(path: str)
 
 
 def test_a_video_of_a_billion_pictures_is_refused(tmp_path: Path) -> None:
-    from annelid.view.render import render_video
+    from annelid.draw.render import render_video
 
     run = simulate({"extends": "riddle2022-planar", "duration_s": 0.1}, tmp_path / "run", progress=False)
     sentence = refused(lambda: render_video(run, tmp_path / "v.mp4", speed=1e-9))

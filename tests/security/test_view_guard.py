@@ -20,9 +20,9 @@ from websockets.exceptions import ConnectionClosed, ConnectionClosedError, Inval
 from websockets.sync.client import connect
 
 from annelid.errors import MissingDependency
-from annelid.view.live import guard
-from annelid.view.live.guard import MOST_BYTES, Guard
-from annelid.view.live.server import Server, warning_of
+from annelid.live import guard
+from annelid.live.guard import MOST_BYTES, Guard
+from annelid.live.server import Server, warning_of
 
 if TYPE_CHECKING:
     from websockets.sync.connection import Connection

@@ -16,13 +16,13 @@ from annelid.analysis.gait import gait
 from annelid.analysis.slip import slip_cost
 from annelid.analysis.track import track_of
 from annelid.body.mjcf import mjcf_text
+from annelid.draw.camera import VIEWS_DEG, view_angles
 from annelid.environments import WormEnv
 from annelid.errors import ConfigError
 from annelid.morphology import heading_turn
 from annelid.plausibility import check
 from annelid.protocols import SIDES, Array
 from annelid.simulation.worm import WormPlant
-from annelid.view.camera import VIEWS_DEG, view_angles
 
 FORMULATIONS: dict[str, dict[str, Any]] = {
     "rods": {},

@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 
 from annelid.config import LEVELS, WormBody, load_config
 from annelid.errors import ConfigError
-from annelid.studies.bench import peer as peer_module
-from annelid.studies.bench import store as store_module
-from annelid.studies.bench.benchmark import JSON_NAME, bench, judge
-from annelid.studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
-from annelid.studies.bench.errors import errors, exponent, front
-from annelid.studies.bench.measure import measure, peak_memory_bytes
-from annelid.studies.bench.store import MeasurementFailed, Measurements
-from annelid.studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
-from annelid.studies.case import CHAIN, RODS
-from annelid.view.bench_table import bench_table
-from annelid.view.figures.bench import bench_figure
+from annelid.experiment.case import CHAIN, RODS
+from annelid_studies.bench import peer as peer_module
+from annelid_studies.bench import store as store_module
+from annelid_studies.bench.benchmark import JSON_NAME, bench, judge
+from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
+from annelid_studies.bench.errors import errors, exponent, front
+from annelid_studies.bench.measure import measure, peak_memory_bytes
+from annelid_studies.bench.store import MeasurementFailed, Measurements
+from annelid_studies.bench.table import bench_table
+from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
+from annelid_studies.figures.bench import bench_figure
 
 positive = st.floats(1e-3, 1e3)
 

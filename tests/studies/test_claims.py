@@ -10,18 +10,18 @@ from pathlib import Path
 import pytest
 from test_examinations_a import WAVE, results, synthetic
 
+from annelid.experiment.case import FAST, Case, rods
+from annelid.experiment.outcome import Outcome, outcome
+from annelid.experiment.store import Store, case_key
 from annelid.simulation.loop import simulate
-from annelid.studies.case import FAST, Case, rods
-from annelid.studies.claims.actuation import velocity_claim
-from annelid.studies.claims.discussion import cause_claim
-from annelid.studies.claims.evidence import Evidence, judged, near
-from annelid.studies.claims.outlook import friction_claim, noise_claim
-from annelid.studies.claims.results import cost_claim
-from annelid.studies.claims.structure import elements_claim, pins_claim
-from annelid.studies.examination import Effort, Examination, Findings, Results, Table
-from annelid.studies.examinations import EXAMINATIONS
-from annelid.studies.outcome import Outcome, outcome
-from annelid.studies.store import Store, case_key
+from annelid_studies.riddle2023.claims.actuation import velocity_claim
+from annelid_studies.riddle2023.claims.discussion import cause_claim
+from annelid_studies.riddle2023.claims.evidence import Evidence, judged, near
+from annelid_studies.riddle2023.claims.outlook import friction_claim, noise_claim
+from annelid_studies.riddle2023.claims.results import cost_claim
+from annelid_studies.riddle2023.claims.structure import elements_claim, pins_claim
+from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
+from annelid_studies.riddle2023.examinations import EXAMINATIONS
 
 SIX_SPRINGS = (0.392, 0.302, 0.284, 0.334, 0.285, 0.322)
 """How far segment 2 stays below segment 1 by each of the springs; the paper says 39.4 %."""
@@ -110,6 +110,6 @@ def found(
     examination: Examination, effort: Effort, made: Outcome, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Findings:
     """What an examination says of runs that all end alike, without its figure."""
-    monkeypatch.setattr(f"annelid.studies.examinations.{examination.name}._draw", lambda *_: None)
+    monkeypatch.setattr(f"annelid_studies.riddle2023.examinations.{examination.name}._draw", lambda *_: None)
     runs = results(examination, effort, lambda case: synthetic(made, case, 0.4, WAVE))
     return examination.examine(runs, effort, folder / examination.name)

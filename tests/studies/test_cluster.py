@@ -20,8 +20,7 @@ import pytest
 
 from annelid.config.cluster import Pool, Scheduler, Slurm, find_cluster
 from annelid.errors import ClusterError, ConfigError, MissingDependency, RunKilled
-from annelid.simulation.runfile import FILE_NAME
-from annelid.studies.attempt import (
+from annelid.experiment.attempt import (
     DRAFTS,
     OUTCOME_NAME,
     Files,
@@ -32,10 +31,11 @@ from annelid.studies.attempt import (
     own_code,
     publish,
 )
-from annelid.studies.case import PLANAR, Case
-from annelid.studies.cluster import SchedulerWorkers, slurm_cluster, workers_of
-from annelid.studies.store import Store, case_key
-from annelid.studies.workers import Processes, Result, Workers
+from annelid.experiment.case import PLANAR, Case
+from annelid.experiment.cluster import SchedulerWorkers, slurm_cluster, workers_of
+from annelid.experiment.store import Store, case_key
+from annelid.experiment.workers import Processes, Result, Workers
+from annelid.simulation.runfile import FILE_NAME
 
 
 def planar(seed: int = 0, duration_s: float = 0.1) -> Case:
@@ -195,7 +195,7 @@ def die_at_seed_5(task: Task) -> Files | None:
 
 
 def test_killed_workers_lose_and_double_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.studies.workers.attempt", die_at_seed_5)
+    monkeypatch.setattr("annelid.experiment.workers.attempt", die_at_seed_5)
     cases = [*(planar(seed) for seed in range(12)), IMPOSSIBLE]
     failed: dict[str, Exception] = {}
     killed: list[int] = []
@@ -226,7 +226,7 @@ def thread_settings(task: Task) -> Any:
 
 
 def test_a_process_computes_on_one_thread_and_is_replaced_when_killed_idle(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.studies.workers.attempt", thread_settings)
+    monkeypatch.setattr("annelid.experiment.workers.attempt", thread_settings)
     any_task: Any = None
     with Processes(1, retries=0) as workers:
         assert set(workers.submit(any_task).result(30).values()) == {"1"}  # type: ignore[union-attr]
@@ -239,7 +239,7 @@ def test_a_process_computes_on_one_thread_and_is_replaced_when_killed_idle(monke
 
 
 def test_a_run_handed_over_while_its_process_dies_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.studies.workers.attempt", thread_settings)
+    monkeypatch.setattr("annelid.experiment.workers.attempt", thread_settings)
     any_task: Any = None
     with Processes(1, retries=0) as workers:
         workers.submit(any_task).result(30)
@@ -279,7 +279,7 @@ def test_without_a_scheduler_one_sentence_says_so() -> None:
 @pytest.fixture
 def with_sbatch(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine where jobs of Slurm could be submitted, but are not."""
-    monkeypatch.setattr("annelid.studies.cluster.SBATCH", "true")
+    monkeypatch.setattr("annelid.experiment.cluster.SBATCH", "true")
 
 
 @pytest.mark.usefixtures("with_sbatch")

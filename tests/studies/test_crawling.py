@@ -10,8 +10,9 @@ import pytest
 from annelid.analysis.gait import Gait
 from annelid.config import ServoRings, WormBody, load_config
 from annelid.errors import ConfigError
-from annelid.studies.case import Case
-from annelid.studies.crawling import (
+from annelid.experiment.case import Case
+from annelid.experiment.tune.judge import Judged
+from annelid_studies.crawling import (
     VALUES,
     Point,
     Reading,
@@ -21,7 +22,6 @@ from annelid.studies.crawling import (
     write_figure,
     write_readings,
 )
-from annelid.studies.tune.judge import Judged
 
 MUSCLES, SERVOS = "riddle2025-muscles", "riddle2025"
 

@@ -11,25 +11,25 @@ import pytest
 from annelid.analysis import RhythmScore
 from annelid.body.assemble import build_spec
 from annelid.config import WormBody
+from annelid.experiment.case import Case, chain, fast, one_after_the_other, rods
+from annelid.experiment.outcome import Hold, Outcome, outcome
+from annelid.experiment.store import case_key
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import open_run
-from annelid.studies.case import Case, chain, fast, one_after_the_other, rods
-from annelid.studies.examination import Results
-from annelid.studies.examinations import friction, ranges, springs
-from annelid.studies.examinations.friction import FRICTION
-from annelid.studies.examinations.pins import PINS, tie_stiffness_N_per_m
-from annelid.studies.examinations.radius import RADIUS
-from annelid.studies.examinations.ranges import EQUAL, RANGES, compiled_ranges
-from annelid.studies.examinations.side_by_side import (
+from annelid_studies.riddle2023.examination import Results
+from annelid_studies.riddle2023.examinations import friction, ranges, springs
+from annelid_studies.riddle2023.examinations.friction import FRICTION
+from annelid_studies.riddle2023.examinations.pins import PINS, tie_stiffness_N_per_m
+from annelid_studies.riddle2023.examinations.radius import RADIUS
+from annelid_studies.riddle2023.examinations.ranges import EQUAL, RANGES, compiled_ranges
+from annelid_studies.riddle2023.examinations.side_by_side import (
     held_elongation,
     in_unit,
     listed,
     rhythm_words,
     span,
 )
-from annelid.studies.examinations.springs import SPRINGS
-from annelid.studies.outcome import Hold, Outcome, outcome
-from annelid.studies.store import case_key
+from annelid_studies.riddle2023.examinations.springs import SPRINGS
 
 open_once = cache(open_run)
 

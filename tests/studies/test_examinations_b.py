@@ -10,11 +10,12 @@ import pytest
 
 from annelid.analysis import RhythmScore
 from annelid.config import load_config
-from annelid.studies.case import CHAIN, Case, chain, rods
-from annelid.studies.examination import Effort, Examination, Results
-from annelid.studies.examinations.discretization import DISCRETIZATION, convergence_order
-from annelid.studies.examinations.gate import GATE, read_beat
-from annelid.studies.examinations.noise import (
+from annelid.experiment.case import CHAIN, Case, chain, rods
+from annelid.experiment.store import Store, case_key
+from annelid_studies.riddle2023.examination import Effort, Examination, Results
+from annelid_studies.riddle2023.examinations.discretization import DISCRETIZATION, convergence_order
+from annelid_studies.riddle2023.examinations.gate import GATE, read_beat
+from annelid_studies.riddle2023.examinations.noise import (
     MAPS,
     NOISE,
     handled_noise,
@@ -23,9 +24,8 @@ from annelid.studies.examinations.noise import (
     share,
     steady_tolerances,
 )
-from annelid.studies.examinations.side_by_side import TIGHT
-from annelid.studies.examinations.timestep import EARLY_S, HARD, TIMESTEP, Start, read_start, velocity_limit
-from annelid.studies.store import Store, case_key
+from annelid_studies.riddle2023.examinations.side_by_side import TIGHT
+from annelid_studies.riddle2023.examinations.timestep import EARLY_S, HARD, TIMESTEP, Start, read_start, velocity_limit
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -119,7 +119,7 @@ def test_tight_rods_keep_within_the_muscles_limit(tmp_path: Path) -> None:
 
 
 def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import annelid.studies.examinations.gate as gate
+    import annelid_studies.riddle2023.examinations.gate as gate
 
     pairs = (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler"))
     monkeypatch.setattr(gate, "VARIANTS", {"quick": {"planar": pairs}})

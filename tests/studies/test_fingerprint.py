@@ -9,31 +9,33 @@ from pathlib import Path
 
 import pytest
 
-from annelid.studies import fingerprint
-from annelid.studies.case import RODS, Case
-from annelid.studies.fingerprint import PHYSICS, READERS, SOURCE, code_fingerprint, code_of, modules_behind
-from annelid.studies.store import case_key
+from annelid.experiment import fingerprint
+from annelid.experiment.case import RODS, Case
+from annelid.experiment.fingerprint import PHYSICS, READERS, SOURCE, code_fingerprint, code_of, modules_behind
+from annelid.experiment.store import case_key
 
 COMPUTING = sorted(
     path
     for room in ("config", "arena", "body", "nervous", "control", "planar", "simulation")
-    for path in (SOURCE / room).rglob("*.py")
-    if path != SOURCE / "simulation" / "progress.py"
+    for path in (SOURCE / "annelid" / room).rglob("*.py")
+    if path != SOURCE / "annelid" / "simulation" / "progress.py"
 )
 
 
 def test_the_key_of_a_run_covers_all_that_computes_it_and_nothing_else() -> None:
     modules = modules_behind(*PHYSICS)
-    rooms = {name.split(".")[0] for name in modules}
-    assert rooms == {*PHYSICS, "engine", "errors", "plausibility", "protocols", "text", "textfiles"}
+    others = ("engine", "errors", "plausibility", "protocols", "text", "textfiles")
+    rooms = {".".join(name.split(".")[:2]) for name in modules}
+    assert rooms == {*PHYSICS, *(f"annelid.{room}" for room in others)}
     assert {name_of(path) for path in COMPUTING} <= modules
-    assert "simulation.progress" not in modules
+    assert "annelid.simulation.progress" not in modules
 
 
 def test_the_key_of_an_outcome_covers_all_that_reads_it() -> None:
     modules = modules_behind(*READERS)
-    assert {"studies.outcome", "analysis.summary", "analysis.gait", "analysis.score", "simulation.runfile"} <= modules
-    assert not {name for name in modules if name.split(".")[0] in ("view", "cli", "export")}
+    readers = ("experiment.outcome", "analysis.summary", "analysis.gait", "analysis.score", "simulation.runfile")
+    assert {f"annelid.{name}" for name in readers} <= modules
+    assert not {name for name in modules if name.split(".")[1] in ("draw", "live", "cli", "export")}
 
 
 def test_a_module_is_found_by_its_import_wherever_it_stands(copied: Path) -> None:
@@ -46,7 +48,7 @@ def test_a_module_is_found_by_its_import_wherever_it_stands(copied: Path) -> Non
         rods.read_text() + "\n\ndef late() -> float:\n    from annelid import added\n\n    return added.SHARE\n"
     )
     forget()
-    assert "added" in modules_behind(*PHYSICS)
+    assert "annelid.added" in modules_behind(*PHYSICS)
 
 
 @pytest.mark.parametrize("path", COMPUTING, ids=lambda path: str(path.relative_to(SOURCE)))
@@ -97,7 +99,7 @@ def test_what_runs_instead_of_an_import_for_type_checkers_counts() -> None:
 
 def test_the_key_of_a_stored_run(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Real files are changed one after the other, each change on top of the last."""
-    monkeypatch.setattr("annelid.studies.store.physics_fingerprint", lambda: code_fingerprint(*PHYSICS))
+    monkeypatch.setattr("annelid.experiment.store.physics_fingerprint", lambda: code_fingerprint(*PHYSICS))
     case = Case(RODS)
     key = case_key(case)
     for place, old, new, counts in (
@@ -118,11 +120,11 @@ def test_the_key_of_a_stored_run(copied: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture
 def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A copy of the package's source, which is read in place of it."""
-    place = tmp_path / "annelid"
-    shutil.copytree(SOURCE, place, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(fingerprint, "SOURCE", place)
+    for package in fingerprint.PACKAGES:
+        shutil.copytree(SOURCE / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(fingerprint, "SOURCE", tmp_path)
     forget()
-    yield place
+    yield tmp_path / "annelid"
     monkeypatch.undo()
     forget()
 

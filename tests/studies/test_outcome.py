@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from annelid.analysis import gait, rhythm_score, summary
+from annelid.experiment.case import FAST, PLANAR, RODS, Case, one_after_the_other
+from annelid.experiment.outcome import outcome, read_outcome, write_outcome
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid.studies.case import FAST, PLANAR, RODS, Case, one_after_the_other
-from annelid.studies.outcome import outcome, read_outcome, write_outcome
 
 HOLD_S, REST_S = 0.3, 0.2
 PROGRAM = one_after_the_other(hold_s=HOLD_S, rest_s=REST_S)

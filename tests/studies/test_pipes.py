@@ -12,7 +12,8 @@ from annelid import load_config, open_run, simulate
 from annelid.analysis.passage import Passage, passage_of
 from annelid.config import Pipe, RobustSns
 from annelid.errors import RunFileError
-from annelid.studies.pipes import (
+from annelid_studies.figures.pipes import Way
+from annelid_studies.pipes import (
     ADAPTIVE,
     BEND_GAITS,
     FIXED,
@@ -26,7 +27,6 @@ from annelid.studies.pipes import (
     trials,
     write_readings,
 )
-from annelid.view.figures.pipes import Way
 
 
 def reading(**changes: object) -> Reading:

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.markdown import anchors, cell, code, words
 from annelid.errors import RunFileError
-from annelid.studies.contents import Claim, Examined, Figure, Report, Verdict
-from annelid.studies.examination import Examination, Findings, Table
-from annelid.studies.markdown import anchors, cell, code, words
-from annelid.studies.report import CLAIMS_COMMAND, claims_page, write_report
 from annelid.text import printable
-from annelid.view.canvas import canvas, save_both
+from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, Verdict
+from annelid_studies.riddle2023.examination import Examination, Findings, Table
+from annelid_studies.riddle2023.report import CLAIMS_COMMAND, claims_page, write_report
 
 COMMAND = """annelid run riddle2023 --set 'controller={kind = "program", ramp_s = 0.1}' --set arena.friction=0.3"""
 SPECIAL = "1 * 2 * 3 _a_ b_c `code|bar` <b>bold</b> |x| < 3 & [4](http://x) #5 ~6~ $7$ \\8 &lt; !"

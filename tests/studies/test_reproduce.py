@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from annelid.errors import ConfigError
-from annelid.studies import paper
-from annelid.studies.case import PLANAR, RODS, Case, one_after_the_other
-from annelid.studies.claims import claim_cases
-from annelid.studies.examination import Effort, Examination, Findings, Results, Table
-from annelid.studies.examinations import EXAMINATIONS
+from annelid.experiment.case import PLANAR, RODS, Case, one_after_the_other
+from annelid_studies.riddle2023 import paper
+from annelid_studies.riddle2023.claims import claim_cases
+from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
+from annelid_studies.riddle2023.examinations import EXAMINATIONS
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -64,7 +64,7 @@ def test_one_examination_alone_makes_a_report_of_its_own(tmp_path: Path) -> None
 @pytest.mark.usefixtures("tiny")
 def test_a_second_call_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1)
-    monkeypatch.setattr("annelid.studies.workers.ProcessPoolExecutor", None)
+    monkeypatch.setattr("annelid.experiment.workers.ProcessPoolExecutor", None)
     assert paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1).main_table == first.main_table
 
 

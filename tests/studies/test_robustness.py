@@ -13,8 +13,8 @@ from annelid.analysis.score import RhythmScore
 from annelid.config import TimedWave
 from annelid.errors import ConfigError, RunFileError
 from annelid.plausibility import tolerance_window_m
-from annelid.studies import robustness as study
-from annelid.studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, shares_table, wilson
+from annelid_studies import robustness as study
+from annelid_studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, shares_table, wilson
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -11,8 +11,9 @@ from annelid.analysis.detector import Score
 from annelid.analysis.slip import SlipCost
 from annelid.config import PressureSns, SnsController, load_config
 from annelid.errors import ConfigError
-from annelid.studies.slip.detection import CASES, write_scores
-from annelid.studies.slip.feedback import (
+from annelid.experiment.store import Store
+from annelid_studies.slip.detection import CASES, write_scores
+from annelid_studies.slip.feedback import (
     DURATION_S,
     EXTENSION,
     FEEDBACKS,
@@ -27,7 +28,6 @@ from annelid.studies.slip.feedback import (
     slip_feedback,
     write_readings,
 )
-from annelid.studies.store import Store
 
 
 @pytest.mark.parametrize("preset", GAITS)

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from annelid.errors import ConfigError
+from annelid.experiment import store as module
+from annelid.experiment import workers
+from annelid.experiment.attempt import OUTCOME_NAME, compute_run, keep_outcome
+from annelid.experiment.case import PLANAR, RODS, Case
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.store import Store, case_key
 from annelid.simulation.runfile import FILE_NAME, open_run
-from annelid.studies import store as module
-from annelid.studies import workers
-from annelid.studies.attempt import OUTCOME_NAME, compute_run, keep_outcome
-from annelid.studies.case import PLANAR, RODS, Case
-from annelid.studies.outcome import Outcome
-from annelid.studies.store import Store, case_key
 
 
 def planar(seed: int = 0, duration_s: float = 0.2) -> Case:
@@ -140,9 +140,9 @@ def test_a_workers_refusal_reaches_the_caller_and_keeps_what_is_done(tmp_path: P
 INTERRUPTED = """
 import sys
 from pathlib import Path
-from annelid.studies.case import PLANAR, Case
-from annelid.studies.outcome import Outcome
-from annelid.studies.store import Store
+from annelid.experiment.case import PLANAR, Case
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.store import Store
 
 if __name__ == "__main__":
     cases = [Case(PLANAR, {"duration_s": 0.2}), Case(PLANAR, {"duration_s": 3000.0, "record.signals_interval_s": 1.0})]

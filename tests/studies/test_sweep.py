@@ -20,14 +20,14 @@ from annelid.analysis import Gait, Summary
 from annelid.analysis.balance import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
+from annelid.experiment.attempt import attempt
+from annelid.experiment.sweep import Sweep, sweeping, swept
+from annelid.experiment.sweep.dataset import dataset_of
+from annelid.experiment.sweep.design import Plan, flattened, plan_of, unit_samples
+from annelid.experiment.sweep.numbers import NUMBERS
+from annelid.experiment.sweep.results import failures, results_table, told_numbers, write_results
+from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
-from annelid.studies.attempt import attempt
-from annelid.studies.sweep import Sweep, sweeping, swept
-from annelid.studies.sweep.dataset import dataset_of
-from annelid.studies.sweep.design import Plan, flattened, plan_of, unit_samples
-from annelid.studies.sweep.numbers import NUMBERS
-from annelid.studies.sweep.results import failures, results_table, told_numbers, write_results
-from annelid.studies.workers import Result, Workers
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

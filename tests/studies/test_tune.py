@@ -18,17 +18,17 @@ from annelid.analysis import RhythmScore, Summary
 from annelid.analysis.gait import Gait
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.studies import workers
-from annelid.studies.case import Case, Work
-from annelid.studies.outcome import Outcome
-from annelid.studies.space import Choice, Interval, from_unit, to_unit
-from annelid.studies.store import Store, case_key
-from annelid.studies.tune import search as module
-from annelid.studies.tune.judge import OBJECTIVES, Judged, judge, objectives_of
-from annelid.studies.tune.optimiser import CmaEs, Parzen, generation_size, optimiser_of
-from annelid.studies.tune.results import write_gait, write_results, write_trials
-from annelid.studies.tune.search import START, Task, Trial, best, compromise, front, search
-from annelid.studies.tune.space import default_variables, parse_variable, variables_of
+from annelid.experiment import workers
+from annelid.experiment.case import Case, Work
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.space import Choice, Interval, from_unit, to_unit
+from annelid.experiment.store import Store, case_key
+from annelid.experiment.tune import search as module
+from annelid.experiment.tune.judge import OBJECTIVES, Judged, judge, objectives_of
+from annelid.experiment.tune.optimiser import CmaEs, Parzen, generation_size, optimiser_of
+from annelid.experiment.tune.results import write_gait, write_results, write_trials
+from annelid.experiment.tune.search import START, Task, Trial, best, compromise, front, search
+from annelid.experiment.tune.space import default_variables, parse_variable, variables_of
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

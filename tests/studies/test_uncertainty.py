@@ -17,17 +17,15 @@ from hypothesis import strategies as st
 from annelid.analysis import summary
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
-from annelid.simulation.loop import simulate
-from annelid.simulation.runfile import open_run
-from annelid.studies import store as store_module
-from annelid.studies.calibration.fit import calibrate
-from annelid.studies.calibration.loop import read_loop
-from annelid.studies.calibration.report import EQUAL_STIFFNESS
-from annelid.studies.case import RODS
-from annelid.studies.store import case_key
-from annelid.studies.uncertainty import Spread, Uncertainty, VariantRun, read_spread, study, uncertainty
-from annelid.studies.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
-from annelid.studies.uncertainty.parameters import (
+from annelid.experiment import store as store_module
+from annelid.experiment.calibration.fit import calibrate
+from annelid.experiment.calibration.loop import read_loop
+from annelid.experiment.calibration.report import EQUAL_STIFFNESS
+from annelid.experiment.case import RODS
+from annelid.experiment.store import case_key
+from annelid.experiment.uncertainty import Spread, Uncertainty, VariantRun, read_spread, study, uncertainty
+from annelid.experiment.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
+from annelid.experiment.uncertainty.parameters import (
     ABSENT,
     CALIBRATION,
     EXACT,
@@ -38,9 +36,11 @@ from annelid.studies.uncertainty.parameters import (
     draw,
     hypercube,
 )
-from annelid.studies.uncertainty.readings import readings
-from annelid.studies.uncertainty.report import as_json, headline, remarks, with_error, write_uncertainty
-from annelid.studies.uncertainty.study import Variant, combine, finer_steps, more_elements, plan
+from annelid.experiment.uncertainty.readings import readings
+from annelid.experiment.uncertainty.report import as_json, headline, remarks, with_error, write_uncertainty
+from annelid.experiment.uncertainty.study import Variant, combine, finer_steps, more_elements, plan
+from annelid.simulation.loop import simulate
+from annelid.simulation.runfile import open_run
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -20,11 +20,13 @@ from annelid.analysis import RhythmScore, Summary
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.config import WormBody
 from annelid.errors import ConfigError
+from annelid.experiment.outcome import Hold, Outcome, outcome
 from annelid.simulation.worm import WormPlant
-from annelid.studies.outcome import Hold, Outcome, outcome
-from annelid.studies.weak_middle import pulls, sweeps
-from annelid.studies.weak_middle.asymmetry import Answer, Asymmetry, value_at
-from annelid.studies.weak_middle.pulls import (
+from annelid_studies.figures.weak_middle import weak_middle_figure
+from annelid_studies.riddle2023.figures.muscle_surface import engine_flv, scaled_length
+from annelid_studies.weak_middle import pulls, sweeps
+from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry, value_at
+from annelid_studies.weak_middle.pulls import (
     ACTUATORS,
     STIFF_N_PER_M,
     Actuator,
@@ -39,7 +41,7 @@ from annelid.studies.weak_middle.pulls import (
     rest_ring_m,
     servo,
 )
-from annelid.studies.weak_middle.results import (
+from annelid_studies.weak_middle.results import (
     COLUMNS,
     asymmetry_table,
     checks_table,
@@ -50,11 +52,9 @@ from annelid.studies.weak_middle.results import (
     sweep_table,
     write_readings,
 )
-from annelid.studies.weak_middle.settings import END_M, Setting, next_force, next_length
-from annelid.studies.weak_middle.sweeps import QUANTITIES, Point, Reading, check_points, sweep_points
-from annelid.studies.weak_middle.worms import stiffness_changes, weight_changes
-from annelid.view.figures.muscle_surface import engine_flv, scaled_length
-from annelid.view.figures.weak_middle import weak_middle_figure
+from annelid_studies.weak_middle.settings import END_M, Setting, next_force, next_length
+from annelid_studies.weak_middle.sweeps import QUANTITIES, Point, Reading, check_points, sweep_points
+from annelid_studies.weak_middle.worms import stiffness_changes, weight_changes
 
 SMALL: dict[str, Any] = {"body.mesh.n_segments": 3, "body.mesh.elements_per_side": 1}
 """Coarse and short; the properties below are those of any mesh."""

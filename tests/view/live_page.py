@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Locator, Page
 
     from annelid.config import RunConfig
+    from annelid.live.show import Show
     from annelid.simulation.runfile import Run
-    from annelid.view.live.show import Show
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next((path for name in _NAMES if (path := shutil.which(name))), None)
@@ -41,7 +41,7 @@ def wait_for(is_so: Callable[[], object], page: Page | None = None) -> None:
 @contextmanager
 def open_show(source: RunConfig | Run) -> Iterator[Show]:
     """A view on a port of its own, whose loop runs in a thread."""
-    from annelid.view.live.show import Show
+    from annelid.live.show import Show
 
     with Show(source) as show:
         loop = threading.Thread(target=show.run)

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.view import bug_report as module
-from annelid.view.bug_report import bug_report, without_names
-from annelid.view.doctor import Finding
+from annelid.draw import bug_report as module
+from annelid.draw.bug_report import bug_report, without_names
+from annelid.draw.doctor import Finding
 
 NAMES = st.text("abcdefghijklmnopqrstuvwxyz0123456789.-_ÄÖ", min_size=1, max_size=12)
 FINDINGS = [

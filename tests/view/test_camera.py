@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from annelid.draw.camera import FIELD_OF_VIEW_DEG, MARGIN, VIEWS_DEG, fitting_distance, view_angles
 from annelid.errors import RunFileError
-from annelid.view.camera import FIELD_OF_VIEW_DEG, MARGIN, VIEWS_DEG, fitting_distance, view_angles
 
 points = st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=1, max_size=20)
 

@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.table import Table
 
 from annelid.analysis.comparison import compare
+from annelid.draw.comparison_table import comparison_table, fields_table
+from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
-from annelid.view.comparison_table import comparison_table, fields_table
-from annelid.view.figures.comparison import lengths_figure, potentials_figure, travel_figure
 
 
 def printed(table: Table) -> str:
@@ -42,7 +42,7 @@ def test_the_fields_of_other_kinds_are_left_to_json(planar_run: Run, rods_run: R
 
 @pytest.mark.parametrize("draw", [lengths_figure, potentials_figure, travel_figure])
 def test_every_run_gets_its_colour(draw, planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
-    from annelid.view.style import segment_colors
+    from annelid.draw.style import segment_colors
 
     both = draw([planar_run, rods_run], ("planar", "rods"), tmp_path / "both.png")
     with Image.open(both) as image:

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from annelid.view import doctor, gl
+from annelid.draw import doctor, gl
 
 
 def finding(item: str) -> str:

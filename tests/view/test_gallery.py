@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from annelid.draw import gallery
 from annelid.errors import RenderingUnavailable
 from annelid.simulation.runfile import Run
-from annelid.view import gallery
 
 
 def test_a_picture_that_fails_does_not_cost_the_others(

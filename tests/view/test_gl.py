@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from annelid.draw import gl
+from annelid.draw.doctor import Finding, examine
+from annelid.draw.render import render_frame
 from annelid.errors import RenderingUnavailable
 from annelid.simulation.runfile import Run
-from annelid.view import gl
-from annelid.view.doctor import Finding, examine
-from annelid.view.render import render_frame
 
 
 def test_linux_tries_what_needs_no_screen_first() -> None:
@@ -47,7 +47,7 @@ def test_a_back_end_that_cannot_exist_does_not_work() -> None:
 def test_importing_the_views_imports_neither_gl_nor_matplotlib() -> None:
     program = (
         "import sys\n"
-        "import annelid.view.render, annelid.view.plots, annelid.view.gl, annelid.view.doctor, annelid.cli\n"
+        "import annelid.draw.render, annelid.draw.plots, annelid.draw.gl, annelid.draw.doctor, annelid.cli\n"
         "heavy = {'mujoco', 'OpenGL', 'glfw', 'matplotlib', 'torch'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium h
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-    from annelid.view.live.show import Show
+    from annelid.live.show import Show
 
 VIEW = {"width": 760, "height": 480}
 MOVED = 1.0
@@ -182,7 +182,7 @@ def test_a_run_is_played_the_same_way(browser: Browser, short_run: Run) -> None:
 
 
 def test_an_exported_page_opens_from_disk_without_a_network(browser: Browser, short_run: Run, tmp_path: Path) -> None:
-    from annelid.view.live.page import export_page
+    from annelid.live.page import export_page
 
     path = export_page(short_run, tmp_path / "walk")
     context = browser.new_context(viewport=VIEW, offline=True)  # type: ignore[arg-type]

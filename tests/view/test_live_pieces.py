@@ -11,18 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
+from annelid.draw.drawn_worm import upright
 from annelid.errors import ConfigError, RunFileError
+from annelid.live.knobs import knobs_of
+from annelid.live.living import LivingWorm
+from annelid.live.moments import Moment, Reel, reel_of
+from annelid.live.picture import Painter, ring_colors, spring_colors
+from annelid.live.player import Player, player_of
+from annelid.live.poke import REACH_M, struck
+from annelid.live.skeleton import Skeleton
+from annelid.live.traces import plots_of
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
-from annelid.view.drawn_worm import upright
-from annelid.view.live.knobs import knobs_of
-from annelid.view.live.living import LivingWorm
-from annelid.view.live.moments import Moment, Reel, reel_of
-from annelid.view.live.picture import Painter, ring_colors, spring_colors
-from annelid.view.live.player import Player, player_of
-from annelid.view.live.poke import REACH_M, struck
-from annelid.view.live.skeleton import Skeleton
-from annelid.view.live.traces import plots_of
 
 FRAME_S = 0.04
 
@@ -108,7 +108,7 @@ def test_a_window_of_signals_is_thinned_evenly(first: float, length: float, most
 
 
 def test_the_oldest_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.view.live.moments.KEEP_S", 1.0)
+    monkeypatch.setattr("annelid.live.moments.KEEP_S", 1.0)
     grown = reel(0)
     for i in range(500):
         grown.add(Moment(i * FRAME_S, np.zeros(3), np.zeros(1), np.zeros((1, 3))))
@@ -274,8 +274,8 @@ def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
 )
 def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[str]) -> None:
     pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-    from annelid.view.live.server import Server
-    from annelid.view.live.stage import LAYERS, Stage
+    from annelid.live.server import Server
+    from annelid.live.stage import LAYERS, Stage
 
     config = load_config("riddle2023-rods", overrides, arena=arena)
     player, anatomy = player_of(config)
@@ -293,8 +293,8 @@ def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[s
 
 def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
     pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-    from annelid.view.live.server import Server
-    from annelid.view.live.stage import Stage
+    from annelid.live.server import Server
+    from annelid.live.stage import Stage
 
     config = load_config("riddle2023-rods", {"arena.slope_deg": 30.0})
     player, anatomy = player_of(config)

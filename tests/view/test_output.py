@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from annelid.errors import RunFileError
-from annelid.view.output import whole_file, with_suffix
+from annelid.output import whole_file, with_suffix
 
 
 def test_a_file_appears_whole_and_alone(tmp_path: Path) -> None:

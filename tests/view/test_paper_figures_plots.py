@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 
 from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
 from annelid.config import Rings, WormBody, load_config
+from annelid.draw.figures import network_diagram
 from annelid.errors import ConfigError
 from annelid.nervous import Network
 from annelid.nervous.neurons import Neuron, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse, Synapse
-from annelid.view.figures import muscle_surface, network_diagram, planar_models, robot_lengths
+from annelid_studies.riddle2023.figures import muscle_surface, planar_models, robot_lengths
 
 
 def assert_two_good_files(png: Path) -> None:

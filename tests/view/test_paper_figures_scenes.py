@@ -11,19 +11,20 @@ import pytest
 from annelid.analysis.rhombi import actuated, rhombus_plane
 from annelid.body import build_spec, mesh_of
 from annelid.config import WormBody, load_config
+from annelid.draw.camera import fitting_distance, picture_axes, picture_points
+from annelid.draw.still import render_still
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
-from annelid.view.camera import fitting_distance, picture_axes, picture_points
-from annelid.view.figures import renderings
-from annelid.view.figures.propagation import (
+from annelid_studies.riddle2023.figures import renderings
+from annelid_studies.riddle2023.figures.propagation import (
     figure_2_caption,
     figure_2_propagation,
     figure_8_caption,
     figure_8_propagation,
     measure_propagation,
 )
-from annelid.view.figures.renderings import (
+from annelid_studies.riddle2023.figures.renderings import (
     ISOMETRIC_DEG,
     figure_4_caption,
     figure_4_model,
@@ -33,7 +34,6 @@ from annelid.view.figures.renderings import (
     rhombus_outline,
     strand_points,
 )
-from annelid.view.still import render_still
 
 LATE_S = 0.2
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")

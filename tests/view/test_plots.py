@@ -9,11 +9,11 @@ import imageio.v3
 import numpy as np
 import pytest
 
+from annelid.draw import plots
+from annelid.draw.plots import figure7
+from annelid.draw.style import activation_color, segment_colors
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
-from annelid.view import plots
-from annelid.view.plots import figure7
-from annelid.view.style import activation_color, segment_colors
 
 
 def test_figure7_is_a_picture_with_curves_on_white(planar_run: Run, picture: Path) -> None:
@@ -57,7 +57,7 @@ def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, pic
         "settings = lambda: {k: matplotlib.rcParams[k] for k in matplotlib.rcParams if k != 'backend'}\n"
         "before = settings()\n"
         "from annelid.simulation.runfile import open_run\n"
-        "from annelid.view.plots import figure7\n"
+        "from annelid.draw.plots import figure7\n"
         f"figure7(open_run({str(planar_run.path)!r}), {str(picture)!r})\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
         "assert settings() == before\n"

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from annelid.config import load_config
+from annelid.draw.camera import VIEWS_DEG
+from annelid.draw.planar_scene import rhombi
+from annelid.draw.render import render_frame, render_video
+from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid.view.camera import VIEWS_DEG
-from annelid.view.figures.renderings import rendering_works
-from annelid.view.planar_scene import rhombi
-from annelid.view.render import render_frame, render_video
-from annelid.view.scene import WormScene
+from annelid_studies.riddle2023.figures.renderings import rendering_works
 
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
 

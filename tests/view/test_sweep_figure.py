@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.view.figures.sweep import _label, sweep_figure, worded
+from annelid.draw.figures.sweep import _label, sweep_figure, worded
 
 FIELDS = {
     "arena.friction": ([0.1, 0.3, 1.0], "1"),

@@ -11,8 +11,8 @@ from rich.console import Console
 from annelid.analysis.paper import formulation, published
 from annelid.analysis.summary import Summary, summary
 from annelid.config import load_config
+from annelid.draw.table import closing_sentence, legend, summary_rows, summary_table
 from annelid.simulation.runfile import Run
-from annelid.view.table import closing_sentence, legend, summary_rows, summary_table
 
 FAST = load_config("riddle2023-fast")
 RODS = load_config("riddle2023-rods")

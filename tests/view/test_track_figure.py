@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from annelid.config import load_config
+from annelid.draw.figures.track import FRONT, track_figure
 from annelid.errors import RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid.view.figures.track import FRONT, track_figure
 
 
 def drawn(pixels: np.ndarray, color: str) -> bool:

@@ -48,11 +48,11 @@ def bench_command(
     """
     import json
 
-    from annelid.studies.bench.benchmark import bench
-    from annelid.studies.progress import study_progress
+    from annelid.experiment.progress import study_progress
     from annelid.terminal import Console
-    from annelid.view.bench_table import bench_table
-    from annelid.view.figures.bench import bench_figure
+    from annelid_studies.bench.benchmark import bench
+    from annelid_studies.bench.table import bench_table
+    from annelid_studies.figures.bench import bench_figure
 
     lock(output)
     try:

@@ -14,8 +14,8 @@ from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
+    from annelid.experiment.workers import Workers
     from annelid.simulation.runfile import Run
-    from annelid.studies.workers import Workers
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
 """What runs where no preset is named: the paper's worm with its soft pins, or the one with rigid crossings."""
@@ -75,7 +75,7 @@ def workers_for(cluster: str | None, jobs: int | None) -> AbstractContextManager
         ConfigError: It names no cluster.
     """
     from annelid.config import find_cluster
-    from annelid.studies.cluster import workers_of
+    from annelid.experiment.cluster import workers_of
 
     return nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
 
@@ -152,9 +152,9 @@ def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
 def print_table(run: Run) -> None:
     """Prints the numbers of a run, those to compare with beside them, and what follows."""
     from annelid.analysis import gait, summary
+    from annelid.draw.gait_table import add_gait
+    from annelid.draw.table import closing_sentence, summary_table
     from annelid.terminal import Console
-    from annelid.view.gait_table import add_gait
-    from annelid.view.table import closing_sentence, summary_table
 
     numbers = summary(run)
     table = summary_table(numbers, run.config)

@@ -55,9 +55,9 @@ def export_command(
     annelid export runs/riddle2023-rods-001 --to mat --every 10 --from-time 2 --to-time 4 -o two_seconds.mat
     annelid export runs/riddle2023-rods-001 --to html -o report.html
     """
+    from annelid.draw.gallery import task_bar
     from annelid.export import Selection, find_format, selected
     from annelid.simulation.runfile import open_run
-    from annelid.view.gallery import task_bar
 
     kind = find_format(to)
     given = {"--signals": signals, "--every": every, "--from-time": from_time, "--to-time": to_time}

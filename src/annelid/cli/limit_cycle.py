@@ -54,10 +54,10 @@ def limit_cycle_command(
     from typing import cast, get_args
 
     from annelid.analysis.limit_cycle import Time, limit_cycle
+    from annelid.draw.cycle_table import HEADINGS, cycle_numbers, cycle_table
+    from annelid.draw.figures.limit_cycle import limit_cycle_figure
+    from annelid.draw.plots import plot_path
     from annelid.terminal import Console
-    from annelid.view.cycle_table import HEADINGS, cycle_numbers, cycle_table
-    from annelid.view.figures.limit_cycle import limit_cycle_figure
-    from annelid.view.plots import plot_path
 
     if output is not None:
         output = plot_path(output)

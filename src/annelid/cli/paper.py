@@ -40,10 +40,10 @@ def paper_command(
     annelid paper --only pins --only friction          these examinations only
     annelid paper -o report --claims docs/paper.md     and the table of claims for the repository
     """
-    from annelid.studies.paper import reproduce
-    from annelid.studies.progress import study_progress
-    from annelid.studies.report import claims_page, write_report
-    from annelid.view.output import whole_file, with_suffix
+    from annelid.experiment.progress import study_progress
+    from annelid.output import whole_file, with_suffix
+    from annelid_studies.riddle2023.paper import reproduce
+    from annelid_studies.riddle2023.report import claims_page, write_report
 
     lock(output)
     if claims is not None:

@@ -69,10 +69,10 @@ def plot(
     annelid plot runs/riddle2023-001 -o figure7.pdf
     annelid plot runs/riddle2025-001 --figure track
     """
+    from annelid.draw.figures.track import track_figure
+    from annelid.draw.plots import figure7, plot_path
     from annelid.errors import RunFileError, suggest
     from annelid.simulation.runfile import open_run
-    from annelid.view.figures.track import track_figure
-    from annelid.view.plots import figure7, plot_path
 
     figures = {"figure7": figure7, "track": track_figure}
     if figure not in figures:
@@ -109,9 +109,9 @@ def render(
     annelid render runs/riddle2023-001 --video slow.mp4 --speed 0.25
     annelid render runs/riddle2023-001 --time 1.5 --camera side -o side.png
     """
+    from annelid.draw.gallery import video_bar
+    from annelid.draw.render import render_frame, render_video
     from annelid.simulation.runfile import open_run
-    from annelid.view.gallery import video_bar
-    from annelid.view.render import render_frame, render_video
 
     if video is None and at is None:
         raise typer.BadParameter("say what to draw: --time SECONDS for a frame, --video FILE for a video")

@@ -45,8 +45,8 @@ def robustness_command(
     annelid robustness --controller sns-robust  only ours
     annelid robustness --points 300             all
     """
-    from annelid.studies.progress import study_progress
-    from annelid.studies.robustness import CONTROLLERS, robustness, shares, shares_table
+    from annelid.experiment.progress import study_progress
+    from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
     lock(output)
     try:

@@ -99,10 +99,10 @@ def run_command(
     annelid run riddle2023-rods --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
     annelid run riddle2023-rods --uncertainty 8 --uncertainty-from calibration/calibration.json
     """
+    from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import open_run
-    from annelid.view.gallery import draw_all
 
     if uncertainty is None and (uncertainty_from, vary, jobs) != (None, None, None):
         raise typer.BadParameter("--uncertainty-from, --vary and --jobs need --uncertainty N")

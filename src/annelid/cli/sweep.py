@@ -48,15 +48,15 @@ def sweep_command(
     if example:
         from importlib.resources import files
 
-        typer.echo((files("annelid.studies.sweep") / "example.toml").read_text(encoding="utf-8"), nl=False)
+        typer.echo((files("annelid.experiment.sweep") / "example.toml").read_text(encoding="utf-8"), nl=False)
         return
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
-    from annelid.studies.progress import study_progress
-    from annelid.studies.sweep import swept
-    from annelid.studies.sweep.dataset import dataset_of
-    from annelid.studies.sweep.results import results_table, write_results
+    from annelid.experiment.progress import study_progress
+    from annelid.experiment.sweep import swept
+    from annelid.experiment.sweep.dataset import dataset_of
+    from annelid.experiment.sweep.results import results_table, write_results
     from annelid.terminal import Console
 
     loaded = load_study(study)

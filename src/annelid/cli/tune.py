@@ -59,14 +59,14 @@ def tune_command(
     annelid tune riddle2025 --objective speed --objective slip --trials 200 -o front
     annelid run tune/best.toml
     """
+    from annelid.experiment.case import Case
+    from annelid.experiment.progress import study_progress
+    from annelid.experiment.store import Store
+    from annelid.experiment.tune.judge import objectives_of
+    from annelid.experiment.tune.results import HISTORY, chosen, results_table, write_results
+    from annelid.experiment.tune.search import Task, Trial, search
+    from annelid.experiment.tune.space import variables_of
     from annelid.plausibility import refuse_nonsense
-    from annelid.studies.case import Case
-    from annelid.studies.progress import study_progress
-    from annelid.studies.store import Store
-    from annelid.studies.tune.judge import objectives_of
-    from annelid.studies.tune.results import HISTORY, chosen, results_table, write_results
-    from annelid.studies.tune.search import Task, Trial, search
-    from annelid.studies.tune.space import variables_of
     from annelid.terminal import Console
 
     lock(output)

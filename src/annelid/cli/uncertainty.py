@@ -13,7 +13,7 @@ from annelid.errors import ConfigError
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
-    from annelid.studies.uncertainty import Uncertainty
+    from annelid.experiment.uncertainty import Uncertainty
 
 
 def run_with_error_bars(
@@ -42,11 +42,11 @@ def run_with_error_bars(
         given: The words after ``annelid run`` that tell the worm, to name the command that goes on.
 
     Raises:
-        AnnelidError: As `annelid.studies.uncertainty.uncertainty`.
+        AnnelidError: As `annelid.experiment.uncertainty.uncertainty`.
         Exit: It was interrupted; finished runs are kept.
     """
-    from annelid.studies.progress import study_progress
-    from annelid.studies.uncertainty import read_spread, uncertainty
+    from annelid.experiment.progress import study_progress
+    from annelid.experiment.uncertainty import read_spread, uncertainty
 
     spread = read_spread(source).but(_errors(vary))
     try:
@@ -72,7 +72,7 @@ def run_with_error_bars(
 
 def report_error_bars(result: Uncertainty, *, quiet: bool) -> None:
     """Writes the files of a run with error bars, prints its table unless quiet, and names the files."""
-    from annelid.studies.uncertainty import uncertainty_table, write_uncertainty
+    from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
     from annelid.terminal import Console
 
     paths = write_uncertainty(result)

@@ -76,12 +76,12 @@ def view_command(
         _export(worm, export, speed, force)
         return
     if native:
-        from annelid.view.live.native import show_native
+        from annelid.live.native import show_native
 
         show_native(worm, speed=speed)
         return
-    from annelid.view.live.server import free_port, warning_of
-    from annelid.view.live.show import Show
+    from annelid.live.server import free_port, warning_of
+    from annelid.live.show import Show
 
     if (warning := warning_of(host)) is not None:
         complain(f"warning: {warning}")
@@ -114,8 +114,8 @@ def _worm_or_run(
 
 
 def _export(worm: RunConfig | Run, path: Path, speed: float, force: bool) -> None:
-    from annelid.view.gallery import task_bar
-    from annelid.view.live.page import export_page, page_path
+    from annelid.draw.gallery import task_bar
+    from annelid.live.page import export_page, page_path
 
     path = page_path(path)
     refuse_existing(path, force, "--export")

@@ -75,7 +75,7 @@ def build(
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
     from annelid.body.mjcf import mjcf_text
-    from annelid.view.output import whole_file
+    from annelid.output import whole_file
 
     refuse_existing(output, force)
     config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
@@ -99,8 +99,8 @@ def presets(
     annelid presets riddle2023 --fields
     """
     from annelid.config import load_config, preset_names, preset_text
+    from annelid.draw.table import field_lines, presets_table
     from annelid.terminal import Console
-    from annelid.view.table import field_lines, presets_table
 
     if name is not None and not fields:
         typer.echo(preset_text(name), nl=False)
@@ -124,8 +124,8 @@ def arenas(
     annelid run --arena my_pipe.toml --set arena.radius=0.8
     """
     from annelid.config import arena_names, arena_summary, arena_text
+    from annelid.draw.table import arenas_table
     from annelid.terminal import Console
-    from annelid.view.table import arenas_table
 
     if name is not None:
         typer.echo(arena_text(name), nl=False)
@@ -146,10 +146,10 @@ def doctor(
     annelid doctor
     annelid doctor --report
     """
-    from annelid.view.doctor import examine
+    from annelid.draw.doctor import examine
 
     if report:
-        from annelid.view.bug_report import bug_report
+        from annelid.draw.bug_report import bug_report
 
         typer.echo(bug_report(list(examine())))
         return

@@ -7,10 +7,10 @@ import weakref
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.draw.camera import view_angles
+from annelid.draw.scene import PostureScene
 from annelid.environments.episode import Episode
 from annelid.errors import require_at_least
-from annelid.view.camera import view_angles
-from annelid.view.scene import PostureScene
 
 
 class Pictures:

@@ -71,7 +71,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             start_activation: Activations at the start are drawn evenly from 0 to this; the only thing that the seed
                 decides, beside the noise of the sensors (``changes={"sensor.noise_m": ..}``).
             render_mode: None, or ``"rgb_array"``.
-            camera: View of the pictures, see `annelid.view.camera.VIEWS_DEG`.
+            camera: View of the pictures, see `annelid.draw.camera.VIEWS_DEG`.
             width: Of the pictures, pixels.
             height: Of the pictures, pixels.
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from annelid.export.tables import Table
-from annelid.view.output import write_csv
+from annelid.output import write_csv
 
 CHUNK_ROWS = 20_000
 

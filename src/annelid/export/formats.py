@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError, suggest
 from annelid.export.delimited import write_table
 from annelid.export.matlab import write_matlab
@@ -15,8 +16,7 @@ from annelid.export.mjcf import write_mjcf
 from annelid.export.page import write_page
 from annelid.export.parquet import write_parquet
 from annelid.export.tables import Table, about, tables_of
-from annelid.view.output import with_suffix, write_json
-from annelid.view.render import Progress, render_video
+from annelid.output import with_suffix, write_json
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run

@@ -11,7 +11,7 @@ import numpy as np
 
 from annelid.export.selection import CLOCKS, signal_names
 from annelid.export.tables import about, labels_of
-from annelid.view.output import whole_file
+from annelid.output import whole_file
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run

@@ -10,7 +10,7 @@ import numpy as np
 from annelid.body.mjcf import Keyframe, mjcf_text
 from annelid.config import PlanarWorm
 from annelid.errors import RunFileError
-from annelid.view.output import whole_file
+from annelid.output import whole_file
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.export.tables import Table
-from annelid.view.output import whole_file
+from annelid.output import whole_file
 
 
 def write_parquet(table: Table, path: Path, facts: dict[str, Any]) -> Path:

@@ -1,6 +1,6 @@
 """Networks as Graphviz source, as a plain SVG, and as Markdown tables: text only, nothing to install.
 
-The SVG is a working drawing. `annelid.view.figures` draws networks in the style of the papers.
+The SVG is a working drawing. `annelid.draw.figures` draws networks in the style of the papers.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ from annelid.cli.common import workers_for
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock
 
 if TYPE_CHECKING:
-    from annelid.studies.progress import StudyProgress
-    from annelid.studies.store import Store
+    from annelid.experiment.progress import StudyProgress
+    from annelid.experiment.store import Store
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
@@ -40,8 +40,8 @@ def kept_runs(
         RunFileError: Another process writes there.
         typer.Exit: The user has interrupted it.
     """
-    from annelid.studies.progress import study_progress
-    from annelid.studies.store import Store
+    from annelid.experiment.progress import study_progress
+    from annelid.experiment.store import Store
 
     lock(output)
     folder = output / "runs"

@@ -34,8 +34,8 @@ def pipes_command(
     annelid experiment pipes --quick
     annelid experiment pipes -o pipes
     """
-    from annelid.studies.pipes import pass_pipes, pipes_picture, pipes_table, trials, write_readings
     from annelid.terminal import Console
+    from annelid_studies.pipes import pass_pipes, pipes_picture, pipes_table, trials, write_readings
 
     with kept_runs(["pipes"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         found = pass_pipes(store, trials(quick), jobs=jobs, progress=progress)

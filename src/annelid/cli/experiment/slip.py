@@ -36,7 +36,9 @@ def slip_command(
     """
     import numpy as np
 
-    from annelid.studies.slip.feedback import (
+    from annelid.terminal import Console
+    from annelid_studies.figures.slip import feedback_figure
+    from annelid_studies.slip.feedback import (
         FEEDBACKS,
         FRICTIONS,
         PRESET,
@@ -46,8 +48,6 @@ def slip_command(
         slip_feedback,
         write_readings,
     )
-    from annelid.terminal import Console
-    from annelid.view.figures.slip import feedback_figure
 
     words = ["slip", "--preset", preset]
     with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
@@ -86,7 +86,9 @@ def slip_detector_command(
     annelid experiment slip-detector -o slip
     """
     from annelid.analysis.detector import score
-    from annelid.studies.slip.detection import (
+    from annelid.terminal import Console
+    from annelid_studies.figures.slip import detector_figure
+    from annelid_studies.slip.detection import (
         LIMIT_M_PER_S,
         QUICK,
         curves,
@@ -95,8 +97,6 @@ def slip_detector_command(
         slip_detection,
         write_scores,
     )
-    from annelid.terminal import Console
-    from annelid.view.figures.slip import detector_figure
 
     words = ["slip-detector"]
     with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):

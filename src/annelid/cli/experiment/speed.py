@@ -36,8 +36,8 @@ def speed_command(
     annelid experiment speed
     annelid experiment speed crawler tune/best.toml -o mine
     """
-    from annelid.studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
     from annelid.terminal import Console
+    from annelid_studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
 
     words = ["speed", *(gaits or [])]
     with kept_runs(words, output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):

@@ -32,8 +32,8 @@ def turning_command(
     annelid experiment turning --quick
     annelid experiment turning -o turning
     """
-    from annelid.studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
     from annelid.terminal import Console
+    from annelid_studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
 
     with kept_runs(["turning"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)

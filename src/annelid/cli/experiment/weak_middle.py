@@ -35,8 +35,10 @@ def weak_middle_command(
     annelid experiment weak-middle --quick
     annelid experiment weak-middle -o weak-middle
     """
-    from annelid.studies.weak_middle.asymmetry import asymmetry
-    from annelid.studies.weak_middle.results import (
+    from annelid.terminal import Console
+    from annelid_studies.figures.weak_middle import weak_middle_figure
+    from annelid_studies.weak_middle.asymmetry import asymmetry
+    from annelid_studies.weak_middle.results import (
         asymmetry_table,
         checks_table,
         panels,
@@ -46,9 +48,7 @@ def weak_middle_command(
         sweep_table,
         write_readings,
     )
-    from annelid.studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
-    from annelid.terminal import Console
-    from annelid.view.figures.weak_middle import weak_middle_figure
+    from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
 
     found = None
     with kept_runs(["weak-middle"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):

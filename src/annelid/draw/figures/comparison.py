@@ -1,0 +1,170 @@
+"""Runs overlaid: lengths of rings and segments, potentials, and where they went."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.analysis.travel import way_ahead
+from annelid.config import WormBody
+from annelid.draw.canvas import canvas, save
+from annelid.draw.style import panel_title, plain, segment_colors
+from annelid.errors import RunFileError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from annelid.simulation.runfile import Run
+
+MOST_ROWS = 6
+"""Segments that get a panel: of more, as many from the first to the last, evenly spaced."""
+_CM = 100.0
+
+
+def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
+    """Draws how much each segment is longer than at rest, and its ring in shares of its longest.
+
+    Args:
+        runs: The runs, of any kinds of worm.
+        labels: A name for each.
+        path: File to write.
+
+    Raises:
+        RunFileError: No run recorded lengths, or the file cannot be written.
+    """
+    drawn = ["stretch_length" in run.data or "ring_length" in run.data for run in runs]
+    if not any(drawn):
+        raise RunFileError("none of these runs recorded lengths of segments or rings")
+    segments = _shown(runs, drawn)
+    with canvas(0.8 + 1.15 * len(segments)) as figure:
+        panels = figure.subplots(len(segments), 2, sharex=True, sharey="col", squeeze=False)
+        panel_title(panels[0, 0], "Segment, longer than at rest (cm)")
+        panel_title(panels[0, 1], "Ring (% of its longest)")
+        for run, color in zip(runs, segment_colors(len(runs)), strict=True):
+            for (left, right), segment in zip(panels, segments, strict=True):
+                if segment < run.config.body.n_segments:
+                    _plot(left, run, _elongation(run), segment, color)
+                    _plot(right, run, _rings(run), segment, color)
+        for (left, _), segment in zip(panels, segments, strict=True):
+            left.set_ylabel(f"segment {segment + 1}")
+        for axes in panels[-1]:
+            axes.set_xlabel("time (s)")
+        _legend(figure, labels, drawn)
+        return save(figure, path)
+
+
+def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
+    """Draws the potentials of each segment's half-centre: contraction neurons solid, expansion neurons thin.
+
+    Raises:
+        RunFileError: No run recorded neurons of half-centres, or the file cannot be written.
+    """
+    drawn = [_potential(run, "contraction", 0) is not None for run in runs]
+    if not any(drawn):
+        raise RunFileError("none of these runs recorded potentials of half-centres")
+    segments = _shown(runs, drawn)
+    with canvas(0.8 + 1.15 * len(segments)) as figure:
+        panels = figure.subplots(len(segments), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        panel_title(panels[0], "Half-centres, above rest (mV); thick: contraction, thin: expansion")
+        for run, color in zip(runs, segment_colors(len(runs)), strict=True):
+            for axes, segment in zip(panels, segments, strict=True):
+                for kind, width in (("contraction", 1.5), ("expansion", 0.7)):
+                    values = _potential(run, kind, segment)
+                    if values is not None:
+                        axes.plot(run.data["time"].values, values, color=color, linewidth=width)
+        for axes, segment in zip(panels, segments, strict=True):
+            axes.set_ylabel(f"segment {segment + 1}")
+        panels[-1].set_xlabel("time (s)")
+        _legend(figure, labels, drawn)
+        return save(figure, path)
+
+
+def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
+    """Draws the way of the centre of mass towards where the front points at first, and its track seen from above.
+
+    Raises:
+        RunFileError: No run has a centre of mass that moves, or the file cannot be written.
+    """
+    ways = [_centre(run) for run in runs]
+    drawn = [way is not None for way in ways]
+    if not any(drawn):
+        raise RunFileError("none of these runs recorded where the worm went")
+    seen = [isinstance(run.config.body, WormBody) for run in runs]
+    with canvas(3.4) as figure:
+        panels = figure.subplots(1, 2 if any(seen) else 1, squeeze=False)[0]
+        panel_title(panels[0], "Way towards the front (cm)")
+        panels[0].set_xlabel("time (s)")
+        for run, way, above, color in zip(runs, ways, seen, segment_colors(len(runs)), strict=True):
+            if way is None:
+                continue
+            ahead = way_ahead(run)
+            panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), color=color)
+            if above:
+                panels[1].plot(way[:, 0], way[:, 1], color=color)
+                panels[1].plot(*way[-1, :2], marker="o", markersize=4, color=color)
+        if any(seen):
+            panel_title(panels[1], "Track of the middle from above (cm)")
+            panels[1].set_xlabel("x, front towards the left (heading 0)")
+            panels[1].set_ylabel("y")
+            panels[1].set_aspect("equal", adjustable="datalim")
+        _legend(figure, labels, drawn)
+        return save(figure, path)
+
+
+def _shown(runs: Sequence[Run], drawn: Sequence[bool]) -> list[int]:
+    """Segments that get a panel, counted from 0."""
+    n_segments = max(run.config.body.n_segments for run, shown in zip(runs, drawn, strict=True) if shown)
+    count = min(n_segments, MOST_ROWS)
+    return np.linspace(0, n_segments - 1, count).round().astype(int).tolist()
+
+
+def _plot(axes: Axes, run: Run, values: NDArray[np.float64] | None, segment: int, color: object) -> None:
+    if values is not None:
+        axes.plot(run.data["time"].values, values[:, segment], color=color)
+
+
+def _elongation(run: Run) -> NDArray[np.float64] | None:
+    """Mean lengthening of each segment's sensors, cm, ``(n_times, n_segments)``."""
+    if "stretch_length" not in run.data:
+        return None
+    stretch, rest = run.data["stretch_length"].values, run.data["stretch_rest_length"].values
+    return _CM * (stretch - rest).mean(axis=2)
+
+
+def _rings(run: Run) -> NDArray[np.float64] | None:
+    """Length of each segment's ring in percent of its longest in the run; a ring of two halves is as long as both."""
+    if "ring_length" not in run.data:
+        return None
+    lengths = run.data["ring_length"].values
+    whole = lengths.reshape(len(lengths), run.config.body.n_segments, -1).sum(axis=2)
+    return 100.0 * whole / whole.max(axis=0)
+
+
+def _potential(run: Run, kind: str, segment: int) -> NDArray[np.float64] | None:
+    if "potential" not in run.data:
+        return None
+    names = [str(name) for name in run.data["neuron"].values]
+    name = f"{kind}_{segment + 1}"
+    return run.data["potential"].values[:, names.index(name)] if name in names else None
+
+
+def _centre(run: Run) -> NDArray[np.float64] | None:
+    """Way of the centre of mass from its first place, cm, ``(n_times, 3)``; None for worms that go nowhere."""
+    if "center_of_mass" not in run.data:
+        return None
+    places = run.data["center_of_mass"].values
+    return _CM * (places - places[0]) if np.isfinite(places[:, 0]).all() else None
+
+
+def _legend(figure: Figure, labels: Sequence[str], drawn: Sequence[bool]) -> None:
+    """Names the runs that were drawn, above all panels."""
+    from matplotlib.lines import Line2D
+
+    runs = zip(segment_colors(len(labels)), labels, drawn, strict=True)
+    handles = [Line2D([], [], color=color, linewidth=2.0, label=plain(label)) for color, label, shown in runs if shown]
+    figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 3))

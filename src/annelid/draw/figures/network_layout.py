@@ -1,0 +1,234 @@
+"""Where the neurons of a network lie, and how its connections, inputs and outputs are led around them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from annelid.draw.figures.network_paths import (
+    RADIUS,
+    angle_between,
+    angle_of,
+    between_rims,
+    bow,
+    return_path,
+    self_loop,
+)
+from annelid.nervous import Connection, Network
+from annelid.protocols import Array
+
+_STUB = 0.42
+HEADER = RADIUS + _STUB + 0.16
+"""Height of a segment's name above its uppermost neuron."""
+
+_COLUMN_GAP = 1.35
+_CROWDED = 0.4
+_BENDS = (0.0, 0.2, -0.2, 0.35, -0.35, 0.55, -0.55, 0.8, -0.8)
+_NUMBERED = re.compile(r"(.+)_(\d+)")
+
+
+@dataclass(frozen=True)
+class Stub:
+    """An input's or output's short line to the outside.
+
+    Attributes:
+        name: Name of the input or output.
+        neuron: Name of the neuron.
+        path: From tail to head of the arrow, shape ``(2, 2)``.
+        outer: Its end away from the neuron, shape ``(2,)``.
+        direction: Unit vector from the neuron outwards, shape ``(2,)``.
+    """
+
+    name: str
+    neuron: str
+    path: Array
+    outer: Array
+    direction: Array
+
+    @property
+    def label(self) -> str:
+        """Its name, unless that is the neuron's."""
+        return "" if self.name == self.neuron else self.name.replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Where everything of a network is drawn, in units of the distance between neighbouring neurons.
+
+    Attributes:
+        places: Centre of every neuron, shape ``(2,)``.
+        routes: Path of every connection from neuron to neuron, each of shape ``(n, 2)``, in the network's order.
+        inputs: One stub for each neuron that an input drives.
+        outputs: One stub an output.
+        columns: Names of the neurons of each segment, by its number; empty in a circular layout.
+    """
+
+    places: dict[str, Array]
+    routes: tuple[Array, ...]
+    inputs: tuple[Stub, ...]
+    outputs: tuple[Stub, ...]
+    columns: dict[int, list[str]]
+
+
+def lay_out(network: Network) -> Diagram:
+    """Places neurons and leads connections around them.
+
+    Names that all end in ``_<n>`` make one column for each n, its neurons row by row from the top in their order; other
+    networks are laid out on a circle. A connection is straight where no neuron is in its way, and bent otherwise;
+    one from the last column back to the first passes below.
+    """
+    columns = _columns(network.neurons)
+    places = _in_columns(columns) if columns else _on_circle(list(network.neurons))
+    routes = tuple(_routes(network, places, columns))
+    busy = _busy_directions(network, places, routes)
+    outputs = [_stub(name, neuron, places, busy, columns, up=True) for name, neuron in network.outputs.items()]
+    inputs = [
+        _stub(name, neuron, places, busy, columns, up=False)
+        for name, neurons in network.inputs.items()
+        for neuron in neurons
+    ]
+    return Diagram(places, routes, tuple(inputs), tuple(outputs), columns)
+
+
+def bounds(diagram: Diagram) -> tuple[float, float, float, float]:
+    """Left, right, bottom and top of all there is, with room for the labels."""
+    label = 0.13
+    rim = RADIUS + 0.2
+    points = [place + sign * rim for place in diagram.places.values() for sign in (-1.0, 1.0)]
+    points += [*np.concatenate(diagram.routes)] if diagram.routes else []
+    for stub in (*diagram.inputs, *diagram.outputs):
+        width = label * len(stub.label)
+        sideways = stub.direction[0]
+        left = -width if sideways < -0.3 else -width / 2.0 if sideways < 0.3 else 0.0
+        points += [np.add(stub.outer, (left, -0.25)), np.add(stub.outer, (left + width, 0.25))]
+    corner = np.array(points).reshape(-1, 2)
+    (left, bottom), (right, top) = corner.min(axis=0) - 0.12, corner.max(axis=0) + 0.12
+    header = HEADER + 0.25 if diagram.columns else 0.0
+    return float(left), float(right), float(bottom), max(float(top), header)
+
+
+def role_of(name: str) -> str:
+    """A neuron's name without its segment's number."""
+    match = _NUMBERED.fullmatch(name)
+    return match[1] if match else name
+
+
+def _columns(names: Iterable[str]) -> dict[int, list[str]]:
+    """Names by the number they end in, in ascending order; empty if one of them has none."""
+    columns: dict[int, list[str]] = {}
+    for name in names:
+        match = _NUMBERED.fullmatch(name)
+        if match is None:
+            return {}
+        columns.setdefault(int(match[2]), []).append(name)
+    return dict(sorted(columns.items()))
+
+
+def _in_columns(columns: Mapping[int, list[str]]) -> dict[str, Array]:
+    n_wide = int(np.ceil(np.sqrt(max(len(names) for names in columns.values()))))
+    pitch = n_wide - 1 + _COLUMN_GAP
+    return {
+        name: np.array([rank * pitch + index % n_wide, -float(index // n_wide)])
+        for rank, names in enumerate(columns.values())
+        for index, name in enumerate(names)
+    }
+
+
+def _on_circle(names: list[str]) -> dict[str, Array]:
+    """Neighbours on the circle lie 1.3 apart, the first on the left and the others clockwise."""
+    n = len(names)
+    radius = 0.65 / np.sin(np.pi / n) if n > 1 else 0.0
+    angles = np.pi - 2.0 * np.pi * np.arange(n) / max(n, 1)
+    return {name: radius * np.array([np.cos(a), np.sin(a)]) for name, a in zip(names, angles, strict=True)}
+
+
+def _routes(network: Network, places: Mapping[str, Array], columns: Mapping[int, list[str]]) -> Iterable[Array]:
+    shared = Counter(frozenset((link.source, link.target)) for link in network.connections)
+    taken: dict[frozenset[str], list[float]] = {}
+    arrived: dict[str, list[float]] = {}
+    n_returns = 0
+    for link in network.connections:
+        start, end = places[link.source], places[link.target]
+        if link.source == link.target:
+            pair = taken.setdefault(frozenset((link.source,)), [])
+            pair.append(0.0)
+            yield self_loop(start, np.pi / 4.0 if columns else angle_of(start), len(pair))
+        elif _closes_the_ring(link, places, columns):
+            yield return_path(start, end, min(place[1] for place in places.values()), n_returns)
+            n_returns += 1
+        else:
+            pair = frozenset((link.source, link.target))
+            others = np.array([place for name, place in places.items() if name not in pair]).reshape(-1, 2)
+            # A bend counts from the same side for both directions, so that two paths never coincide.
+            side = 1.0 if link.source < link.target else -1.0
+            bends = _BENDS if shared[pair] == 1 else _BENDS[3:]
+            free = [bend for bend in bends if side * bend not in taken.get(pair, [])] or [1.1 + 0.3 * shared[pair]]
+            paths = [between_rims(bow(start, end, bend), start, end) for bend in free]
+            arrivals = arrived.setdefault(link.target, [])
+            costs = [10 * _n_hit(path, others) + _n_crowded(path[-1] - end, arrivals) for path in paths]
+            chosen = int(np.argmin(costs))
+            arrivals.append(angle_of(paths[chosen][-1] - end))
+            taken.setdefault(pair, []).append(side * free[chosen])
+            yield paths[chosen]
+
+
+def _closes_the_ring(link: Connection, places: Mapping[str, Array], columns: Mapping[int, list[str]]) -> bool:
+    """Whether a connection leads from the right end of a row in the last column to the left end of one in the first."""
+    if len(columns) < 2:
+        return False
+    first, *_, last = columns.values()
+
+    def at_the_end(name: str, names: list[str], sign: float) -> bool:
+        row = [places[other] for other in names if places[other][1] == places[name][1]]
+        return name in names and all(sign * place[0] <= sign * places[name][0] for place in row)
+
+    return at_the_end(link.source, last, 1.0) and at_the_end(link.target, first, -1.0)
+
+
+def _n_hit(path: Array, others: Array) -> int:
+    distance = np.linalg.norm(path[:, np.newaxis] - others, axis=2)
+    return int(np.sum(distance.min(axis=0) < 1.25 * RADIUS)) if len(others) else 0
+
+
+def _n_crowded(arrival: Array, others: Sequence[float]) -> int:
+    return sum(angle_between(angle_of(arrival), other) < _CROWDED for other in others)
+
+
+def _busy_directions(network: Network, places: Mapping[str, Array], routes: Sequence[Array]) -> dict[str, list[float]]:
+    """Angles, seen from each neuron, at which there is a connection or a close neighbour."""
+    busy: dict[str, list[float]] = {name: [] for name in places}
+    for link, route in zip(network.connections, routes, strict=True):
+        for name, end in ((link.source, route[0]), (link.target, route[-1])):
+            busy[name].append(angle_of(end - places[name]))
+    for name, place in places.items():
+        gaps = [other - place for key, other in places.items() if key != name]
+        busy[name] += [angle_of(gap) for gap in gaps if np.hypot(*gap) < 1.2]
+    return busy
+
+
+def _stub(
+    name: str,
+    neuron: str,
+    places: Mapping[str, Array],
+    busy: dict[str, list[float]],
+    columns: Mapping[int, list[str]],
+    *,
+    up: bool,
+) -> Stub:
+    """Leads an input (or ``up``, an output) away where there is room, near to down (up) or out of the circle."""
+    place = places[neuron]
+    wanted = angle_of(place) if not columns and np.any(place) else (0.5 if up else -0.5) * np.pi
+
+    def merit(angle: float) -> float:
+        room = min((angle_between(angle, other) for other in busy[neuron]), default=np.pi)
+        return min(room, 0.9) + 0.25 * np.cos(angle - wanted)
+
+    angle = max(np.pi / 8.0 * np.arange(16), key=merit)
+    busy[neuron].append(float(angle))
+    direction = np.array([np.cos(angle), np.sin(angle)])
+    rim, outer = place + RADIUS * direction, place + (RADIUS + _STUB) * direction
+    return Stub(name, neuron, np.array([rim, outer] if up else [outer, rim]), outer, direction)

@@ -1,0 +1,200 @@
+"""A sweep: lines over one field, maps over two, parallel axes over more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.style import panel_title, plain, segment_colors
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLORS = "viridis"
+_FAILED = "0.6"
+_MOST_TICKS = 8
+
+
+def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str], stem: str | Path) -> Path:
+    """Draws numbers over the varied fields; runs without a number are marked with crosses.
+
+    Args:
+        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``, of which the mean is
+            drawn.
+        fields: The varied fields, coordinates of the data.
+        numbers: Variables of the data, at most four; of three or more fields the first only.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written.
+
+    Returns:
+        The path of the picture in pixels.
+
+    Raises:
+        RunFileError: A file cannot be written.
+    """
+    if len(fields) > 2:
+        with canvas(3.8) as figure:
+            _parallel(figure, data, fields, numbers[0])
+            return save_both(figure, stem)
+    columns = min(2, len(numbers))
+    rows = ceil(len(numbers) / columns)
+    with canvas(0.5 + 2.6 * rows, 3.7 * columns if len(numbers) > 1 else 4.6) as figure:
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for i, (axes, name) in enumerate(zip(panels, numbers, strict=False)):
+            if len(fields) == 1:
+                _line(axes, data, fields[0], name)
+            else:
+                _map(figure, axes, data, fields, name)
+                if i % columns:
+                    axes.set_ylabel("")
+        for axes in panels[len(numbers) :]:
+            axes.set_visible(False)
+        return save_both(figure, stem)
+
+
+def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
+    values = data[name]
+    x, ticks = _axis(data[field].values)
+    others = [dim for dim in values.dims if dim != data[field].dims[0]]
+    y = values.transpose(data[field].dims[0], *others).values.reshape(len(x), -1)
+    dot, line, *_ = segment_colors(4)
+    order = np.argsort(x, kind="stable")
+    mean = _mean(y, axis=1)
+    if y.shape[1] > 1:
+        axes.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="0.65", markersize=4.0)
+    on_a_grid = data[field].dims == (field,)
+    axes.plot(x[order], mean[order], "o-" if on_a_grid else "o", color=line if on_a_grid else dot, markersize=3.5)
+    lost = np.isnan(y).any(axis=1)
+    edge = axes.get_xaxis_transform()
+    axes.plot(x[lost], np.full(lost.sum(), 0.03), "x", color=_FAILED, transform=edge, markersize=5.0)
+    _name_axis(axes, "x", data[field], ticks)
+    axes.set_ylabel(worded(name, values.attrs["units"]))
+
+
+def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
+    values = data[name]
+    if "repeat" in values.dims:
+        values = values.mean("repeat", keep_attrs=True)
+    along_x, along_y = (data[field] for field in fields)
+    (x, x_ticks), (y, y_ticks) = _axis(along_x.values), _axis(along_y.values)
+    if fields[0] in values.dims:
+        grid = np.ma.masked_invalid(values.transpose(fields[1], fields[0]).values)
+        shown: Any = axes.pcolormesh(np.arange(len(x) + 1) - 0.5, np.arange(len(y) + 1) - 0.5, grid, cmap=COLORS)
+        rows, columns = np.nonzero(np.ma.getmaskarray(grid))
+        axes.plot(columns, rows, "x", color=_FAILED, markersize=5.0)
+        # Cells are of one size, whatever the spacing of the values.
+        x_ticks, y_ticks = (_cells(coordinate.values) for coordinate in (along_x, along_y))
+    else:
+        z = values.values
+        told = np.isfinite(z)
+        shown = axes.scatter(x[told], y[told], c=z[told], cmap=COLORS, s=18.0)
+        axes.plot(x[~told], y[~told], "x", color=_FAILED, markersize=5.0)
+    axes.grid(visible=False)
+    _name_axis(axes, "x", along_x, x_ticks)
+    _name_axis(axes, "y", along_y, y_ticks)
+    figure.colorbar(shown, ax=axes, pad=0.02)
+    panel_title(axes, worded(name, values.attrs["units"]))
+
+
+def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
+    """Draws a line for each run through its values, in the colour of its number; each axis spans its own range."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    flat = data[[name]].reset_coords(drop=True)
+    if "repeat" in flat.dims:
+        flat = flat.mean("repeat", keep_attrs=True)
+    z = flat[name].values.ravel()
+    # On a grid each run's values are those at its place; in samples all fields lie along the samples already.
+    places = np.indices(flat[name].shape).reshape(flat[name].ndim, -1)
+    columns, ticks = [], []
+    for field in fields:
+        scale, labels = _axis(data[field].values)
+        axis = flat[name].dims.index(data[field].dims[0])
+        columns.append(scale[places[axis]])
+        ticks.append(labels)
+    told = np.isfinite(z)
+    low, high = (float(z[told].min()), float(z[told].max())) if told.any() else (0.0, 1.0)
+    norm = Normalize(low, high if high > low else low + 1.0)
+    shares = [*(_share(column) for column in columns), norm(z)]
+    axes = figure.subplots()
+    lines = np.array(shares, dtype=float).T
+    for i in np.argsort(np.nan_to_num(z, nan=-np.inf)):
+        color: Any = colormaps[COLORS](norm(z[i])) if told[i] else _FAILED
+        width, alpha = (0.9, 0.8) if told[i] else (0.5, 0.5)
+        axes.plot(range(len(shares)), lines[i], color=color, linewidth=width, alpha=alpha)
+    names = [_label(data[field]) for field in fields]
+    axes.set_xticks(range(len(shares)), [*names, worded(name, flat[name].attrs["units"])])
+    axes.set_yticks([])
+    axes.set_xlim(-0.2, len(shares) - 1 + 0.05)
+    axes.spines[["left", "bottom"]].set_visible(False)
+    for i in range(len(shares)):
+        axes.axvline(i, color="0.3", linewidth=0.8, zorder=3)
+    for i, (column, labels) in enumerate(zip(columns, ticks, strict=True)):
+        for value, text in labels or [(end, f"{end:.4g}") for end in (column.min(), column.max())]:
+            share = _share(np.append(column, value))[-1]
+            behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8}
+            at = {"textcoords": "offset points", "fontsize": 7.5, "va": "center", "zorder": 4, "bbox": behind}
+            axes.annotate(text, (i, share), (4, 0), **at)
+    figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=worded(name, flat[name].attrs["units"]))
+
+
+def _axis(values: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
+    """Returns where values lie along an axis, and the ticks of words; numbers have none of their own."""
+    if values.dtype.kind in "if":
+        return values.astype(float), []
+    words = list(dict.fromkeys(values.tolist()))
+    ticks = [(float(i), plain(str(word))) for i, word in enumerate(words)]
+    return np.array([words.index(value) for value in values], dtype=float), ticks
+
+
+def _cells(values: np.ndarray) -> list[tuple[float, str]]:
+    texts = [f"{value:.4g}" if values.dtype.kind in "if" else plain(str(value)) for value in values]
+    every = ceil(len(texts) / _MOST_TICKS)
+    return [(float(i), text) for i, text in enumerate(texts)][::every]
+
+
+def _name_axis(axes: Axes, which: str, coordinate: xr.DataArray, ticks: list[tuple[float, str]]) -> None:
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_label_text(_label(coordinate))
+    if ticks:
+        axis.set_ticks([place for place, _ in ticks], labels=[text for _, text in ticks])
+    elif coordinate.values.min() > 0.0 and _is_logarithmic(coordinate.values):
+        axes.set_xscale("log") if which == "x" else axes.set_yscale("log")
+
+
+def _is_logarithmic(values: np.ndarray) -> bool:
+    """Whether values over a decade are spread evenly by ratio rather than by difference."""
+    low, middle, high = np.min(values), np.median(values), np.max(values)
+    return bool(high > 10.0 * low and abs(np.log(middle**2 / (low * high))) < abs(np.log(2.0 * middle / (low + high))))
+
+
+def _share(values: np.ndarray) -> np.ndarray:
+    low, high = values.min(), values.max()
+    return (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
+
+
+def _mean(values: np.ndarray, axis: int) -> np.ndarray:
+    told = np.isfinite(values)
+    count = told.sum(axis=axis)
+    total = np.where(told, values, 0.0).sum(axis=axis)
+    return np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
+
+
+def _label(coordinate: xr.DataArray) -> str:
+    return worded(str(coordinate.name).rsplit(".", 1)[-1], coordinate.attrs["units"])
+
+
+def worded(name: str, unit: str) -> str:
+    """Writes a name without the unit that ends it, and the unit in brackets."""
+    if unit == "1":
+        return name.replace("_", " ")
+    ending = "_" + unit.replace("1/", "per ").replace("/", " per ").replace(" ", "_")
+    return f"{name.removesuffix(ending).replace('_', ' ')} ({unit})"

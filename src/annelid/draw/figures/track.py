@@ -1,0 +1,101 @@
+"""A worm's track seen from above, in the coordinates of its run: the worm leads towards -x, and its left is -y."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from annelid.analysis.track import Track, track_of
+from annelid.config import CourseTurning, Floor, RunConfig
+from annelid.draw.canvas import WIDTH_IN, canvas, save
+from annelid.draw.plots import plot_path
+from annelid.draw.style import panel_title
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from annelid.simulation.runfile import Run
+
+N_OUTLINES = 6
+"""Outlines drawn, the first and the last posture among them."""
+FIRST, LAST = "#9bb0c9", "#1b2a6b"
+FRONT = "#c2410c"
+WALL = "#bf784d"
+_EDGE_IN = 1.3
+"""Room that labels take beside the plot, inches."""
+
+
+def track_figure(run: Run, path: str | Path) -> Path:
+    """Draws where a 3D worm crawled: middle, front, outlines from light to dark, walls and waypoints.
+
+    Both axes have the same scale. The plot is turned so that the worm starts out to the left and its left is below, as
+    it is seen from above.
+
+    Args:
+        run: The run.
+        path: File to write; its suffix chooses the format (``.png``, ``.pdf``, ``.svg``).
+
+    Returns:
+        The path written.
+
+    Raises:
+        RunFileError: A planar worm, a run of fewer than two postures, or a file that cannot be written.
+    """
+    path = plot_path(path)
+    track = track_of(run)
+    with canvas(_height_in(track, run.config)) as figure:
+        axes = figure.subplots()
+        draw_track(axes, track)
+        draw_marks(axes, run.config)
+        reached = f"{track.time_s[-1]:g} s"
+        panel_title(axes, f"{run.config.name}: track of {reached}, seen from above")
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+        return save(figure, path)
+
+
+def draw_track(axes: Axes, track: Track, label: str = "middle of the body", color: str = LAST) -> None:
+    """Draws a track with outlines into axes of equal scale."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    shades = LinearSegmentedColormap.from_list("ages", [FIRST, LAST])
+    samples = np.linspace(0, len(track.time_s) - 1, N_OUTLINES).round().astype(int)
+    for place, sample in enumerate(samples):
+        shade = shades(place / (N_OUTLINES - 1))
+        outline = track.outline_m(sample)
+        axes.fill(*outline.T, facecolor=(*shade[:3], 0.12), edgecolor=shade, linewidth=0.9)
+        x, y = track.middle_m[sample]
+        axes.annotate(f"{track.time_s[sample]:.0f} s", (x, y), color=shade, fontsize=7, ha="center", va="center")
+    axes.plot(*track.front_m.T, color=FRONT, linewidth=0.7, label="foremost ring")
+    axes.plot(*track.middle_m.T, color=color, linewidth=1.6, label=label)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+
+
+def draw_marks(axes: Axes, config: RunConfig) -> None:
+    """Draws posts and guard rails, and waypoints with the circle within which each counts as reached."""
+    from matplotlib.patches import Circle
+
+    if isinstance(config.arena, Floor):
+        for x, y, radius in config.arena.posts or ():
+            axes.add_patch(Circle((x, y), radius, facecolor=WALL, edgecolor="none"))
+        if config.arena.rail_gap_m is not None:
+            for side in (-0.5, 0.5):
+                axes.axhline(side * config.arena.rail_gap_m, color=WALL, linewidth=2.0)
+    if isinstance(config.turning, CourseTurning):
+        for number, point in enumerate(config.turning.waypoints, start=1):
+            axes.add_patch(Circle(point, config.turning.reach_m, fill=False, color="0.6", linestyle=":"))
+            axes.annotate(str(number), point, fontsize=8, color="0.3", ha="center", va="center")
+
+
+def _height_in(track: Track, config: RunConfig) -> float:
+    """Height at which the plot fills the width of a page at equal scales, within reason."""
+    points = track.crossing_m[..., :2].reshape(-1, 2)
+    if isinstance(config.turning, CourseTurning):
+        points = np.concatenate([points, config.turning.waypoints])
+    if isinstance(config.arena, Floor) and config.arena.posts:
+        points = np.concatenate([points, [post[:2] for post in config.arena.posts]])
+    width, height = np.ptp(points, axis=0)
+    return float(np.clip((WIDTH_IN - _EDGE_IN) * height / width + _EDGE_IN, 2.6, 8.5))

@@ -1,0 +1,95 @@
+"""The pictures that a run ends with: as many as can be drawn on this machine."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from annelid.draw.plots import figure7
+from annelid.draw.render import Progress, render_frame, render_video
+from annelid.errors import AnnelidError
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+FRAME_TIME_S = 1.5
+"""Time of the frame, as in the paper's Fig. 8; half of the run where it is shorter."""
+BAR_AFTER_S = 2.0
+
+
+def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
+    """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``.
+
+    Args:
+        run: The run.
+        folder: Where the pictures go; those of an earlier run there are replaced.
+        video: Whether to draw the video.
+        quiet: Whether to do without a progress bar.
+        complain: Called at the end with one sentence for each reason for which pictures could not be drawn.
+
+    Yields:
+        The path of each picture once it is written.
+    """
+    times = run.data["time"].values
+    frame_time = FRAME_TIME_S
+    if times.size and not times[0] <= frame_time <= times[-1]:
+        frame_time = float(times[0] + times[-1]) / 2
+    frame_remedy = f"annelid render {folder} --time {frame_time:g}"
+    video_path = folder / "video.mp4"
+
+    def draw_video(path: Path) -> Path:
+        with video_bar(quiet=quiet) as progress:
+            return render_video(run, path, progress=progress)
+
+    pictures: list[tuple[str, Callable[[Path], Path], str]] = [
+        ("figure7.png", lambda path: figure7(run, path), f"annelid plot {folder}"),
+        ("frame.png", lambda path: render_frame(run, frame_time, path), frame_remedy),
+    ]
+    if video:
+        pictures.append((video_path.name, draw_video, f"annelid render {folder} --video {video_path}"))
+    failures: dict[str, list[tuple[str, str]]] = {}
+    for name, draw, remedy in pictures:
+        try:
+            path = draw(folder / name)
+        except (AnnelidError, OSError) as error:
+            failures.setdefault(str(error), []).append((name, remedy))
+        else:
+            yield path
+    for reason, failed in failures.items():
+        names = " and ".join(name for name, _ in failed)
+        remedies = " and ".join(remedy for _, remedy in failed)
+        complain(f"{names} not drawn: {reason} (the run is whole; then draw with: {remedies})")
+
+
+def video_bar(*, quiet: bool = False) -> AbstractContextManager[Progress | None]:
+    """Gives the progress callback of a video."""
+    return task_bar("drawing the video", quiet=quiet)
+
+
+@contextmanager
+def task_bar(task: str, *, quiet: bool = False) -> Iterator[Progress | None]:
+    """Gives a progress callback whose bar shows up on a terminal once a task takes more than two seconds."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import Progress as Bar
+
+    from annelid.terminal import Console
+
+    began = time.monotonic()
+    bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
+    shown = bar.add_task(task)
+
+    def update(done: int, total: int) -> None:
+        if time.monotonic() - began > BAR_AFTER_S:
+            bar.start()
+            bar.update(shown, completed=done, total=total, refresh=True)
+
+    try:
+        yield update
+    finally:
+        bar.stop()

@@ -1,0 +1,217 @@
+"""Finding an OpenGL back-end that works without a screen, and drawing a MuJoCo scene with it.
+
+A back-end may be missing, may fail, or may bring the whole process down, so each one is first tried in a
+process of its own. ``MUJOCO_GL`` is obeyed where the user set it; where it is not set, Linux gets the first
+of EGL, OSMesa and (with a display) GLFW that draws, and macOS and Windows their own.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.errors import RenderingUnavailable
+
+if TYPE_CHECKING:
+    import mujoco
+
+INSTALL_LINE = "apt install libosmesa6"
+"""What installs a back-end that needs neither a graphics card nor a screen (Debian, Ubuntu)."""
+
+UNSET = "unset MUJOCO_GL"
+_OFF = {"disable", "disabled", "off", "false", "0"}
+_DEFAULT = {"", "enable", "enabled", "on", "true", "1"}
+_MODULES = {"egl": "egl", "osmesa": "osmesa", "glfw": "glfw", "glx": "glfw", "wgl": "glfw", "cgl": "cgl"}
+_PROBE_LIMIT_S = 60.0
+
+
+def candidates(environment: Mapping[str, str], system: str) -> list[str]:
+    """Returns the back-ends worth trying, best first.
+
+    Args:
+        environment: Environment variables, of which ``MUJOCO_GL`` decides if it names a back-end.
+        system: Operating system as `platform.system` calls it.
+
+    Raises:
+        RenderingUnavailable: ``MUJOCO_GL`` switches rendering off or names no back-end.
+    """
+    wanted = environment.get("MUJOCO_GL", "").strip().lower()
+    if wanted in _OFF:
+        raise RenderingUnavailable(f"rendering is switched off by MUJOCO_GL={wanted}: unset it to render")
+    if wanted not in _DEFAULT:
+        if wanted not in _MODULES:
+            raise RenderingUnavailable(
+                f"MUJOCO_GL={wanted} names no OpenGL back-end: unset it, or use one of {', '.join(_MODULES)}"
+            )
+        return [wanted]
+    if system == "Darwin":
+        return ["cgl", "glfw"]
+    if system == "Windows":
+        return ["glfw"]
+    screen = environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")
+    return ["egl", "osmesa", *(["glfw"] if screen else [])]
+
+
+@cache
+def works(backend: str) -> bool:
+    """Tells whether a back-end draws a picture, tried in a process of its own."""
+    environment = {**os.environ, "MUJOCO_GL": backend}
+    try:
+        probe = subprocess.run(
+            [sys.executable, "-m", "annelid.draw.gl", backend],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=_PROBE_LIMIT_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return probe.returncode == 0
+
+
+def find_backend() -> str:
+    """Returns the first back-end that works here.
+
+    Raises:
+        RenderingUnavailable: None works; the sentence names the line that installs one.
+    """
+    tried = candidates(os.environ, platform.system())
+    for backend in tried:
+        if works(backend):
+            return backend
+    if os.environ.get("MUJOCO_GL", "").strip().lower() not in _DEFAULT:
+        raise RenderingUnavailable(f"the OpenGL back-end {tried[0]} that MUJOCO_GL names does not work here: {UNSET}")
+    remedy = (
+        f"install one with: {INSTALL_LINE}"
+        if platform.system() == "Linux"
+        else "update the graphics driver, or render the run file on another machine"
+    )
+    raise RenderingUnavailable(f"no OpenGL back-end works here (tried {', '.join(tried)}): {remedy}")
+
+
+class Canvas:
+    """An off-screen picture of a MuJoCo model, used as a context manager.
+
+    Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
+    the back-end that `find_backend` chose.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int, backend: str, *, fine: bool = True) -> None:
+        """Keeps what `__enter__` opens.
+
+        Args:
+            model: The model; its off-screen size and sampling are set here.
+            width: Pixels.
+            height: Pixels.
+            backend: What `find_backend` returned.
+            fine: Shadows and smooth edges, which cost ten times the time where software draws.
+        """
+        model.vis.global_.offwidth = width
+        model.vis.global_.offheight = height
+        model.vis.quality.offsamples = 4 if fine else 0
+        self._model = model
+        self._fine = fine
+        self._size = (width, height)
+        self._backend = backend
+        self._context: Any = None
+        self._buffers: Any = None
+
+    def __enter__(self) -> Self:
+        import mujoco
+
+        try:
+            module = importlib.import_module(f"mujoco.{_MODULES[self._backend]}")
+            self._context = module.GLContext(*self._size)
+            self._context.make_current()
+            self._buffers = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+        except (ImportError, AttributeError, RuntimeError, OSError, mujoco.FatalError) as error:
+            self.close()
+            raise RenderingUnavailable(f"the OpenGL back-end {self._backend} failed: {error}") from error
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._buffers)
+        self._scene = mujoco.MjvScene(self._model, maxgeom=50_000)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._fine
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the back-end."""
+        if self._buffers is not None:
+            self._buffers.free()
+            self._buffers = None
+        if self._context is not None:
+            self._context.free()
+            self._context = None
+
+    def draw(
+        self,
+        data: mujoco.MjData,
+        camera: mujoco.MjvCamera,
+        option: mujoco.MjvOption,
+        caption: str = "",
+        *,
+        upright: NDArray[np.float64] | None = None,
+    ) -> NDArray[np.uint8]:
+        """Draws the model in its present posture.
+
+        Args:
+            data: The posture; kinematics up to the tendons must be up to date.
+            camera: Where it is seen from.
+            option: What is shown.
+            caption: Words in the lower left corner.
+            upright: Rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``; by
+                default the same.
+
+        Returns:
+            Pixels, shape ``(height, width, 3)``.
+        """
+        import mujoco
+
+        width, height = self._size
+        # Another canvas may have been opened in between.
+        self._context.make_current()
+        mujoco.mjv_updateScene(self._model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene)
+        if upright is not None:
+            for eye in self._scene.camera:
+                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ upright
+                eye.forward, eye.up = eye.forward @ upright, eye.up @ upright
+        pixels = np.empty((height, width, 3), dtype=np.uint8)
+        view = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(view, self._scene, self._buffers)
+        if caption:
+            corner = mujoco.mjtGridPos.mjGRID_BOTTOMLEFT
+            mujoco.mjr_overlay(mujoco.mjtFont.mjFONT_NORMAL, corner, view, caption, "", self._buffers)
+        mujoco.mjr_readPixels(pixels, None, view, self._buffers)
+        return pixels[::-1]
+
+
+def _probe(backend: str) -> bool:
+    """Draws a lit ball and tells whether anything showed up."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><light pos="0 0 5"/><geom size="1"/></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    camera = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, camera)
+    with Canvas(model, 32, 32, backend) as canvas:
+        return bool(np.any(canvas.draw(data, camera, mujoco.MjvOption())))
+
+
+if __name__ == "__main__":
+    sys.exit(0 if _probe(sys.argv[1]) else 1)

@@ -1,0 +1,161 @@
+"""The planar worms, drawn with matplotlib from their recorded outlines, or from heights and lengths alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.config import Daltorio2013Body
+from annelid.draw.style import STYLE, activation_color
+from annelid.errors import RunFileError
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+_DPI = 100
+_CM = 100.0
+_ROOM = 1.08
+_WALL = "0.75"
+
+
+class PlanarScene:
+    """Pictures of a planar worm's run, used as a context manager like `WormScene`.
+
+    Each segment is a rhombus, from segment 1 on the left, coloured by its activation. A worm that has forces is drawn
+    where it is, with its sides bent as they are and the walls of its pipe; a kinematic one has nothing to push
+    against, so the pictures keep its middle in place.
+    """
+
+    def __init__(self, run: Run, width: int, height: int) -> None:
+        """Takes the run's lengths and heights; ``width`` and ``height`` in pixels.
+
+        Raises:
+            RunFileError: The run holds no samples.
+        """
+        data = run.data
+        if data.sizes.get("time", 0) == 0:
+            raise RunFileError(f"{run.path} holds no samples to draw")
+        self.times_s: NDArray[np.float64] = data["time"].values
+        self._lengths = _CM * data["stretch_length"].values[:, :, 0]
+        self._heights = _CM * data["ring_length"].values
+        self._outline = _CM * data["outline"].values if "outline" in data else None
+        self._activation = data["activation"].values
+        self._size = (width, height)
+        body = run.config.body
+        self._wall_height = _CM * body.pipe_diameter_m / 2 if isinstance(body, Daltorio2013Body) else None
+
+    def __enter__(self) -> Self:
+        import matplotlib
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+        from matplotlib.patches import Polygon
+
+        width, height = self._size
+        with matplotlib.rc_context(STYLE):
+            figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, layout="constrained")
+            self._canvas = FigureCanvasAgg(figure)
+            axes = figure.add_subplot()
+            axes.set_aspect("equal")
+            axes.set_xlabel("along the body (cm)" if self._outline is None else "x (cm)")
+            axes.set_ylabel("height (cm)")
+            axes.set_xlim(*self._extent())
+            half_height = _ROOM * self._heights.max() / 2
+            if self._wall_height is not None:
+                half_height = max(half_height, 1.25 * self._wall_height)
+                axes.axhspan(self._wall_height, 2 * half_height, color=_WALL, linewidth=0, zorder=0)
+                axes.axhspan(-2 * half_height, -self._wall_height, color=_WALL, linewidth=0, zorder=0)
+            axes.set_ylim(-half_height, half_height)
+            self._title = axes.set_title(" ", animated=True)
+            self._rhombi = [
+                Polygon(np.zeros((4, 2)), closed=True, edgecolor="0.15", linewidth=1.2, animated=True)
+                for _ in range(self._lengths.shape[1])
+            ]
+            for rhombus in self._rhombi:
+                axes.add_patch(rhombus)
+            self._labels = [
+                axes.text(0, 0, str(i + 1), ha="center", va="center", color="w", size=13, weight="bold", animated=True)
+                for i in range(len(self._rhombi))
+            ]
+            self._canvas.draw()
+        # Axes and grid stay as they are, so each picture redraws the worm only: a tenth of the time.
+        self._background = self._canvas.copy_from_bbox(figure.bbox)
+        self._axes = axes
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._canvas.figure.clear()
+
+    def picture(self, frame: int) -> NDArray[np.uint8]:
+        """Draws one recorded sample.
+
+        Args:
+            frame: Index along the run's ``time`` dimension.
+
+        Returns:
+            Pixels, shape ``(height, width, 3)``.
+        """
+        corners = self._corners(frame)
+        for i, (patch, label) in enumerate(zip(self._rhombi, self._labels, strict=True)):
+            patch.set_xy(corners[i])
+            patch.set_facecolor(activation_color(float(self._activation[frame, i])))
+            label.set_position(corners[i].mean(axis=0))
+        self._title.set_text(f"{self.times_s[frame]:.2f} s   (red: contracted)")
+        self._canvas.restore_region(self._background)
+        for artist in (*self._rhombi, *self._labels, self._title):
+            self._axes.draw_artist(artist)
+        return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
+
+    def _corners(self, frame: int) -> NDArray[np.float64]:
+        if self._outline is None:
+            return rhombi(self._lengths[frame], self._heights[frame])
+        return bent_rhombi(self._outline[frame], len(self._rhombi))
+
+    def _extent(self) -> tuple[float, float]:
+        """Left and right limit of all pictures, cm."""
+        if self._outline is None:
+            half_length = _ROOM * float(self._lengths.sum(axis=1).max()) / 2
+            return -half_length, half_length
+        x = self._outline[:, :, 0]
+        margin = (_ROOM - 1) / 2 * float(np.ptp(x))
+        return float(x.min()) - margin, float(x.max()) + margin
+
+
+def bent_rhombi(outline: NDArray[np.float64], n_segments: int) -> NDArray[np.float64]:
+    """Closes each segment's part of the upper outline with its mirror image.
+
+    Args:
+        outline: Upper half of the worm, front tip to rear tip, shape ``(n_segments * n + 1, 2)``.
+        n_segments: Number of segments.
+
+    Returns:
+        Corners round each segment, shape ``(n_segments, 2 n, 2)``.
+    """
+    n = (len(outline) - 1) // n_segments
+    upper = outline[n * np.arange(n_segments)[:, np.newaxis] + np.arange(n + 1)]
+    return np.concatenate([upper, upper[:, -2:0:-1] * [1.0, -1.0]], axis=1)
+
+
+def rhombi(lengths: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lays rhombi in a row, tip to tip, its middle at the origin.
+
+    Args:
+        lengths: Horizontal diagonals, shape ``(n_segments,)``.
+        heights: Vertical diagonals, same shape and unit.
+
+    Returns:
+        Corners (left, top, right, bottom), shape ``(n_segments, 4, 2)``.
+    """
+    tips = np.concatenate(([0.0], np.cumsum(lengths))) - lengths.sum() / 2
+    left, right = tips[:-1], tips[1:]
+    middle, level = (left + right) / 2, np.zeros_like(left)
+    return np.stack(
+        [
+            np.stack([left, level], axis=1),
+            np.stack([middle, heights / 2], axis=1),
+            np.stack([right, level], axis=1),
+            np.stack([middle, -heights / 2], axis=1),
+        ],
+        axis=1,
+    )

@@ -1,0 +1,230 @@
+"""Frames and videos from a run's recorded states: later, and on any machine.
+
+The 3D worm is drawn by MuJoCo and needs OpenGL; the planar worms are drawn by matplotlib and do not.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.config import PlanarWorm
+from annelid.errors import MissingDependency, RunFileError
+from annelid.output import whole_file, with_suffix
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
+
+FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1280, 320), "boxerbaum2012": (1280, 320)}
+VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
+"""Width and height in pixels by the kind of body; a video's are multiples of 16, as its codec likes them."""
+FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
+DEFAULT_CAMERA = "isometric"
+MOST_PICTURES = 200_000
+"""Of a video, which are drawn some 30 a second."""
+FPS_RANGE = (1.0, 240.0)
+_H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
+# 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
+_PALETTE = "split[all][drawn];[all]palettegen=stats_mode=diff[colors];[drawn][colors]paletteuse=dither=bayer"
+_GIF: dict[str, Any] = {
+    "codec": "gif",
+    "pix_fmt_out": "pal8",
+    "macro_block_size": 1,
+    "output_params": ["-filter_complex", _PALETTE],
+}
+_FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip install imageio-ffmpeg"
+
+Progress = Callable[[int, int], object]
+"""Called with the number of frames done and their total."""
+
+
+class Scene(Protocol):
+    """What draws a run: recorded times, and one picture for each."""
+
+    times_s: NDArray[np.float64]
+
+    def picture(self, frame: int) -> NDArray[np.uint8]:
+        """Draws one of the recorded times, as pixels of shape ``(height, width, 3)``."""
+        ...
+
+
+def render_frame(
+    run: Run,
+    time_s: float,
+    path: str | Path,
+    *,
+    camera: str | None = None,
+    size: tuple[int, int] | None = None,
+) -> Path:
+    """Draws the recorded posture nearest to a time.
+
+    Args:
+        run: The run.
+        time_s: Simulated time, s.
+        path: Picture to write (``.png``, ``.jpg``).
+        camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
+        size: Width and height, pixels; by default `FRAME_SIZE`.
+
+    Returns:
+        The path written.
+
+    Raises:
+        RunFileError: The run does not hold that time, has no such camera, or the path has another suffix or
+            cannot be written.
+        RenderingUnavailable: No OpenGL back-end works.
+    """
+    import imageio.v3
+
+    path = with_suffix(path, FRAME_SUFFIXES, "a picture")
+    size = size or FRAME_SIZE[run.config.body.kind]
+    with _scene(run, size, camera, fine=True) as scene:
+        pixels = scene.picture(_nearest(run, scene.times_s, time_s))
+    with whole_file(path) as draft:
+        imageio.v3.imwrite(draft, pixels)
+    return path
+
+
+def render_video(
+    run: Run,
+    path: str | Path,
+    *,
+    fps: float = 25.0,
+    speed: float = 1.0,
+    camera: str | None = None,
+    size: tuple[int, int] | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Draws the whole run as a video (H.264, or an animated GIF), without shadows, which cost most of the time.
+
+    The file appears under its name only when it is complete.
+
+    Args:
+        run: The run.
+        path: Video to write (``.mp4``, ``.mov``, ``.mkv``, ``.gif``).
+        fps: Frames a second of the video, 1 to 240; the recorded posture nearest to each is shown.
+        speed: Simulated seconds a second of video: 1 is real time, 0.25 a quarter of it.
+        camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
+        size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
+        progress: Called after every frame.
+
+    Returns:
+        The path written.
+
+    Raises:
+        RunFileError: The run has no such camera, the path another suffix, ``fps`` or ``speed`` is out of range or makes
+            too many pictures,
+            or the file cannot be written whole, as on a full disk.
+        RenderingUnavailable: No OpenGL back-end works.
+        MissingDependency: There is no ffmpeg to write videos with.
+    """
+    path = with_suffix(path, VIDEO_SUFFIXES, "a video")
+    slowest, fastest = FPS_RANGE
+    if not slowest <= fps <= fastest:
+        raise RunFileError(f"fps = {fps:g}: a video has {slowest:g} to {fastest:g} frames a second")
+    if not 0 < speed < math.inf:
+        raise RunFileError(f"speed = {speed:g}: the speed of a video must be positive and finite")
+    size = size or _video_size(run.config.body.kind, path)
+    with (
+        _scene(run, size, camera, fine=False) as scene,
+        whole_file(path) as draft,
+        _video_writer(draft, fps, size, path) as video,
+    ):
+        first, last = float(scene.times_s[0]), float(scene.times_s[-1])
+        pictures = (last - first) * fps / speed + 1.0
+        if pictures > MOST_PICTURES:
+            raise RunFileError(
+                f"speed = {speed:g}: {last - first:g} s of the run at {fps:g} pictures a second make {pictures:.3g} "
+                f"pictures, more than {MOST_PICTURES:,}, which take about {pictures / 30 / 3600:.2g} h: raise the speed"
+            )
+        total = math.floor(pictures + 1e-6)
+        for done in range(total):
+            video.write(scene.picture(_nearest(run, scene.times_s, first + done * speed / fps)))
+            if progress is not None:
+                progress(done + 1, total)
+    return path
+
+
+def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> AbstractContextManager[Scene]:
+    if isinstance(run.config.body, PlanarWorm):
+        from annelid.draw.planar_scene import PlanarScene
+
+        if camera is not None:
+            raise RunFileError(f"camera {camera!r} does not apply: a planar worm has one view only")
+        return PlanarScene(run, *size)
+    from annelid.draw.scene import WormScene
+
+    return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine)
+
+
+def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
+    """Index of the recorded time nearest to a wanted one, which must lie within the run."""
+    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
+    if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
+        raise RunFileError(
+            f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
+        )
+    return int(np.abs(times_s - time_s).argmin())
+
+
+def _video_size(kind: str, path: Path) -> tuple[int, int]:
+    """A GIF is large for what it shows, and so it is drawn smaller."""
+    width, height = VIDEO_SIZE[kind]
+    return (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
+
+
+class _VideoWriter:
+    """Hands pictures to ffmpeg and counts them."""
+
+    def __init__(self, frames: Generator[None, NDArray[np.uint8] | None, None]) -> None:
+        self._frames = frames
+        self.n_frames = 0
+
+    def write(self, pixels: NDArray[np.uint8]) -> None:
+        """Adds a picture."""
+        self._frames.send(np.ascontiguousarray(pixels))
+        self.n_frames += 1
+
+
+@contextmanager
+def _video_writer(path: Path, fps: float, size: tuple[int, int], name: Path) -> Iterator[_VideoWriter]:
+    """Opens a video, and at the end makes sure that every picture is in it, for ffmpeg's exit status is lost."""
+    try:
+        import imageio_ffmpeg
+
+        ffmpeg = imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        raise MissingDependency(f"no ffmpeg to write {name} with: {_FFMPEG_REMEDY}") from None
+    if shutil.which(ffmpeg) is None:
+        raise MissingDependency(f"no ffmpeg to write {name} with, there is no program {ffmpeg}: {_FFMPEG_REMEDY}")
+    settings = _GIF if path.suffix.lower() == ".gif" else _H264
+    frames = imageio_ffmpeg.write_frames(
+        str(path),
+        size,
+        fps=fps,  # type: ignore[arg-type]
+        ffmpeg_log_level="quiet",
+        **settings,
+    )
+    frames.send(None)
+    writer = _VideoWriter(frames)
+    broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"
+    try:
+        try:
+            yield writer
+        finally:
+            frames.close()
+    except OSError as error:
+        raise RunFileError(broken) from error
+    try:
+        n_frames, _ = imageio_ffmpeg.count_frames_and_secs(path)
+    except (RuntimeError, OSError, ValueError) as error:
+        raise RunFileError(broken) from error
+    if n_frames != writer.n_frames:
+        raise RunFileError(f"{broken} {n_frames} of {writer.n_frames} pictures are in it")

@@ -1,0 +1,1 @@
+"""From a design to runs to numbers: sweeps, searches, calibration, error bars, and the store of runs."""

@@ -1,0 +1,220 @@
+"""One attempt at a run, by a worker on any machine: computed in a folder of its own, then published whole.
+
+Two workers may compute the same run, as where a cluster takes a slow one for dead. The first to publish wins, and the
+other's folder is dropped, so that a run is there once and never half.
+"""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import tempfile
+import uuid
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from annelid.config import RunConfig
+from annelid.errors import MOST_LISTED, ClusterError, RunFileError, SimulationStopped, shortened
+from annelid.experiment.fingerprint import READERS, code_fingerprint, physics_fingerprint
+from annelid.experiment.outcome import Outcome, outcome, read_outcome, write_outcome
+from annelid.simulation.runfile import FILE_NAME, Run, open_run
+
+OUTCOME_NAME = "outcome.json"
+MARK_NAME = ".store"
+"""A store's mark: a worker that reads it in the store's folder shares the file system."""
+DRAFTS = ".*.part"
+"""Folders of attempts."""
+
+MOST_BYTES = {FILE_NAME: 4 * 2**30, OUTCOME_NAME: 2**26}
+"""The files that a worker may send, and how large each may be, bytes."""
+
+Keep = Literal["runs", "outcomes"]
+"""What is kept of every run: all of its files, or its numbers only."""
+SENT: Mapping[Keep, str] = {"runs": FILE_NAME, "outcomes": OUTCOME_NAME}
+"""The one file that a worker sends: an outcome is read at home where its run is there."""
+Files = dict[str, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a worker must know of a run, in plain words.
+
+    Attributes:
+        name: Of the run's folder in the store.
+        config: The configuration as JSON.
+        code: Digests of the code that computes runs and that reads them.
+        home: The store's folder, absolute.
+        mark: The store's mark.
+        keep: What is kept.
+    """
+
+    name: str
+    config: str
+    code: tuple[str, str]
+    home: str
+    mark: str
+    keep: Keep
+
+
+def own_code() -> tuple[str, str]:
+    """Digests of this process' code that computes runs and that reads them."""
+    return physics_fingerprint(), code_fingerprint(*READERS)
+
+
+def attempt(task: Task) -> Files | None:
+    """Computes a run and publishes it in its store.
+
+    Returns:
+        None; or the content of the file to send by its name, where the store's folder is not that of this machine.
+
+    Raises:
+        ClusterError: This worker has other code.
+        AnnelidError: The run cannot be built or written. A run that a guard stops is no error.
+        KeyboardInterrupt: It was interrupted.
+    """
+    if task.code != own_code():
+        raise ClusterError(
+            f"the worker on {platform.node()} has other code: install the same versions of annelid, mujoco-core and "
+            "numpy as on this machine"
+        )
+    home = Path(task.home)
+    folder = home / task.name
+    if not _is_shared(home, task.mark):
+        with tempfile.TemporaryDirectory(prefix="annelid-") as away:
+            compute_run(RunConfig.model_validate_json(task.config), Path(away), task.keep)
+            return {SENT[task.keep]: (Path(away) / SENT[task.keep]).read_bytes()}
+    draft = new_draft(folder)
+    try:
+        compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
+        publish(draft, folder, task.keep)
+    except OSError:
+        # Where another attempt has won, this one's folder may have been cleared away under it.
+        if stored_outcome(folder, task.keep) is None:
+            raise
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    return None
+
+
+def fetch_results(files: Files, folder: Path, config: RunConfig, keep: Keep) -> None:
+    """Publishes a run that was computed on another machine, once its file is seen to be of this run.
+
+    Args:
+        files: What the worker sent.
+        folder: Of the run in the store.
+        config: Of the run.
+        keep: What is kept.
+
+    Raises:
+        ClusterError: It is another file, too large, damaged, or of another run.
+        OSError: It cannot be written.
+    """
+    name = SENT[keep]
+    if not isinstance(files, dict) or list(files) != [name]:
+        names = sorted(map(repr, files)) if isinstance(files, dict) else [f"a {type(files).__name__}"]
+        sent = f"{', '.join(names[:3])}{' ..' if len(names) > 3 else ''}"[:200]
+        raise ClusterError(f"a worker sent {sent or 'nothing'} in place of {name}: nothing of it is kept")
+    content = files[name]
+    if not isinstance(content, bytes) or len(content) > MOST_BYTES[name]:
+        raise ClusterError(f"a worker sent a {name} that is no file of at most {MOST_BYTES[name]:,} bytes")
+    draft = new_draft(folder)
+    try:
+        draft.mkdir()
+        (draft / name).write_bytes(content)
+        try:
+            if keep == "outcomes":
+                read_outcome(draft / name, code_fingerprint(*READERS))
+            elif (sent := open_run(draft)).config.model_dump_json() != config.model_dump_json():
+                raise ClusterError(f"a worker sent another run in place of {folder.name}: nothing of it is kept")
+            else:
+                keep_outcome(sent)
+        except (OSError, ClusterError):
+            raise
+        # What a file of others raises depends on what is wrong with it.
+        except Exception as error:
+            raise ClusterError(
+                f"a worker sent a damaged {name} of the run {folder.name}: {shortened(str(error), MOST_LISTED)}"
+            ) from None
+        publish(draft, folder, keep)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def compute_run(config: RunConfig, folder: Path, keep: Keep = "runs") -> None:
+    """Runs a configuration into a folder and writes its outcome beside it; of ``"outcomes"`` only that is left."""
+    from annelid.simulation.loop import simulate
+
+    try:
+        run = simulate(config, folder, progress=False, overwrite=True)
+    except SimulationStopped:
+        # A run that a guard stops is a finding, not a failure.
+        run = open_run(folder)
+    if run.status == "interrupted":
+        raise KeyboardInterrupt
+    keep_outcome(run)
+    if keep == "outcomes":
+        (folder / FILE_NAME).unlink()
+
+
+def keep_outcome(run: Run) -> Outcome:
+    """Reads the outcome of a run, and writes it beside the run."""
+    read = outcome(run)
+    folder = run.path.parent
+    draft = folder / f".{OUTCOME_NAME}.{uuid.uuid4().hex[:8]}.part"
+    write_outcome(read, draft, code_fingerprint(*READERS))
+    draft.replace(folder / OUTCOME_NAME)
+    return read
+
+
+def stored_outcome(folder: Path, keep: Keep = "runs") -> Outcome | None:
+    """Returns the outcome of the run in a folder, read again where its file is damaged or other code has read the run.
+
+    Returns:
+        The outcome; None where there is no whole run, or not all of it that is to be kept.
+    """
+    if keep == "runs" and not (folder / FILE_NAME).exists():
+        return None
+    try:
+        return read_outcome(folder / OUTCOME_NAME, code_fingerprint(*READERS))
+    except OSError:
+        return None
+    except ValueError:
+        with suppress(RunFileError):
+            return keep_outcome(open_run(folder))
+        return None
+
+
+def publish(draft: Path, folder: Path, keep: Keep) -> None:
+    """Gives a whole draft its name, unless another attempt came first."""
+    try:
+        draft.rename(folder)
+    except OSError:
+        if not folder.exists():
+            raise
+        if stored_outcome(folder, keep) is not None:
+            return
+        # What is there has no outcome that counts: an older annelid was killed over it, or it is not to be kept so.
+        aside = new_draft(folder)
+        folder.rename(aside)
+        draft.rename(folder)
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def new_draft(folder: Path) -> Path:
+    """Returns a name for an attempt's own folder beside that of the run."""
+    return folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}.part")
+
+
+def run_of_draft(draft: Path) -> Path:
+    """Returns the folder of the run that a draft is of."""
+    return draft.with_name(draft.name.removeprefix(".").rsplit(".", 2)[0])
+
+
+def _is_shared(home: Path, mark: str) -> bool:
+    try:
+        return (home / MARK_NAME).read_text(encoding="utf-8") == mark
+    except OSError:
+        return False

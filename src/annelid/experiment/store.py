@@ -1,0 +1,204 @@
+"""The store of runs: computed in parallel, each kept in a folder named by all that it depends on.
+
+A run is there or it is not: a folder gets its name once its outcome is written, which happens last. So a second call
+computes nothing, a killed one loses the runs in progress and no other, and changed code makes new folders.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import time
+import uuid
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, wait
+from contextlib import contextmanager
+from pathlib import Path
+
+from annelid.errors import ClusterError, RunFileError
+from annelid.experiment.attempt import (
+    DRAFTS,
+    MARK_NAME,
+    Keep,
+    Task,
+    fetch_results,
+    own_code,
+    run_of_draft,
+    stored_outcome,
+)
+from annelid.experiment.case import Work
+from annelid.experiment.fingerprint import physics_fingerprint
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.workers import Processes, Result, Workers
+from annelid.simulation.runfile import Run, open_run
+
+Progress = Callable[[int, int, float], object]
+"""Called with the number of runs done, their total, and the share of the work that is done."""
+
+POLL_S = 0.5
+"""How often workers are looked for that have come or gone, s."""
+
+
+class Store:
+    """A folder of runs."""
+
+    def __init__(self, folder: Path, workers: Workers | None = None, keep: Keep = "runs") -> None:
+        """Opens a store; the folder is made when the first run is computed.
+
+        Args:
+            folder: The folder.
+            workers: Who computes its runs; None for processes of this machine.
+            keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
+        """
+        self.folder = folder
+        self._workers = workers
+        self._keep: Keep = keep
+
+    def path(self, case: Work) -> Path:
+        """Folder of a case's run."""
+        return self.folder / f"{case.stem}-{case_key(case)}"
+
+    def __contains__(self, case: Work) -> bool:
+        return self._stored(case) is not None
+
+    def __getitem__(self, case: Work) -> Outcome:
+        """Outcome of a case that has been computed; KeyError if it has not."""
+        found = self._stored(case)
+        if found is None:
+            raise KeyError(case.command)
+        return found
+
+    def run(self, case: Work) -> Run:
+        """Opens the run of a case that has been computed.
+
+        Raises:
+            RunFileError: It has not, or its file is damaged.
+        """
+        return open_run(self.path(case))
+
+    def _stored(self, case: Work) -> Outcome | None:
+        return stored_outcome(self.path(case), self._keep)
+
+    def compute(
+        self,
+        cases: Iterable[Work],
+        *,
+        jobs: int | None = None,
+        progress: Progress | None = None,
+        failed: MutableMapping[str, Exception] | None = None,
+    ) -> Mapping[str, Outcome]:
+        """Runs those cases that are not there yet, the longest first, several at a time.
+
+        Args:
+            cases: The cases; a case given twice runs once.
+            jobs: Processes, by default as many as there are cores; has no effect on workers given to the store.
+            progress: Called at the start and after every run.
+            failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
+                end the call.
+
+        Returns:
+            The outcome by its `case_key` of every case but those that failed.
+
+        Raises:
+            AnnelidError: A case cannot be built, or its file cannot be written, and ``failed`` is None. A run that a
+                guard stops is no error: its outcome says so.
+            ClusterError: The workers are lost for good, or have other code. Finished runs are kept.
+            KeyboardInterrupt: Runs in progress are dropped, all others kept.
+        """
+        wanted = {case_key(case): case for case in cases}
+        found = {key: stored for key, case in wanted.items() if (stored := self._stored(case)) is not None}
+        missing = sorted((wanted[key] for key in wanted if key not in found), key=lambda case: -case.cost_s)
+        total_s = sum(case.cost_s for case in missing)
+        left_s, done = total_s, len(found)
+
+        def report() -> None:
+            if progress is not None:
+                progress(done, len(wanted), 1.0 - left_s / total_s if total_s else 1.0)
+
+        report()
+        if not missing:
+            return found
+        mark = self._mark()
+        with self._opened(min(jobs or os.cpu_count() or 1, len(missing))) as workers:
+            for case, error in self._computed(workers, missing, mark):
+                left_s, done = left_s - case.cost_s, done + 1
+                if error is None:
+                    found[case_key(case)] = self[case]
+                elif failed is None:
+                    raise error
+                else:
+                    failed[case_key(case)] = error
+                report()
+        self._clear_drafts()
+        return found
+
+    def _computed(
+        self, workers: Workers, missing: Sequence[Work], mark: str
+    ) -> Iterator[tuple[Work, Exception | None]]:
+        """Has runs computed, and hands each over as it is there or has failed."""
+        # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
+        # dies would be counted against the runs behind the one that killed it.
+        waiting, running, tries = deque(missing), dict[Result, Work](), Counter[str]()
+        while waiting or running:
+            while waiting and len(running) < workers.slots():
+                case = waiting.popleft()
+                running[workers.submit(self._task(case, mark))] = case
+            if not running:
+                time.sleep(POLL_S)
+            done, _ = wait(running, POLL_S, FIRST_COMPLETED)
+            for future in done:
+                case = running.pop(future)
+                key = case_key(case)
+                try:
+                    files = future.result()
+                    if files is not None:
+                        fetch_results(files, self.path(case), case.config, self._keep)
+                except CancelledError:
+                    waiting.append(case)
+                except ClusterError:
+                    raise
+                except ImportError as error:
+                    raise ClusterError(f"a worker cannot import annelid: install it there too ({error})") from error
+                except Exception as error:
+                    if isinstance(error, RunFileError | OSError | BrokenExecutor) and tries[key] < workers.retries:
+                        tries[key] += 1
+                        waiting.append(case)
+                    else:
+                        yield case, workers.explained(error)
+                else:
+                    yield case, None
+
+    def _task(self, case: Work, mark: str) -> Task:
+        config = case.config.model_dump_json()
+        return Task(self.path(case).name, config, own_code(), str(self.folder.resolve()), mark, self._keep)
+
+    def _mark(self) -> str:
+        """Returns the store's mark, by which a worker can tell that it sees the same folder."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / MARK_NAME
+        if not path.exists():
+            path.write_text(uuid.uuid4().hex, encoding="utf-8")
+        return path.read_text(encoding="utf-8")
+
+    def _clear_drafts(self) -> None:
+        """Removes what killed attempts have left of runs that are there now."""
+        for draft in self.folder.glob(DRAFTS):
+            if stored_outcome(run_of_draft(draft), self._keep) is not None:
+                shutil.rmtree(draft, ignore_errors=True)
+
+    @contextmanager
+    def _opened(self, jobs: int) -> Iterator[Workers]:
+        """Gives the store's own workers, or as many processes as are asked for."""
+        if self._workers is not None:
+            yield self._workers
+        else:
+            with Processes(jobs) as processes:
+                yield processes
+
+
+def case_key(case: Work) -> str:
+    """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
+    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,0 +1,5 @@
+"""Sweeps: fields of a configuration varied over a grid or in samples, all runs told in one labelled dataset."""
+
+from annelid.experiment.sweep.sweeping import Sweep, SweepRun, sweep, swept
+
+__all__ = ["Sweep", "SweepRun", "sweep", "swept"]

@@ -1,0 +1,174 @@
+"""A sweep: its runs computed by a cluster's workers as far as they are not there, and their results as one dataset."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from annelid.config import Cluster, Study, find_cluster, load_study
+from annelid.errors import AnnelidError
+from annelid.experiment.case import refusal
+from annelid.experiment.cluster import workers_of
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.progress import StudyProgress
+from annelid.experiment.store import Store, case_key
+from annelid.experiment.sweep.design import Plan, Point, plan_of
+from annelid.experiment.sweep.numbers import Number, check_rank, chosen_numbers
+from annelid.simulation.lock import locks
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+RUNS = "runs"
+"""Subfolder of the runs."""
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """One run of a sweep, done.
+
+    Attributes:
+        point: The run.
+        status: "stopped" where a guard ended it before its time, "failed" where it could not be computed.
+        reason: Why; empty for a complete run.
+        outcome: What is kept of it; None where it failed.
+    """
+
+    point: Point
+    status: Literal["complete", "stopped", "failed"]
+    reason: str
+    outcome: Outcome | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about it, a sentence each."""
+        return () if self.outcome is None else self.outcome.summary.warnings
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """All runs of a study.
+
+    Attributes:
+        plan: The design.
+        numbers: What is told of every run.
+        runs: The runs, in the order of the plan's points.
+        folder: Folder of the results.
+    """
+
+    plan: Plan
+    numbers: tuple[Number, ...]
+    runs: tuple[SweepRun, ...]
+    folder: Path
+
+
+@locks("folder")
+def sweep(
+    study: Study | str | Path | Mapping[str, Any],
+    folder: str | Path = "sweep",
+    *,
+    cluster: Cluster | str | None = None,
+    jobs: int | None = None,
+    progress: StudyProgress | None = None,
+) -> xr.Dataset:
+    """Computes a sweep, writes its results, and returns them.
+
+    Call it below ``if __name__ == "__main__":``, since workers start as new processes.
+
+    Args:
+        study: The study, the path of its TOML file, or a nested mapping.
+        folder: Folder for ``sweep.nc``, ``sweep.csv``, a figure, and the runs, which a second call finds there.
+        cluster: Where runs are computed: a section, or a word as `find_cluster` takes; default: processes of this
+            machine. What a study says of it is not used, since a scheduler and a job run code: name its file here.
+        jobs: Workers, instead of as many as there are cores, or as the cluster says.
+        progress: Called at the start and after every run.
+
+    Returns:
+        Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
+        ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason``, ``warnings``
+        and ``run`` tell of each run whether it is complete, why not, what is doubtful about it, and its folder.
+
+    Raises:
+        ConfigError: The study is refused, or all of its runs are.
+        MissingDependency: Dask, SciPy or dask-jobqueue is needed and not installed.
+        ClusterError: The workers are lost for good; finished runs are kept.
+        RunFileError: A file cannot be written.
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    from annelid.experiment.sweep.dataset import dataset_of
+    from annelid.experiment.sweep.results import write_results
+
+    to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
+    done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
+    data = dataset_of(done)
+    write_results(done, data)
+    return data
+
+
+def swept(
+    study: Study,
+    folder: Path,
+    *,
+    cluster: Cluster | str | None = None,
+    jobs: int | None = None,
+    progress: StudyProgress | None = None,
+    to_use: str = "pass it as cluster",
+) -> Sweep:
+    """Computes a sweep as `sweep` does, in a folder that the caller has locked, and writes nothing but the runs.
+
+    Args:
+        study: The study.
+        folder: As of `sweep`.
+        cluster: As of `sweep`.
+        jobs: As of `sweep`.
+        progress: As of `sweep`.
+        to_use: What the user has to do to have the cluster used that the study describes, for a sentence.
+    """
+    numbers = chosen_numbers(study.outputs)
+    check_rank(study.rank, numbers)
+    if cluster is None and study.cluster is not None:
+        warnings.warn(
+            f"the study {study.name!r} describes a cluster ({study.cluster}): not used; {to_use} to use it",
+            stacklevel=2,
+        )
+    chosen = find_cluster(cluster or "processes") if cluster is None or isinstance(cluster, str) else cluster
+    its_workers = workers_of(chosen, jobs)
+    plan = plan_of(study)
+    refused = []
+    for i, point in enumerate(plan.points):
+        if progress is not None:
+            progress("checking the study", i, len(plan.points), i / len(plan.points))
+        refused.append(refusal(point.case))
+    first = refused[0]
+    if first is not None and all(refused):
+        raise first
+    built = [point.case for point, error in zip(plan.points, refused, strict=True) if error is None]
+    failed: dict[str, Exception] = {}
+
+    def tell(done: int, total: int, share: float) -> None:
+        if progress is not None:
+            progress(f"sweep, {len(failed)} failed" if failed else "sweep", done, total, share)
+
+    with its_workers as workers:
+        outcomes = Store(folder / RUNS, workers, study.keep).compute(built, progress=tell, failed=failed)
+    runs = tuple(
+        _run(point, outcomes, failed) if error is None else SweepRun(point, "failed", str(error), None)
+        for point, error in zip(plan.points, refused, strict=True)
+    )
+    return Sweep(plan, tuple(numbers), runs, folder)
+
+
+def _run(point: Point, outcomes: Mapping[str, Outcome], failed: Mapping[str, Exception]) -> SweepRun:
+    key = case_key(point.case)
+    if key in outcomes:
+        message = outcomes[key].message
+        return SweepRun(point, "stopped" if message else "complete", message, outcomes[key])
+    return SweepRun(point, "failed", _sentence(failed[key]), None)
+
+
+def _sentence(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return text if isinstance(error, AnnelidError) and text else f"{type(error).__name__}: {text}"

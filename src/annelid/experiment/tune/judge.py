@@ -1,0 +1,103 @@
+"""What a gait is worth: its speed, its cost of transport and its slip, or what is wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+from annelid.analysis.gait import Gait
+from annelid.errors import ConfigError, suggest
+from annelid.experiment.outcome import Outcome
+
+LEAST_CYCLES = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Objective:
+    """A number that a gait is tuned for.
+
+    Attributes:
+        name: As a user gives it.
+        label: With its unit, for axes and tables.
+        better: "more" or "less".
+        penalty: What counts for a run that does not walk.
+        read: Reads it from a gait's numbers.
+    """
+
+    name: str
+    label: str
+    better: str
+    penalty: float
+    read: Callable[[Gait], float | None]
+
+    def is_better(self, one: float, other: float) -> bool:
+        """Whether one value is better than another."""
+        return one > other if self.better == "more" else one < other
+
+
+OBJECTIVES: Mapping[str, Objective] = {
+    one.name: one
+    for one in (
+        Objective("speed", "speed (m/s)", "more", 0.0, lambda gait: gait.speed_m_per_s),
+        Objective("cost-of-transport", "cost of transport", "less", 100.0, lambda gait: gait.cost_of_transport),
+        Objective("slip", "slip ratio", "less", 10.0, lambda gait: gait.slip_ratio),
+    )
+}
+"""The objectives. The cost of transport counts positive work, none of it regained. The penalties are worse than any
+gait that advances: no speed, and a cost and a slip beyond reach."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What was found of one run.
+
+    Attributes:
+        gait: Its numbers; None where it does not walk.
+        problem: Why it does not count as a gait; empty if it does.
+    """
+
+    gait: Gait | None
+    problem: str
+
+    def value(self, objective: Objective) -> float:
+        """Returns the value of an objective, its penalty for a run that does not walk."""
+        value = None if self.gait is None or self.problem else objective.read(self.gait)
+        return objective.penalty if value is None or not isfinite(value) else value
+
+
+def objectives_of(names: list[str]) -> list[Objective]:
+    """Returns one or two objectives by name.
+
+    Raises:
+        ConfigError: An unknown name, the same one twice, or more than two.
+    """
+    for name in names:
+        if name not in OBJECTIVES:
+            raise ConfigError(f"unknown objective {name!r}: {suggest(name, OBJECTIVES)}")
+    if not 1 <= len(set(names)) == len(names) <= 2:
+        raise ConfigError(f"objectives must be one or two of {', '.join(OBJECTIVES)}, not {', '.join(names)}")
+    return [OBJECTIVES[name] for name in names]
+
+
+def judge(outcome: Outcome, gait: Gait | None) -> Judged:
+    """Judges a run: it must have ended whole, in order, over at least two cycles, and advance.
+
+    In order are neighbours that take turns with steady periods and lags; onsets need not be evenly spaced.
+    """
+    return Judged(gait, _problem(outcome, gait))
+
+
+def _problem(outcome: Outcome, gait: Gait | None) -> str:
+    rhythm = outcome.rhythm
+    if outcome.message:
+        return f"stopped: {outcome.message}"
+    if rhythm.verdict == "silent":
+        return f"silent: {rhythm.reason}"
+    if not rhythm.is_regular:
+        return f"out of order: {rhythm.reason}"
+    if gait is None or gait.cycles < LEAST_CYCLES:
+        return f"fewer than {LEAST_CYCLES} whole cycles"
+    if gait.speed_m_per_s is None or not gait.speed_m_per_s > 0.0:
+        return "does not advance"
+    return ""

@@ -1,0 +1,96 @@
+"""From the readings of a run and its variants to error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log2, sqrt
+from statistics import stdev
+
+from annelid.experiment.uncertainty.readings import Reading
+
+NOT_CONVERGED = 0.5
+"""Numerical error, of the value, above which a quantity does not count as converged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity(Reading):
+    """A number of the run itself with its error bars, all in ``unit``; None for what cannot be told.
+
+    Attributes:
+        parameters: Sample standard deviation over the drawn worms.
+        time_step: Largest difference between the run and one of finer steps.
+        discretization: Largest difference between the run and one of more elements.
+        order: Order in which the value converges with the step, from two halvings; None unless both change it the
+            same way.
+        n_drawn: Number of drawn worms that it was read in.
+    """
+
+    parameters: float | None
+    time_step: float | None
+    discretization: float | None
+    order: float | None
+    n_drawn: int
+
+    @property
+    def errors(self) -> dict[str, float | None]:
+        """The three errors by their kinds."""
+        return {
+            "parameters": self.parameters,
+            "time step": self.time_step,
+            "elements": self.discretization,
+        }
+
+    @property
+    def total(self) -> float | None:
+        """Root of the sum of the squares of those errors that are known; None if none is."""
+        known = [error for error in self.errors.values() if error is not None]
+        return sqrt(sum(error**2 for error in known)) if known else None
+
+    @property
+    def converged(self) -> bool | None:
+        """Whether neither numerical error exceeds half of the value; None as long as one of them is not known."""
+        if self._faults:
+            return False
+        known = self.value is not None and None not in (self.time_step, self.discretization)
+        return True if known else None
+
+    @property
+    def note(self) -> str:
+        """What is wrong with it, in words; empty where nothing is."""
+        if self.value is None:
+            return "not told by this run"
+        unknown = [kind for kind, error in self.errors.items() if error is None]
+        words = [f"not converged: {' and '.join(self._faults)}"] if self._faults else []
+        words += [f"without {' and '.join(unknown)}"] if unknown else []
+        return "; ".join(words)
+
+    @property
+    def _faults(self) -> list[str]:
+        if self.value is None:
+            return []
+        limit = NOT_CONVERGED * abs(self.value)
+        numerical = {kind: error for kind, error in self.errors.items() if kind != "parameters"}
+        return [kind for kind, error in numerical.items() if error is not None and error > limit]
+
+
+def scatter(values: Sequence[float | None]) -> float | None:
+    """Sample standard deviation of the values that are known; None for fewer than two."""
+    known = [value for value in values if value is not None]
+    return stdev(known) if len(known) > 1 else None
+
+
+def largest_difference(value: float | None, finer: Sequence[float | None]) -> float | None:
+    """Largest distance of a value from those of finer runs; None if it or all of them are unknown."""
+    differences = [abs(value - other) for other in finer if value is not None and other is not None]
+    return max(differences, default=None)
+
+
+def order_of_convergence(value: float | None, half: float | None, quarter: float | None) -> float | None:
+    """Order p of an error that goes as ``step**p``, from values at a step, its half and its quarter.
+
+    None where one is unknown, or the halvings do not change the value the same way.
+    """
+    if value is None or half is None or quarter is None or (value - half) * (half - quarter) <= 0.0:
+        return None
+    return log2((value - half) / (half - quarter))

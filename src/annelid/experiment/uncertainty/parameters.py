@@ -1,0 +1,224 @@
+"""What is uncertain about a worm's body, by how much, and worms drawn from it.
+
+Errors and their correlations are those of a fit to the load frame (`annelid.experiment.calibration`); the one that lies
+beside this module is what ``annelid calibrate`` writes. They are relative and are laid about the run's own values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import resources
+from math import exp, inf, sqrt
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+from annelid.config import RunConfig, WormBody
+from annelid.errors import ConfigError, UnreadableText, suggest
+from annelid.experiment.calibration.fit import PARAMETERS
+from annelid.experiment.calibration.loop import wrap_factors
+from annelid.morphology import Array
+from annelid.textfiles import parse_json, read_text
+
+CABLE = "cable_friction"
+FIELDS: Mapping[str, tuple[str, ...]] = {
+    **{name: tuple(parameter.changes(parameter.start)) for name, parameter in PARAMETERS.items()},
+    CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N"),
+    "floor_friction": ("arena.friction",),
+}
+"""What can be varied, and the fields that it scales: what a fit may change, and the floor. The shear modulus keeps its
+ratio to Young's. The cable's friction is no field of a body: it scales the rings' force by the mean tension of a cable,
+``(1 - exp(-m)) / m`` of that at its pulled end. By default what the load frame tells apart is varied: the first three.
+The others have no error that anyone has measured."""
+CALIBRATION = "calibration.json"
+DEFAULT_SOURCE = "annelid calibrate"
+LEAST_EIGENVALUE = -1e-6
+ABSENT, UNMEASURED, EXACT = "0 or not set in this worm", "its error is not known", "its error is 0"
+"""Why a parameter is not varied."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """How uncertain parameters are.
+
+    Attributes:
+        names: The parameters, of `FIELDS`, ``(p,)``.
+        relative_error: Standard deviation of the logarithm of each, ``(p,)``.
+        correlation: Of those, ``(p, p)``.
+        source: Where the errors come from.
+        cable_exponent: m, friction of the cable times the angle it is wrapped round, where that is uncertain.
+    """
+
+    names: tuple[str, ...]
+    relative_error: Array
+    correlation: Array
+    source: str
+    cable_exponent: float | None = None
+
+    def but(self, errors: Mapping[str, float]) -> Spread:
+        """Returns the spread with other errors, by parameter; those that it lacks are correlated with none.
+
+        Raises:
+            ConfigError: An unknown parameter, an error out of range, or the cable's without its exponent.
+        """
+        for name, error in errors.items():
+            if name not in FIELDS:
+                raise ConfigError(f"unknown parameter {name!r}: {suggest(name, FIELDS)}")
+            if not 0.0 <= error < 1.0:
+                raise ConfigError(f"relative error of {name} = {error:g} must be at least 0 and below 1")
+        if CABLE in errors and self.cable_exponent is None:
+            raise ConfigError(f"{CABLE} cannot be varied: {self.source} has no value of it")
+        names = (*self.names, *(name for name in errors if name not in self.names))
+        known = dict(zip(self.names, self.relative_error.tolist(), strict=True)) | dict(errors)
+        correlation = np.eye(len(names))
+        correlation[: len(self.names), : len(self.names)] = self.correlation
+        source = f"{self.source}; {', '.join(f'{name} as given' for name in errors)}" if errors else self.source
+        return Spread(names, np.array([known[name] for name in names]), correlation, source, self.cable_exponent)
+
+    def only(self, names: Sequence[str]) -> Spread:
+        """Returns the spread of some of its parameters."""
+        chosen = [self.names.index(name) for name in names]
+        correlation = self.correlation[np.ix_(chosen, chosen)]
+        return replace(self, names=tuple(names), relative_error=self.relative_error[chosen], correlation=correlation)
+
+
+def read_spread(path: Path | None = None) -> Spread:
+    """Reads the errors of a fit.
+
+    Args:
+        path: A ``calibration.json`` of ``annelid calibrate``; None for the one that comes with annelid.
+
+    Raises:
+        ConfigError: The file cannot be read, is no such file, or the fit does not tell a parameter at all.
+    """
+    bundled = (resources.files(__package__ or __name__) / CALIBRATION).read_text(encoding="utf-8")
+    try:
+        content: dict[str, Any] = parse_json(bundled if path is None else read_text(path), str(path))
+        fitted = {str(name): (float(of["value"]), of["relative_error"]) for name, of in content["parameters"].items()}
+        rows: list[list[float | None]] = content["correlation"]
+        correlation = np.array([[np.nan if value is None else value for value in row] for row in rows], dtype=float)
+        if correlation.shape != (len(fitted), len(fitted)):
+            raise ValueError("shape")
+    except UnreadableText:
+        raise
+    except (ValueError, OverflowError, KeyError, TypeError, AttributeError):
+        raise ConfigError(f"{path} is no calibration.json of `annelid calibrate`") from None
+    for name, (_, error) in fitted.items():
+        if name not in FIELDS:
+            raise ConfigError(f"{path} has an unknown parameter {name!r}: {suggest(name, FIELDS)}")
+        if error is None or not 0.0 <= float(error) < inf:
+            raise ConfigError(f"{path} does not tell {name}: its relative error is not finite; fit fewer with --free")
+    if not _is_correlation(correlation):
+        raise ConfigError(f"{path}: correlation must be symmetric and positive, with ones on its diagonal")
+    return Spread(
+        tuple(fitted),
+        np.array([float(error) for _, error in fitted.values()]),
+        correlation,
+        DEFAULT_SOURCE if path is None else str(path),
+        fitted[CABLE][0] if CABLE in fitted else None,
+    )
+
+
+def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str]]:
+    """Splits what a spread can change in a worm from what it cannot.
+
+    Returns:
+        The spread of those parameters that change the worm, and the reason of every other one by its name.
+
+    Raises:
+        ConfigError: The body is planar.
+    """
+    if not isinstance(config.body, WormBody):
+        raise ConfigError(
+            f"body.kind = {config.body.kind!r} has no calibrated parameters and no elements, so no error bars; they "
+            "are for the 3D worm (body.kind = 'worm')"
+        )
+    left_out: dict[str, str] = {}
+    errors = dict(zip(spread.names, spread.relative_error.tolist(), strict=True))
+    for name in FIELDS:
+        if not any(scaled_fields(config, name)):
+            left_out[name] = ABSENT
+        elif not errors.get(name):
+            left_out[name] = EXACT if name in errors else UNMEASURED
+    return spread.only([name for name in spread.names if name not in left_out]), left_out
+
+
+def draw(n: int, spread: Spread, seed: int) -> Array:
+    """Draws relative changes in the logarithm: normal numbers with exactly the errors and correlations asked for.
+
+    They are the numbers nearest to a Latin hypercube of independent normal ones whose sample has mean 0 and covariance
+    1, then correlated and scaled. An answer that is linear in them scatters exactly as linear propagation says, where a
+    few independent draws correlate by chance. Fewer than p + 1 worms cannot have such a sample: theirs lies in a
+    subspace drawn at random and has the same total variance.
+
+    Args:
+        n: How many worms, at least 2.
+        spread: Errors and correlations of p parameters.
+        seed: Of the draw.
+
+    Returns:
+        Shape ``(n, p)``.
+    """
+    p = len(spread.names)
+    if not p:
+        return np.empty((n, 0))
+    normal = np.vectorize(NormalDist().inv_cdf, otypes=[float])(hypercube(n, p, np.random.default_rng(seed)))
+    left, _, right = np.linalg.svd(normal - normal.mean(axis=0), full_matrices=False)
+    rank = min(n - 1, p)
+    independent = sqrt((n - 1) * p / rank) * left[:, :rank] @ right[:rank]
+    values, vectors = np.linalg.eigh(spread.correlation)
+    root = vectors * np.sqrt(values.clip(min=0.0)) @ vectors.T
+    return independent @ root * spread.relative_error
+
+
+def hypercube(n: int, p: int, rng: np.random.Generator) -> Array:
+    """Draws a Latin hypercube in (0, 1), shape ``(n, p)``, p at least 1: in every column one number in each n-th."""
+    strata = np.column_stack([rng.permutation(n) for _ in range(p)])
+    # Open at both ends, where the normal numbers are infinite.
+    return (strata + rng.uniform(1e-6, 1.0 - 1e-6, strata.shape)) / n
+
+
+def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any]:
+    """Returns the fields of one drawn worm by dotted path.
+
+    Args:
+        config: The worm that is varied.
+        spread: Parameters that change it, see `applicable`.
+        relative: Change of the logarithm of each, ``(p,)``.
+    """
+    changed: dict[str, Any] = {}
+    for name, change in zip(spread.names, relative.tolist(), strict=True):
+        factor = exp(change)
+        if name == CABLE and spread.cable_exponent is not None:
+            pulled, drawn = (wrap_factors(m)[0] for m in (spread.cable_exponent, spread.cable_exponent * factor))
+            factor = pulled / drawn
+        for path, value in scaled_fields(config, name):
+            changed[path] = [factor * each for each in value] if isinstance(value, tuple) else factor * value
+    return changed
+
+
+def scaled_fields(config: RunConfig, name: str) -> Iterator[tuple[str, Any]]:
+    """Gives the fields that a parameter scales in this worm by dotted path, and their values."""
+    for path in FIELDS[name]:
+        value = _value(config, path)
+        if value:
+            yield path, value
+
+
+def _value(config: RunConfig, path: str) -> Any:
+    value: Any = config
+    for key in path.split("."):
+        value = getattr(value, key, None)
+    return value
+
+
+def _is_correlation(matrix: Array) -> bool:
+    return bool(
+        np.isfinite(matrix).all()
+        and np.allclose(matrix, matrix.T)
+        and np.allclose(np.diag(matrix), 1.0)
+        and (np.linalg.eigvalsh(matrix) > LEAST_EIGENVALUE).all()
+    )

@@ -1,0 +1,188 @@
+"""Who computes the runs of a store: processes of this machine, or the workers of a cluster (`cluster.py`)."""
+
+from __future__ import annotations
+
+import os
+import signal
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Self
+
+from annelid.errors import ClusterError, RunKilled
+from annelid.experiment.attempt import Files, Task, attempt
+from annelid.experiment.lifeline import end_with_parent
+from annelid.simulation.interruption import Interruption
+
+Result = Future[Files | None]
+
+STARTS = 5
+"""Processes that are tried for one run before they count as unable to start."""
+_SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+class Workers(ABC):
+    """Workers that each compute one run at a time; used as a context, at whose end they are let go.
+
+    Attributes:
+        retries: How often a run is tried again whose files could not be written.
+    """
+
+    retries: int = 0
+
+    @abstractmethod
+    def slots(self) -> int:
+        """Returns how many runs can be under way now.
+
+        Raises:
+            ClusterError: The workers are lost for good.
+        """
+
+    @abstractmethod
+    def submit(self, task: Task) -> Result:
+        """Has a run computed; a future that ends cancelled was lost on the way and may be submitted again."""
+
+    def explained(self, error: Exception) -> Exception:
+        """Returns an error of a run as one that a user can read."""
+        return error
+
+    @abstractmethod
+    def close(self, *, drop: bool) -> None:
+        """Lets the workers go, ``drop`` with what they are at."""
+
+    def __enter__(self) -> Self:
+        """Begins to use them."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Lets them go."""
+        self.close(drop=error is not None)
+
+
+@dataclass
+class _Process:
+    """A process with a queue of its own: should it die, only its own run is lost.
+
+    Attributes:
+        pool: The process.
+        ready: Done once it has started.
+        result: Of its last run.
+    """
+
+    pool: ProcessPoolExecutor
+    ready: Future[int]
+    result: Result | None = None
+
+
+class Processes(Workers):
+    """Processes of this machine, started as runs come; one that dies is replaced, and all end with this process.
+
+    They are reached through pipes: no port is opened.
+    """
+
+    def __init__(self, jobs: int | None = None, retries: int = 2) -> None:
+        """Prepares.
+
+        Args:
+            jobs: How many; default: one a core.
+            retries: How often a run is tried again whose process died or whose files could not be written.
+        """
+        self.retries = retries
+        self._jobs = jobs or os.cpu_count() or 1
+        self._processes: list[_Process] = []
+        self._lifeline: tuple[Connection, Connection] | None = None
+
+    def slots(self) -> int:
+        """Returns how many runs can be under way."""
+        return self._jobs
+
+    def submit(self, task: Task) -> Result:
+        """Has a run computed by a process that is free.
+
+        Raises:
+            ClusterError: Processes end as they start.
+        """
+        free = next((one for one in self._processes if one.result is None or one.result.done()), None)
+        if free is not None and free.result is not None and isinstance(free.result.exception(), BrokenExecutor):
+            self._bury(free)
+            free = None
+        # The pool starts its process as it takes work.
+        with _single_threaded():
+            for left in reversed(range(STARTS)):
+                free = free or self._start()
+                try:
+                    free.result = free.pool.submit(attempt, task)
+                    # One that dies at this very moment may lose the run without a word, so that it would never end
+                    # (CPython 3.11); a pool that still takes a call tells of what it has taken before.
+                    free.pool.submit(os.getpid)
+                    break
+                except BrokenExecutor:
+                    # It was killed while it had nothing to do.
+                    self._bury(free)
+                    free = None
+                    if not left:
+                        raise ClusterError(
+                            f"{STARTS} processes ended as they started: killed, or out of memory (try fewer --jobs)"
+                        ) from None
+        assert free is not None
+        assert free.result is not None
+        return free.result
+
+    def explained(self, error: Exception) -> Exception:
+        """Says in a sentence that the process of a run has died."""
+        if isinstance(error, BrokenExecutor):
+            return RunKilled(f"its worker died {self.retries + 1} times: killed, or out of memory (try fewer --jobs)")
+        return error
+
+    def close(self, *, drop: bool) -> None:
+        """Ends the processes."""
+        reader, writer = self._lifeline or (None, None)
+        if drop and writer is not None:
+            writer.close()
+        for one in self._processes:
+            one.pool.shutdown(wait=True, cancel_futures=drop)
+        if reader is not None and writer is not None:
+            reader.close()
+            writer.close()
+        self._processes, self._lifeline = [], None
+
+    def _start(self) -> _Process:
+        context = get_context("spawn")
+        if self._lifeline is None:
+            self._lifeline = context.Pipe(duplex=False)
+        pool = ProcessPoolExecutor(1, context, end_with_parent, (self._lifeline[0],))
+        # Interrupted halfway, it would leave a process that complains of it.
+        with Interruption() as interruption:
+            self._processes.append(_Process(pool, pool.submit(os.getpid)))
+        if interruption.requested is not None:
+            signal.raise_signal(signal.Signals[interruption.requested])
+        return self._processes[-1]
+
+    def _bury(self, dead: _Process) -> None:
+        self._processes.remove(dead)
+        dead.pool.shutdown(wait=True)
+        if dead.ready.exception() is not None:
+            raise ClusterError(
+                "the processes that compute runs end as they start: in a script, call this below "
+                'if __name__ == "__main__":'
+            )
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Has the workers' linear algebra keep to one thread each: the runs are what is parallel."""
+    before = {name: os.environ.get(name) for name in _SINGLE_THREADED}
+    os.environ.update({name: value for name, value in _SINGLE_THREADED.items() if before[name] is None})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)

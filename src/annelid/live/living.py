@@ -1,0 +1,158 @@
+"""A worm that runs while it is watched: it can be changed, poked and started anew."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from annelid.config import RunConfig, WormBody, load_config
+from annelid.errors import ConfigError
+from annelid.live.moments import Moment, Reel, signal_names
+from annelid.morphology import Array
+from annelid.protocols import Records
+from annelid.simulation.adjust import adjusted
+from annelid.simulation.assemble import build_controller
+from annelid.simulation.coupling import Coupling, start
+from annelid.simulation.worm import WormPlant
+
+ENDLESS_S = 1e7
+"""A live worm runs until the view ends; its configuration keeps the duration that it has."""
+SAMPLE_S = 0.01
+"""Signals for the plots are kept at most this often, in simulated time."""
+POKE_S = 0.15
+"""How long a poke lasts, in simulated time."""
+POKE_RADIUS_M = 0.06
+"""Distance from the middle of a poke at which its force has fallen to 0.6, as under the flat of a hand."""
+
+
+class LivingWorm:
+    """Body, nervous system and what is remembered of them.
+
+    Attributes:
+        config: What it runs under now.
+        coupling: Plant and controller.
+        reel: What is remembered, up to the present.
+    """
+
+    def __init__(self, config: RunConfig) -> None:
+        """Builds the worm and puts it at time zero.
+
+        Raises:
+            ConfigError: The body is planar, or cannot be built.
+        """
+        require_worm(config)
+        self._first = self.config = config
+        self.restart()
+
+    @property
+    def plant(self) -> WormPlant:
+        """The body."""
+        plant = self.coupling.plant
+        assert isinstance(plant, WormPlant)
+        return plant
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time, s."""
+        return self.coupling.step * self.config.clock.control_timestep_s
+
+    def restart(self) -> None:
+        """Begins anew at time zero under the present configuration, and forgets what was."""
+        plant = WormPlant(self.config)
+        self.coupling: Coupling = start(_endless(self.config), plant, build_controller(self.config, plant), None)
+        self._poke_ends_s = -1.0
+        self._next_sample_s = 0.0
+        self.reel = Reel(signal_names(self._neurons(), plant.n_muscles))
+        self._remember_signals()
+        self.remember()
+
+    def as_at_first(self) -> None:
+        """Gives all fields the values that the worm came with; it goes on from where it is."""
+        self._take(self._first)
+
+    def adjust(self, values: Mapping[str, Any]) -> None:
+        """Changes fields of the configuration; the worm goes on from where it is.
+
+        Args:
+            values: By dotted path.
+
+        Raises:
+            ConfigError: A value is out of range, or the body cannot be built with it; nothing has changed then.
+        """
+        self._take(load_config(self.config.model_dump(), values))
+
+    def _take(self, config: RunConfig) -> None:
+        self.coupling = adjusted(self.coupling, _endless(self.config), _endless(config))
+        self.config = config
+
+    def advance(self, until_s: float, deadline: float) -> None:
+        """Runs up to a simulated time, or to a moment of `time.perf_counter`, and remembers where it has come to.
+
+        Raises:
+            SimulationStopped: A guard stopped it; what is remembered stays.
+        """
+        begun = self.coupling.step
+        while self.time_s < until_s - 1e-9 and (self.coupling.step == begun or perf_counter() < deadline):
+            if self._poke_ends_s >= 0 and self.time_s >= self._poke_ends_s:
+                self._poke_ends_s = -1.0
+                self.plant.push(np.zeros((self.plant.geometry.n_crossings, 3)))
+            self.coupling.advance()
+            if self.time_s >= self._next_sample_s:
+                self._remember_signals()
+        if self.coupling.step > begun:
+            self.remember()
+
+    def poke(self, place_m: Array, force_N: Array) -> None:
+        """Pushes the skin about a place for a short time.
+
+        Args:
+            place_m: In the model's axes, m, ``(3,)``.
+            force_N: The whole force, N, ``(3,)``; neighbouring crossings share it.
+        """
+        away = np.linalg.norm(np.asarray(self.plant.read(True)["crossing_position"]) - place_m, axis=-1)
+        share = np.exp(-0.5 * ((away - away.min()) / POKE_RADIUS_M) ** 2)
+        self.plant.push((share / share.sum())[:, np.newaxis] * force_N)
+        self._poke_ends_s = self.time_s + POKE_S
+
+    def remember(self) -> None:
+        """Adds the present to the reel."""
+        self.reel.add(
+            Moment(
+                self.time_s,
+                self.plant.qpos().astype(np.float32),
+                self.coupling.activation.astype(np.float32),
+                self.coupling.sensation.contact_force_N.astype(np.float32),
+            )
+        )
+        self.reel.forget()
+
+    def _neurons(self) -> list[str]:
+        controller = self.coupling.controller
+        coords = controller.recordable().coords if isinstance(controller, Records) else {}
+        return [str(name) for name in coords.get("neuron", ())]
+
+    def _remember_signals(self) -> None:
+        controller = self.coupling.controller
+        potential = controller.read(False).get("potential", ()) if isinstance(controller, Records) else ()
+        self.reel.add_sample(self.time_s, np.concatenate([np.asarray(potential), self.coupling.activation]))
+        self._next_sample_s = self.time_s + SAMPLE_S
+
+
+def require_worm(config: RunConfig) -> None:
+    """Refuses planar worms.
+
+    Raises:
+        ConfigError: It is one.
+    """
+    if not isinstance(config.body, WormBody):
+        raise ConfigError(
+            f"body.kind = {config.body.kind!r} has nothing to view in 3D; only the 3D worm (body.kind = 'worm') has: "
+            "use annelid run and annelid render"
+        )
+
+
+def _endless(config: RunConfig) -> RunConfig:
+    return config.model_copy(update={"duration_s": ENDLESS_S})

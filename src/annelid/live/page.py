@@ -1,0 +1,143 @@
+"""A run as one HTML page that opens from disk, with nothing loaded from anywhere, and plays."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from annelid.config import RunConfig
+from annelid.errors import RunFileError
+from annelid.live.guard import content_policy
+from annelid.live.legend import legend_html
+from annelid.live.picture import Lines, Painter, Picture
+from annelid.live.player import Player, config_of, player_of
+from annelid.live.server import Server
+from annelid.live.skeleton import Skeleton
+from annelid.live.stage import Stage
+from annelid.output import whole_file, with_suffix
+from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.runfile import Run
+
+FRAMES_A_SECOND = 25.0
+"""Of a page, in simulated time; a run has as many as it has recorded, if those are fewer."""
+GRAIN_M = 2.0**-13
+"""Places are rounded to an eighth of a millimetre, which halves the page."""
+PAGE_SUFFIXES = (".html", ".htm")
+
+Progress = Callable[[int, int], object]
+"""Called with the number of frames done and their total."""
+
+
+def export_page(
+    source: RunConfig | Run, path: str | Path, *, speed: float = 1.0, progress: Progress | None = None
+) -> Path:
+    """Writes a page that shows a worm from all sides and plays, pauses and scrubs.
+
+    The file appears under its name only when it is complete.
+
+    Args:
+        source: A run, or a configuration, which is run for its duration.
+        path: The page to write (``.html``).
+        speed: Simulated seconds a second: 1 is real time.
+        progress: Called after every frame.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ConfigError: The body is planar, or cannot be built.
+        RunFileError: The run holds no postures, or the file has another suffix or cannot be written.
+        SimulationStopped: A guard stopped the worm.
+    """
+    path = page_path(path)
+    if not 0 < speed < math.inf:
+        raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
+    config = config_of(source)
+    player, anatomy = player_of(source)
+    span = (0.0, config.duration_s) if player.worm is not None else player.reel.span_s
+    page = _page(config, anatomy, player, _times(*span), speed, progress)
+    with whole_file(path) as draft:
+        draft.write_text(page, encoding="utf-8")
+    return path
+
+
+def page_path(path: str | Path) -> Path:
+    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``.
+
+    Raises:
+        RunFileError: Another suffix, or a folder.
+    """
+    return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
+
+
+def _times(first_s: float, last_s: float) -> list[float]:
+    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
+    return [first_s + frame / FRAMES_A_SECOND for frame in range(n_frames)]
+
+
+def _page(
+    config: RunConfig,
+    anatomy: Anatomy,
+    player: Player,
+    times_s: list[float],
+    speed: float,
+    progress: Progress | None,
+) -> str:
+    """Lets a server that nobody visits record what it would send."""
+    painter = Painter(Skeleton(anatomy), config)
+    reel, worm = player.reel, player.worm
+    server = Server()
+    try:
+        stage = Stage(server, config, painter.strand_colors(), _rounded(painter.paint(reel.at(times_s[0]))))
+        recording = server.get_scene_serializer()
+        shown = reel.at(times_s[0])
+        for frame, time_s in enumerate(times_s):
+            if worm is not None:
+                worm.advance(time_s, math.inf)
+            moment = reel.at(time_s + 0.5 / FRAMES_A_SECOND)
+            if moment is not shown:
+                stage.show(_rounded(painter.paint(moment)), follow=True)
+                shown = moment
+            recording.insert_sleep(1.0 / FRAMES_A_SECOND / speed)
+            if progress is not None:
+                progress(frame + 1, len(times_s))
+        page = recording.as_html()
+    finally:
+        server.stop()
+    return _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
+
+
+def _rounded(picture: Picture) -> Picture:
+    """Places with fewer digits, which compress."""
+    lines: dict[str, Any] = {
+        name: _grained(getattr(picture, name)) for name in ("strands", "rings", "springs", "contacts")
+    }
+    return Picture(**lines, ring_colors=picture.ring_colors, spring_colors=picture.spring_colors, middle=picture.middle)
+
+
+def _grained(lines: Lines) -> Lines:
+    return (np.round(lines / GRAIN_M) * GRAIN_M).astype(np.float32)
+
+
+def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> str:
+    """Adds the worm's name and what the colours mean, over the scene; viser's own title gives way."""
+    name, summary = html.escape(config.name), html.escape(config.summary)
+    pace = "" if speed == 1.0 else f", {speed:g} &times; real time"
+    style = (
+        "position:fixed;right:12px;top:10px;z-index:5;max-width:26em;padding:8px 12px;border-radius:4px;"
+        "background:rgba(255,255,255,0.85);font-family:sans-serif;color:#222;pointer-events:none"
+    )
+    caption = (
+        f'<div style="{style}"><b>{name}</b>{pace}<div style="font-size:0.8em;margin:2px 0 6px">{summary}</div>'
+        f"{legend}</div>"
+    )
+    policy = f'<meta http-equiv="Content-Security-Policy" content="{content_policy()}" />'
+    page = page.replace("<head>", f"<head>{policy}", 1)
+    page = page.replace("<title>Viser</title>", f"<title>{name} - annelid</title>", 1)
+    end = page.rindex("</body>")
+    return page[:end] + caption + page[end:]

@@ -1,0 +1,140 @@
+"""What is drawn of one instant: lines and arrows as small arrays, with their colours. Pure functions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.config import RunConfig
+from annelid.draw.style import CONTRACTED, RELAXED
+from annelid.live.moments import Moment
+from annelid.live.skeleton import Skeleton
+from annelid.morphology import Array
+
+Lines = NDArray[np.float32]
+"""Ends of line segments, m, ``(n, 2, 3)``."""
+Colors = NDArray[np.uint8]
+"""Red, green and blue at these ends, ``(n, 2, 3)``."""
+
+STRAND_COLORS = ((0.16, 0.38, 0.72), (0.42, 0.62, 0.86))
+"""Of the two handednesses."""
+SPRING_COLORS = ((0.45, 0.20, 0.70), (0.80, 0.74, 0.60), (0.95, 0.50, 0.05))
+"""Of an axial spring at most shortened, at rest, and at most stretched."""
+SPRING_RANGE = 0.3
+"""Strain at which these colours are full."""
+CONTACT_COLOR = (0.04, 0.45, 0.14)
+SCREEN_GAMMA = 2.2
+LONGEST_ARROW = 4.0
+"""Of the arrows of contact forces, in radii of the worm at rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One instant, ready to draw, in the model's axes.
+
+    Attributes:
+        strands: Elements of all strands; their colours never change.
+        rings: Ring muscles from crossing to crossing.
+        ring_colors: Grey at rest, red where activated.
+        springs: Axial springs.
+        spring_colors: By their strain.
+        contacts: Arrows of the ground's force on every segment, from where it pushes most.
+        middle: The middle of the worm, m, ``(3,)``.
+    """
+
+    strands: Lines
+    rings: Lines
+    ring_colors: Colors
+    springs: Lines
+    spring_colors: Colors
+    contacts: Lines
+    middle: Array
+
+
+class Painter:
+    """Turns the moments of one worm into pictures.
+
+    Attributes:
+        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, N.
+    """
+
+    def __init__(self, skeleton: Skeleton, config: RunConfig) -> None:
+        """Takes what stays the same: which points belong together, and the scale of forces.
+
+        Args:
+            skeleton: The worm.
+            config: Its configuration; gravity sets the scale of forces, about two segments' weight.
+        """
+        self._skeleton = skeleton
+        anatomy = skeleton.anatomy
+        self._geometry = anatomy.geometry
+        path = anatomy.ring_path
+        self._ring_pairs = np.stack([path[:, :-1], path[:, 1:]], axis=-1).reshape(-1, 2)
+        self._corners = path.shape[1] - 1
+        assert config.arena is not None
+        share = float(anatomy.model.body_mass.sum()) * config.arena.gravity_m_per_s2 / anatomy.n_segments
+        self.arrow_N = float(f"{2.0 * share:.1g}") if share > 0 else 1.0
+
+    def strand_colors(self) -> Colors:
+        """Colours of all elements, one for either handedness."""
+        n_strands, n_vertices, _ = self._geometry.vertices_m.shape
+        handed = np.arange(n_strands) // self._geometry.n_per_plane
+        colors = np.asarray(STRAND_COLORS)[handed]
+        return _bytes(np.repeat(colors, 2 * (n_vertices - 1), axis=0)).reshape(-1, 2, 3)
+
+    def paint(self, moment: Moment) -> Picture:
+        """Draws one moment."""
+        vertices, crossing = self._skeleton.locate(moment.qpos)
+        springs = crossing[self._geometry.springs]
+        length = np.linalg.norm(springs[:, 1] - springs[:, 0], axis=-1)
+        return Picture(
+            strands=_segments(vertices),
+            rings=crossing[self._ring_pairs].astype(np.float32),
+            ring_colors=ring_colors(moment.activation, self._corners),
+            springs=springs.astype(np.float32),
+            spring_colors=spring_colors(length / self._geometry.spring_length_m - 1.0),
+            contacts=self._arrows(moment.contact_force_N, crossing),
+            middle=crossing.mean(axis=0),
+        )
+
+    def _arrows(self, force_N: NDArray[np.floating], crossing: Array) -> Lines:
+        """Arrows from the crossing of each ring that lies farthest against the force."""
+        rings = crossing[self._geometry.rings]
+        from_centre = rings - rings.mean(axis=1, keepdims=True)
+        against = -np.einsum("sci,si->sc", from_centre, force_N)
+        foot = rings[np.arange(len(rings)), against.argmax(axis=1)]
+        reach = self._geometry.radius_m * force_N / self.arrow_N
+        length = np.linalg.norm(reach, axis=-1, keepdims=True)
+        longest = LONGEST_ARROW * self._geometry.radius_m
+        reach = reach * np.minimum(1.0, longest / np.maximum(length, longest * 1e-9))
+        return np.stack([foot, foot + reach], axis=1).astype(np.float32)
+
+
+def ring_colors(activation: NDArray[np.floating], n_corners: int) -> Colors:
+    """Colours of every line of the rings, grey at activation 0 and red at 1.
+
+    Args:
+        activation: Of every ring muscle, ``(n_muscles,)``.
+        n_corners: Lines of each.
+    """
+    share = np.clip(activation, 0.0, 1.0)[:, np.newaxis]
+    relaxed, contracted = np.asarray(RELAXED), np.asarray(CONTRACTED)
+    return _bytes(np.repeat(relaxed + share * (contracted - relaxed), 2 * n_corners, axis=0)).reshape(-1, 2, 3)
+
+
+def spring_colors(strain: NDArray[np.floating]) -> Colors:
+    """Colours of axial springs by their strain, ``(n_springs,)``: violet if shortened, orange if stretched."""
+    stops = (-SPRING_RANGE, 0.0, SPRING_RANGE)
+    colors = np.stack([np.interp(strain, stops, channel) for channel in np.transpose(SPRING_COLORS)], axis=-1)
+    return _bytes(np.repeat(colors, 2, axis=0)).reshape(-1, 2, 3)
+
+
+def _segments(vertices: Array) -> Lines:
+    return np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3).astype(np.float32)
+
+
+def _bytes(colors: NDArray[np.floating]) -> Colors:
+    """Colours as the viewer takes those of lines: it adds the gamma of the screen, which ours have already."""
+    return np.rint(255.0 * colors**SCREEN_GAMMA).astype(np.uint8)

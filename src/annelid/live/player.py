@@ -1,0 +1,136 @@
+"""What is shown when: a clock that plays, pauses, goes slower or faster, and back through what is remembered."""
+
+from __future__ import annotations
+
+import math
+
+from annelid.config import RunConfig
+from annelid.errors import SimulationStopped
+from annelid.live.living import LivingWorm, require_worm
+from annelid.live.moments import Moment, Reel, reel_of
+from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.runfile import Run
+from annelid.simulation.worm import compile_worm
+
+SLOWEST, FASTEST = 0.05, 10.0
+"""Simulated seconds a second."""
+
+
+class Player:
+    """Shows a reel; at the end of a living worm's the worm goes on, at the end of a run's it stops.
+
+    Attributes:
+        worm: The living worm, or None for a recorded run.
+        playing: Whether time goes on.
+        speed: Simulated seconds a second, as wanted.
+        at_end: Whether the last moment is shown: of a living worm the present.
+        stopped: The sentence of the guard that stopped the worm, or an empty one.
+    """
+
+    def __init__(self, source: LivingWorm | Reel, speed: float = 1.0) -> None:
+        """Begins with the first moment, playing."""
+        self.worm = source if isinstance(source, LivingWorm) else None
+        self._reel = source if isinstance(source, Reel) else None
+        self.speed = speed
+        self.stopped = ""
+        self._rewind()
+
+    @property
+    def reel(self) -> Reel:
+        """What can be shown."""
+        if self.worm is not None:
+            return self.worm.reel
+        assert self._reel is not None
+        return self._reel
+
+    @property
+    def moment(self) -> Moment:
+        """What is shown now; of a worm that is followed the newest, up to a step of its body ahead of the clock."""
+        return self.reel.at(self.reel.span_s[1] if self.at_end else self._clock_s)
+
+    def restart(self) -> None:
+        """Starts a living worm anew, and a recorded run from its beginning."""
+        if self.worm is not None:
+            self.worm.restart()
+        self.stopped = ""
+        self._rewind()
+
+    def play(self) -> None:
+        """Lets time go on; a run that has ended begins again."""
+        if self.worm is None and self.at_end:
+            self._rewind()
+        self.playing = True
+
+    def pause(self) -> None:
+        """Holds time."""
+        self.playing = False
+
+    def seek(self, time_s: float) -> None:
+        """Shows another time and pauses there."""
+        first, last = self.reel.span_s
+        self._clock_s = min(max(time_s, first), last)
+        self.at_end = self._clock_s >= last
+        self.playing = False
+
+    def go_live(self) -> None:
+        """Shows the last moment and plays: a living worm goes on from there."""
+        self.seek(self.reel.span_s[1])
+        self.playing = self.worm is not None and not self.stopped
+
+    def tick(self, elapsed_s: float, deadline: float = math.inf) -> None:
+        """Lets wall-clock time pass.
+
+        A worm that is too slow for the wanted speed is as late as it is: nothing is caught up.
+
+        Args:
+            elapsed_s: Since the last call, s.
+            deadline: Of `time.perf_counter`, after which the worm takes no further step.
+        """
+        if not self.playing:
+            return
+        wanted = self._clock_s + self.speed * elapsed_s
+        if wanted >= self.reel.span_s[1]:
+            self.at_end = True
+            if self.worm is not None and not self.stopped:
+                self._live_on(self.worm, wanted, deadline)
+            else:
+                self.playing = False
+        self._clock_s = min(wanted, self.reel.span_s[1])
+
+    def _live_on(self, worm: LivingWorm, until_s: float, deadline: float) -> None:
+        try:
+            worm.advance(until_s, deadline)
+        except SimulationStopped as stop:
+            self.stopped, self.playing = str(stop), False
+
+    def _rewind(self) -> None:
+        first, last = self.reel.span_s
+        self._clock_s = first
+        self.at_end = first >= last
+        self.playing = True
+
+
+def config_of(source: RunConfig | Run) -> RunConfig:
+    """Returns the configuration that a worm is run under, or was.
+
+    Raises:
+        ConfigError: It is a planar worm.
+    """
+    config = source.config if isinstance(source, Run) else source
+    require_worm(config)
+    return config
+
+
+def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy]:
+    """Returns the player of a configuration, which is run, or of a run, and the body that is seen.
+
+    Raises:
+        ConfigError: The body is planar, or cannot be built.
+        RunFileError: The run holds no postures.
+    """
+    config = config_of(source)
+    if isinstance(source, Run):
+        anatomy = compile_worm(config)
+        return Player(reel_of(source, anatomy.model.nq), speed), anatomy
+    worm = LivingWorm(config)
+    return Player(worm, speed), worm.plant.anatomy

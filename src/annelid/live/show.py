@@ -1,0 +1,251 @@
+"""A view while it is open: the one loop in which the worm runs, the scene is drawn and the user's wishes are met."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from annelid.config import RunConfig
+from annelid.errors import AnnelidError
+from annelid.live.knobs import knobs_of
+from annelid.live.legend import legend_html, status_html
+from annelid.live.moments import Moment
+from annelid.live.panel import Panel
+from annelid.live.picture import Painter
+from annelid.live.player import config_of, player_of
+from annelid.live.poke import struck
+from annelid.live.server import LOOPBACK, Server
+from annelid.live.skeleton import Skeleton
+from annelid.live.stage import Stage
+from annelid.live.traces import SECONDS, plots_of
+from annelid.morphology import Array
+from annelid.simulation.runfile import Run
+
+if TYPE_CHECKING:
+    import viser
+
+FRAMES_A_SECOND = 30.0
+"""At most; fewer where a step of the body takes longer."""
+LONGEST_TICK_S = 0.25
+"""A computer that was asleep does not make the view leap."""
+PANEL_INTERVAL_S = 0.33
+"""Between two updates of plots, time and status."""
+PACE_OVER_S = 2.0
+"""Over which the speed that is reached is measured."""
+EARTH_M_PER_S2 = 9.81
+MOST_SAMPLES = 250
+"""Of one curve of a plot."""
+
+
+class Show:
+    """A server with the scene and the panel of one worm, and the loop that keeps them going.
+
+    All that changes the worm, the player or the scene is done by the loop; other threads `ask` for it.
+
+    Attributes:
+        player: What is shown when.
+        picture: What is seen, in the model's axes.
+        address: Of the page, with the token that it opens with.
+        frames_drawn: Number of pictures sent so far.
+    """
+
+    def __init__(self, source: RunConfig | Run, *, host: str = LOOPBACK, port: int = 0, speed: float = 1.0) -> None:
+        """Builds the worm, or reads the run, and begins to serve.
+
+        Args:
+            source: A configuration to run, or a run to play.
+            host: Address to listen on.
+            port: Port, 0 for any that is free.
+            speed: Simulated seconds a second.
+
+        Raises:
+            ConfigError: The body is planar, or cannot be built.
+            RunFileError: The run holds no postures.
+        """
+        self._config = config_of(source)
+        self.player, anatomy = player_of(source, speed)
+        living = self.player.worm is not None
+        self._painter = Painter(Skeleton(anatomy), self._config)
+        self.picture = self._painter.paint(self.player.moment)
+        self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
+        self._wishing = threading.Lock()
+        self._ending = threading.Event()
+        self._follow = True
+        self._notice = ""
+        self._pace: deque[tuple[float, float]] = deque()
+        self._drawn: tuple[Moment, bool] | None = None
+        self.frames_drawn = 0
+        self._knobs = knobs_of(self._config) if living else ()
+        self._plots = plots_of(self.player.reel.names)
+        self._server = Server(host, port)
+        self.address = self._server.address
+        self._stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
+        self._panel = Panel(
+            self._server,
+            self,
+            living=living,
+            speed=speed,
+            weight_N=round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1),
+            knobs={knob: knob.shown(self._config) for knob in self._knobs},
+            plots=self._plots,
+            legend=legend_html(self._painter.arrow_N, anatomy.geometry.radius_m),
+        )
+        self.choose_plot(next(iter(self._plots)))
+        if living:
+            self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.stop()
+
+    def run(self) -> None:
+        """Keeps the view going until `end` is called."""
+        last = panel_due = perf_counter()
+        while not self._ending.is_set():
+            begun = perf_counter()
+            self._meet_wishes()
+            self.player.tick(min(begun - last, LONGEST_TICK_S), deadline=begun + 1.0 / FRAMES_A_SECOND)
+            last = begun
+            self._draw()
+            if begun >= panel_due:
+                self._update_panel(begun)
+                panel_due = begun + PANEL_INTERVAL_S
+            self._ending.wait(max(0.0, begun + 1.0 / FRAMES_A_SECOND - perf_counter()))
+
+    @property
+    def shift_m(self) -> Array:
+        """Where the model's origin is in the page, m, ``(3,)``."""
+        return self._stage.shift_m
+
+    def clients(self) -> list[viser.ClientHandle]:
+        """Returns the browsers that look on, each with its camera."""
+        return list(self._server.get_clients().values())
+
+    def end(self) -> None:
+        """Lets `run` return; may be called from any thread."""
+        self._ending.set()
+
+    def ask(self, call: Callable[..., None], *arguments: Any) -> None:
+        """Has the loop call one of the methods below; may be called from any thread.
+
+        Of calls that differ in their last argument only, as while a slider is dragged, the last one counts.
+        """
+        with self._wishing:
+            self._wishes[call.__name__, *arguments[:-1]] = call, arguments
+
+    def play_or_pause(self) -> None:
+        """Changes between the two."""
+        if self.player.playing:
+            self.player.pause()
+        else:
+            self.player.play()
+
+    def go_live(self) -> None:
+        """Shows the present."""
+        self.player.go_live()
+
+    def restart(self) -> None:
+        """Begins anew, under what the knobs say."""
+        self._notice = ""
+        self.player.restart()
+
+    def seek(self, time_s: float) -> None:
+        """Shows another time."""
+        self.player.seek(time_s)
+
+    def set_speed(self, speed: float) -> None:
+        """Sets simulated seconds a second."""
+        self.player.speed = speed
+
+    def turn(self, field: str, value: float) -> None:
+        """Changes a field of the running worm."""
+        assert self.player.worm is not None
+        self._notice = ""
+        self.player.worm.adjust({field: value})
+
+    def reset_knobs(self) -> None:
+        """Gives all knobs their first values."""
+        assert self.player.worm is not None
+        self._notice = ""
+        self.player.worm.as_at_first()
+        self._panel.show_knobs({knob: knob.shown(self.player.worm.config) for knob in self._knobs})
+
+    def poke(self, origin_m: tuple[float, ...], direction: tuple[float, ...]) -> None:
+        """Pokes what a line of sight hits, in the page's axes, m."""
+        worm = self.player.worm
+        if worm is None or self.player.stopped:
+            return
+        if not self.player.at_end:
+            self._notice = "This is the past: press now and poke the worm again."
+            return
+        origin, sight = self._stage.to_model(np.asarray(origin_m), np.asarray(direction))
+        place = struck(self.picture.strands.reshape(-1, 3).astype(float), origin, sight)
+        if place is not None:
+            worm.poke(place, self._panel.poke_N * sight)
+
+    def set_follow(self, follow: bool) -> None:
+        """Keeps the worm in the middle, or lets it crawl away."""
+        self._follow = follow
+
+    def set_visible(self, layer: str, visible: bool) -> None:
+        """Shows or hides a layer of the scene."""
+        self._stage.set_visible(layer, visible)
+
+    def choose_plot(self, name: str) -> None:
+        """Plots other signals."""
+        self._plot = self._plots[name]
+        self._columns = [self.player.reel.names.index(curve.signal) for curve in self._plot.curves]
+        self._panel.show_plot(self._plot)
+
+    def _meet_wishes(self) -> None:
+        with self._wishing:
+            wishes, self._wishes = self._wishes, {}
+        for call, arguments in wishes.values():
+            try:
+                call(*arguments)
+            except AnnelidError as error:
+                self._notice = str(error)
+
+    def _draw(self) -> None:
+        wanted = self.player.moment, self._follow
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        self.picture = self._painter.paint(self.player.moment)
+        with self._server.atomic():
+            self._stage.show(self.picture, follow=self._follow)
+        self._server.flush()
+        self.frames_drawn += 1
+
+    def _update_panel(self, now: float) -> None:
+        player = self.player
+        time_s = player.moment.time_s
+        self._panel.show_time(time_s, player.reel.span_s)
+        times, values = player.reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
+        if len(times):
+            self._panel.show_curves(times, list(values[:, self._columns].T))
+        self._panel.tell(self._status(now, time_s))
+
+    def _status(self, now: float, time_s: float) -> str:
+        player = self.player
+        self._pace.append((now, time_s))
+        while now - self._pace[0][0] > PACE_OVER_S:
+            self._pace.popleft()
+        passed = now - self._pace[0][0]
+        pace = (time_s - self._pace[0][1]) / passed if passed > 0 else 0.0
+        parts, below = [f"{time_s:.2f} s"], self._notice
+        if player.stopped:
+            below = f"Stopped: {player.stopped}. Move the sliders back and restart. {self._notice}"
+        elif not player.playing:
+            parts.append("paused")
+        else:
+            parts.append(f"{max(pace, 0.0):.2f} \N{MULTIPLICATION SIGN} real time")
+            parts += [] if player.worm is None or player.at_end else ["(the past)"]
+        return status_html(self._config.name, parts, below)

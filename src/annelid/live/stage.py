@@ -1,0 +1,232 @@
+"""The 3D scene of a view: a few nodes that are made once and then only told where their points are."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.arena.scenery import (
+    FLOOR_HALF_SIZE_M,
+    PIPE_ABOVE_FLOOR_M,
+    PIPE_RGBA,
+    POST_HALF_HEIGHT_M,
+    POST_RGBA,
+    RAIL_HALF_HEIGHT_M,
+    RAIL_RGBA,
+)
+from annelid.arena.shapes import shape_of
+from annelid.config import Floor, Pipe, RunConfig, WormBody
+from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
+from annelid.draw.drawn_worm import upright
+from annelid.live.picture import CONTACT_COLOR, Colors, Picture
+from annelid.morphology import Array, heading_turn
+
+if TYPE_CHECKING:
+    import viser
+
+ASPECT = 1.0
+"""Of the canvas beside the panel, for which the camera is placed."""
+ROOM = 1.3
+"""Share that the worm is seen from farther than it would just fit: it grows longer and moves."""
+STRAND_PIXELS, RING_PIXELS, SPRING_PIXELS = 3.0, 6.0, 3.5
+"""Widths of lines; lines that grow thinner with distance take twice as long to draw without a graphics card."""
+LAYERS = ("strands", "rings", "springs", "contacts", "ground")
+"""What can be shown or hidden, by the names of the nodes."""
+FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
+"""What is drawn of the floor, for a worm that leads towards -x; it turns with the heading at the start."""
+SQUARE_M = 0.2
+SQUARE_COLOR = (0.80, 0.83, 0.86)
+STRIP_M = 0.003
+RELIEF_LIGHT, RELIEF_CONTRAST = (-0.5, -0.3, 0.8), 1.5
+"""Where the light on relief comes from: against it, the risers of steps are dark."""
+_GROUND_COLOR = (0.97, 0.98, 1.0)
+_ROOT = "/worm"
+
+
+class Stage:
+    """Worm and arena in a viewer.
+
+    Attributes:
+        turn: Rotation from the model's axes to the page's, ``(3, 3)``.
+        shift_m: Where the model's origin is in the page, m, ``(3,)``.
+    """
+
+    def __init__(self, server: viser.ViserServer, config: RunConfig, strand_colors: Colors, first: Picture) -> None:
+        """Makes all nodes and places the camera so that the whole worm is seen.
+
+        Args:
+            server: Where they are seen.
+            config: The worm's arena.
+            strand_colors: Of all elements of the strands.
+            first: What is shown first.
+        """
+        from viser.transforms import SO3
+
+        self._scene = scene = server.scene
+        scene.configure_default_lights(enabled=False)
+        scene.configure_environment_map(hdri=None)
+        scene.add_light_ambient("/sky", intensity=2.0)
+        scene.add_light_directional("/lamp", intensity=2.0, position=(-3.0, -2.0, 3.0))
+        self.turn = upright(config)
+        self.shift_m = np.zeros(3)
+        self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=SO3.from_matrix(self.turn).wxyz)
+        self._strands = scene.add_line_segments(
+            f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_PIXELS, thickness_units="screen"
+        )
+        self._rings = scene.add_line_segments(
+            f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_PIXELS, thickness_units="screen"
+        )
+        self._springs = scene.add_line_segments(
+            f"{_ROOT}/springs", first.springs, first.spring_colors, thickness=SPRING_PIXELS, thickness_units="screen"
+        )
+        self._contacts = scene.add_arrows(
+            f"{_ROOT}/contacts",
+            first.contacts,
+            CONTACT_COLOR,
+            shaft_radius=0.0035,
+            head_radius=0.009,
+            head_length=0.022,
+        )
+        length = float(np.ptp(first.strands[..., 0]))
+        assert isinstance(config.body, WormBody)
+        heading = config.body.heading_deg
+        _add_ground(server, config, length, heading)
+        self._first_middle = first.middle
+        self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
+        self._place_camera(server, first, heading)
+
+    def show(self, picture: Picture, *, follow: bool) -> None:
+        """Shows another instant.
+
+        Args:
+            picture: What is to be seen.
+            follow: Moves worm and ground so that the worm's middle stays where it is on the screen.
+        """
+        self._strands.points = picture.strands
+        self._rings.points = picture.rings
+        self._rings.colors = picture.ring_colors
+        self._springs.points = picture.springs
+        self._springs.colors = picture.spring_colors
+        self._contacts.points = picture.contacts
+        shift = self.turn @ (self._first_middle - picture.middle) if follow else np.zeros(3)
+        if self._level:
+            # A worm that breathes is not to make the ground bob.
+            shift[2] = 0.0
+        if np.abs(shift - self.shift_m).max() > 1e-4:
+            self.shift_m = shift
+            self._root.position = shift
+
+    def set_visible(self, layer: str, visible: bool) -> None:
+        """Shows or hides one of `LAYERS`."""
+        handle = self._scene.get_handle_by_name(f"{_ROOT}/{layer}")
+        assert handle is not None
+        handle.visible = visible
+
+    def to_model(self, origin: Array, direction: Array) -> tuple[Array, Array]:
+        """Turns a ray of the page into the model's axes."""
+        return (origin - self.shift_m) @ self.turn, direction @ self.turn
+
+    def _place_camera(self, server: viser.ViserServer, first: Picture, heading_deg: float) -> None:
+        points = first.strands.reshape(-1, 3) @ self.turn.T
+        target = (points.min(axis=0) + points.max(axis=0)) / 2
+        angles = view_angles("isometric", heading_deg)
+        _, _, sight = picture_axes(*angles)
+        distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
+        camera = server.initial_camera
+        camera.fov = math.radians(FIELD_OF_VIEW_DEG)
+        camera.look_at = target
+        camera.position = target - distance * sight
+
+
+def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, heading_deg: float) -> None:
+    """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
+    scene, arena = server.scene, config.arena
+    assert arena is not None
+    scene.add_frame(f"{_ROOT}/ground", show_axes=False)
+    shape = shape_of(arena, length_m)
+    pipe = isinstance(arena, Pipe)
+    if shape is not None and pipe:
+        scene.add_mesh_simple(
+            f"{_ROOT}/ground/pipe",
+            shape.vertices_m,
+            shape.faces,
+            color=PIPE_RGBA[:3],
+            opacity=PIPE_RGBA[3],
+            side="double",
+        )
+    elif shape is not None:
+        import trimesh
+        from trimesh.visual import ColorVisuals
+
+        relief = trimesh.Trimesh(shape.vertices_m, shape.faces, process=False)
+        relief.visual = ColorVisuals(relief, vertex_colors=_shaded(relief.vertex_normals))
+        scene.add_mesh_trimesh(f"{_ROOT}/ground/relief", relief, cast_shadow=False, receive_shadow=False)
+    if shape is None or pipe:
+        depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
+        vertices, faces = _squares(-depth)
+        # The plainest of the viewer's materials.
+        scene.add_mesh_simple(
+            f"{_ROOT}/ground/floor",
+            vertices @ heading_turn(heading_deg).T,
+            faces,
+            color=SQUARE_COLOR,
+            material="toon3",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+    if isinstance(arena, Floor):
+        _add_walls(scene, arena)
+
+
+def _shaded(normals: Array) -> NDArray[np.uint8]:
+    """Colours of a relief by its slopes, which are too gentle for the viewer's own light, ``(n, 4)``."""
+    shade = np.clip(1.0 + RELIEF_CONTRAST * (normals - [0.0, 0.0, 1.0]) @ RELIEF_LIGHT, 0.4, 1.1)
+    colors = np.minimum(shade[:, np.newaxis] * np.asarray(_GROUND_COLOR), 1.0)
+    return np.rint(255.0 * np.column_stack([colors, np.ones(len(colors))])).astype(np.uint8)
+
+
+def _squares(height_m: float) -> tuple[Array, NDArray[np.int32]]:
+    """Strips that make squares to see the worm move against: vertices and faces of a mesh.
+
+    An endless grid, or lines, would take longer to draw than the worm.
+    """
+    (ahead, behind), side = FLOOR_X_M, FLOOR_HALF_WIDTH_M
+    strips = [(x - _half_width(x), x + _half_width(x), -side, side) for x in _marks(ahead, behind)]
+    strips += [(ahead, behind, y - _half_width(y), y + _half_width(y)) for y in _marks(-side, side)]
+    corners = [[(a, c, height_m), (b, c, height_m), (b, d, height_m), (a, d, height_m)] for a, b, c, d in strips]
+    first = 4 * np.arange(len(strips))[:, np.newaxis, np.newaxis]
+    faces = first + np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array(corners).reshape(-1, 3), faces.reshape(-1, 3).astype(np.int32)
+
+
+def _marks(first: float, last: float) -> Array:
+    return np.linspace(first, last, round((last - first) / SQUARE_M) + 1)
+
+
+def _half_width(place_m: float) -> float:
+    """Of a strip, which is wider at every whole metre."""
+    return STRIP_M / 2 * (2.5 if abs(place_m - round(place_m)) < 1e-6 else 1.0)
+
+
+def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:
+    for number, (x, y, radius) in enumerate(arena.posts or ()):
+        scene.add_cylinder(
+            f"{_ROOT}/ground/post_{number}",
+            radius=radius,
+            height=2 * POST_HALF_HEIGHT_M,
+            color=POST_RGBA[:3],
+            position=(x, y, POST_HALF_HEIGHT_M - arena.floor_gap_m),
+        )
+    if arena.rail_gap_m is None:
+        return
+    for side in (-1.0, 1.0):
+        scene.add_box(
+            f"{_ROOT}/ground/rail_{'left' if side < 0 else 'right'}",
+            dimensions=(FLOOR_HALF_SIZE_M, 0.004, 2 * RAIL_HALF_HEIGHT_M),
+            color=RAIL_RGBA[:3],
+            opacity=RAIL_RGBA[3],
+            position=(0.0, side * (arena.rail_gap_m / 2 + 0.002), RAIL_HALF_HEIGHT_M - arena.floor_gap_m),
+        )

@@ -1,1 +1,0 @@
-"""The paper, reproduced and examined: cases, examinations, claims and the report."""

@@ -1,5 +1,0 @@
-"""Sweeps: fields of a configuration varied over a grid or in samples, all runs told in one labelled dataset."""
-
-from annelid.studies.sweep.sweeping import Sweep, SweepRun, sweep, swept
-
-__all__ = ["Sweep", "SweepRun", "sweep", "swept"]

@@ -1,0 +1,1 @@
+"""What was found out with annelid: studies, each a design, its numbers, its pictures and its text."""

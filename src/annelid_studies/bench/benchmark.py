@@ -1,0 +1,198 @@
+"""The benchmark as a whole: measures what is missing, judges it, and writes one JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from annelid.config import Chain
+from annelid.experiment.case import CHAIN, RODS
+from annelid.output import whole_file
+from annelid.simulation.lock import locks
+from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
+from annelid_studies.bench.errors import errors, exponent, front
+from annelid_studies.bench.store import MeasurementFailed, Measurements
+from annelid_studies.riddle2023.examination import Effort
+
+JSON_NAME = "bench.json"
+CASES_FOLDER = "cases"
+
+SCALED_SEGMENTS = (12, 47)
+"""Beside the whole range of segments, the exponent of the cost is taken over this one."""
+
+SCHEMA = {
+    "cases[].step_median_ms, step_mean_ms": "wall-clock time of the closed loop a physics step, recording included, ms",
+    "cases[].real_time_factor": "simulated over wall-clock time, recording included",
+    "cases[].peak_memory_MB": "largest resident memory of the process that ran the case and nothing else, 1e6 bytes",
+    "cases[].build_s, compile_s": "making the engine's specification, and the engine's compilation of it, s",
+    "cases[].velocities": "degrees of freedom of the model",
+    "cases[].shares": "fractions of the wall-clock time: the engine's own timers over the first 2.7 s, the rest of the "
+    "plant, the network with its control, and recording with the loop; they add up to 1",
+    "cases[].rhythm": "the score of the rhythm; errors of a rhythm that is not ordered are stated all the same",
+    "cases[].errors": "by converged run: relative errors as fractions of the shortest ring, of each segment's "
+    "elongation and the largest of these, and of the period; largest of the last two; difference of travel in m",
+    "cases[].load_average_1min": "processes that competed for the cores when the case began; quiet below 1",
+    "cost_exponents": "slope of log(step_median_ms) against log(segments), by preset and range of segments",
+    "fronts": "by converged run: the cases that no other beats in both speed and largest error, the fastest first",
+    "levels": "the case of each level of fidelity",
+    "peer": "free rods without joints, contact or muscles; step_limit_us is the closed form of the largest stable step",
+}
+
+Progress = Callable[[str, int, int, float], object]
+"""Called with what is being done, the number of cases done, their total, and the share of the work."""
+
+_PEER_COST_S = 15.0
+# Importing, compiling, and the pass with the engine's timers.
+_OVERHEAD_S = 5.0
+# Exponents by which the cost of a step grows with the number of segments, beyond proportion.
+_GROWTH = {"chain": 2.0, "rods": 0.4}
+
+
+@locks("folder")
+def bench(
+    folder: Path, effort: Effort = "full", *, lines: Sequence[str] | None = None, progress: Progress | None = None
+) -> Path:
+    """Times closed loops one after the other, as far as they have not been timed into the folder before.
+
+    Args:
+        folder: Where ``bench.json`` goes, and each case as soon as it is measured.
+        effort: ``"quick"`` for fewer points on each line, ``"full"`` for all.
+        lines: Which lines of `annelid_studies.bench.cases.LINES`; None for all.
+        progress: Called as the work goes on.
+
+    Returns:
+        Path of ``bench.json``. A case that could not be measured is in it with the reason, and tried again next time.
+
+    Raises:
+        ConfigError: There is no such line.
+        RunFileError: A file cannot be written.
+        KeyboardInterrupt: The case in progress is dropped, all others kept.
+    """
+    cases = bench_cases(effort, lines)
+    with_peer = "peer" in check_lines(lines)
+    measured = _measure_all(cases, with_peer, Measurements(folder / CASES_FOLDER), progress)
+    report = {
+        "effort": effort,
+        "machine": f"{os.cpu_count()} cores, one of them used",
+        "versions": {name: version(name) for name in ("annelid", "mujoco-core", "numpy")}
+        | {"python": platform.python_version()},
+        "schema": SCHEMA,
+        **judge(cases, measured),
+        "peer": measured.get(None),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / JSON_NAME
+    with whole_file(path) as draft:
+        draft.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def judge(cases: Sequence[BenchCase], measured: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
+    """Lays measurements side by side: errors, fronts, exponents, levels.
+
+    Args:
+        cases: The cases.
+        measured: What was measured of each, by its name; ``{"failed": reason}`` where nothing was.
+    """
+    references = {case.name: measured[case.name] for case in cases if case.kind == "converged"}
+    entries = [_entry(case, measured[case.name], references) for case in cases]
+    usable = [entry for entry in entries if "failed" not in entry]
+    judged = [entry for entry in usable if entry["kind"] == "judged"]
+    return {
+        "cases": entries,
+        "cost_exponents": {preset: _exponents(usable, line) for preset, line in ((RODS, "segments"), (CHAIN, "chain"))},
+        "fronts": {name: _front(judged, name) for name, run in references.items() if "failed" not in run},
+        "levels": {entry["level"]: entry["name"] for entry in entries if entry["level"]},
+    }
+
+
+def _measure_all(
+    cases: Sequence[BenchCase], with_peer: bool, store: Measurements, progress: Progress | None
+) -> dict[str | None, dict[str, Any]]:
+    wanted: list[BenchCase | None] = [*cases, *([None] if with_peer else [])]
+    found = {_name(case): stored for case in wanted if (stored := store.find(case)) is not None}
+    missing = [case for case in wanted if _name(case) not in found]
+    total_s = sum(map(_cost_s, missing)) or 1.0
+    done_s = 0.0
+
+    def report(within_s: float) -> None:
+        if progress is not None:
+            progress("timing worms", len(found), len(wanted), min(1.0, (done_s + within_s) / total_s))
+
+    for case in missing:
+        cost_s = _cost_s(case)
+        report(0.0)
+        try:
+            found[_name(case)] = store.measure(case, lambda share, cost_s=cost_s: report(share * cost_s))
+        except MeasurementFailed as failure:
+            found[_name(case)] = {"failed": str(failure)}
+        done_s += cost_s
+    return found
+
+
+def _name(case: BenchCase | None) -> str | None:
+    return None if case is None else case.name
+
+
+def _cost_s(case: BenchCase | None) -> float:
+    if case is None:
+        return _PEER_COST_S
+    growth = _GROWTH["chain" if isinstance(case.body.formulation, Chain) else "rods"]
+    return case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
+
+
+def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    config = case.case.config
+    known = {
+        "name": case.name,
+        "kind": case.kind,
+        "lines": list(case.lines),
+        "level": level_of(config) if "levels" in case.lines else None,
+        "preset": case.case.preset,
+        "formulation": "chain" if isinstance(case.body.formulation, Chain) else "rods",
+        "n_segments": config.body.n_segments,
+        "elements_per_side": case.body.mesh.elements_per_side,
+        "physics_step_ms": round(1e3 * config.clock.physics_timestep_s, 9),
+        "duration_s": config.duration_s,
+        "command": case.case.command,
+    }
+    if case.kind == "speed" or "failed" in measured:
+        return {**known, **measured}
+    compared = {
+        name: errors(measured["summary"], reference["summary"])
+        for name, reference in references.items()
+        if name != case.name and "failed" not in reference
+    }
+    return {**known, **measured, "errors": compared}
+
+
+def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, float | None]:
+    points = {
+        entry["n_segments"]: entry["step_median_ms"]
+        for entry in entries
+        if line in entry["lines"] and entry["step_median_ms"]
+    }
+    if len(points) < 2:
+        return {}
+    ranges = dict.fromkeys([(min(points), max(points)), SCALED_SEGMENTS])
+    found = {}
+    for low, high in ranges:
+        within = [n for n in sorted(points) if low <= n <= high]
+        if within and (within[0], within[-1]) == (low, high):
+            found[f"{low}-{high}"] = exponent(within, [points[n] for n in within])
+    return found
+
+
+def _front(entries: Sequence[Mapping[str, Any]], reference: str) -> list[str]:
+    """The front of the ordered runs: the period of any other is no measure of it."""
+    points = {
+        entry["name"]: (entry["real_time_factor"], entry["errors"][reference]["largest"])
+        for entry in entries
+        if entry["rhythm"]["verdict"] == "ordered" and entry["errors"][reference]["largest"] is not None
+    }
+    return front(points)

@@ -1,0 +1,190 @@
+"""Which runs the benchmark times: lines through steps, elements and segments, and the converged runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import Any, Literal
+
+from annelid.config import LEVELS, RunConfig, WormBody, load_config
+from annelid.errors import ConfigError, suggest
+from annelid.experiment.case import CHAIN, RODS, Case
+from annelid_studies.riddle2023.examination import Effort
+
+Kind = Literal["judged", "converged", "speed"]
+
+LINES = {
+    "levels": "the levels of --fidelity, and the paper's own worm beside them",
+    "steps": "3 segments, physics steps of 1 to 40 ms, 2 and 3 elements a side",
+    "elements": "3 segments, 1 to 6 elements a side, physics steps of 5 and 20 ms",
+    "segments": "rods as their preset has them, 3 to 47 segments",
+    "chain": "the paper's formulation, 3 to 12 segments",
+    "duration": "rods as their preset has them, 10 and 60 s, for the memory",
+    "peer": "free rods of PyElastica",
+}
+"""The lines by name, with what they vary."""
+
+JUDGED_S = 8.0
+CONVERGED_STEP_S = 0.0005
+CONVERGED_IMPEDANCE_RATIO = 1000.0
+PAPER_ELEMENTS, FINE_ELEMENTS = 3, 6
+CHAIN_S, SEGMENTS_S = 0.05, 2.0
+"""Durations of the runs that are timed but not judged, s: fifty steps of the chain, a hundred of rods."""
+
+_STEPS_MS = {"full": (1, 2, 5, 10, 20, 40), "quick": (5, 20)}
+_ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
+_ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
+# 48 segments of two elements a side are ten bodies beyond the engine's limit (docs/upstream/sparse_ordering.md).
+_SEGMENTS = {"full": (3, 6, 12, 24, 47), "quick": (3, 6, 12)}
+# Twelve segments of chain take seconds to compile and most of a second a step; both grow about with the cube of N.
+_CHAIN_SEGMENTS = {"full": (3, 6, 12), "quick": (3, 6)}
+_DURATIONS_S = {"full": (10.0, 60.0), "quick": (10.0,)}
+_LEAST_INTERVAL_S = 0.005
+
+
+@dataclass(frozen=True)
+class BenchCase:
+    """One run of the benchmark.
+
+    Attributes:
+        name: What it is, in a few words; no two cases share it.
+        kind: ``"judged"`` is compared with the ``"converged"`` runs, ``"speed"`` only timed.
+        case: Its preset and what is changed in it.
+        lines: The lines that it lies on.
+    """
+
+    name: str
+    kind: Kind
+    case: Case
+    lines: tuple[str, ...]
+
+    @property
+    def body(self) -> WormBody:
+        """The 3D worm's body."""
+        return _worm_body(self.case.config)
+
+
+def bench_cases(effort: Effort, lines: Sequence[str] | None = None) -> list[BenchCase]:
+    """Returns the cases of the lines, each once, the converged runs last.
+
+    Args:
+        effort: ``"quick"`` for fewer points on each line and one converged run, ``"full"`` for all.
+        lines: Names of `LINES`; None for all.
+
+    Raises:
+        ConfigError: There is no such line.
+    """
+    chosen = check_lines(lines)
+    found: dict[str, BenchCase] = {}
+    for line in LINES:
+        if line in chosen:
+            for case in _cases_of(line, effort):
+                before = found.get(case.name)
+                found[case.name] = case if before is None else _joined(before, case)
+    if any(case.kind == "judged" for case in found.values()):
+        meshes = (PAPER_ELEMENTS, FINE_ELEMENTS) if effort == "full" else (PAPER_ELEMENTS,)
+        found |= {case.name: case for case in map(converged, meshes)}
+    return list(found.values())
+
+
+def check_lines(lines: Iterable[str] | None) -> list[str]:
+    """Returns the lines asked for, all for None.
+
+    Raises:
+        ConfigError: There is no such line.
+    """
+    if lines is None:
+        return list(LINES)
+    chosen = list(lines)
+    for line in chosen:
+        if line not in LINES:
+            raise ConfigError(f"there are no cases {line!r}: {suggest(line, LINES)}")
+    return chosen
+
+
+def converged(elements: int) -> BenchCase:
+    """The run that the judged ones are compared with, for one mesh: short steps, and contact that does not creep."""
+    changes = {
+        **_resolution(elements, CONVERGED_STEP_S),
+        "body.formulation.friction_impedance_ratio": CONVERGED_IMPEDANCE_RATIO,
+        "duration_s": JUDGED_S,
+    }
+    return BenchCase(f"converged, {elements} elements", "converged", Case(RODS, changes), ())
+
+
+def judged(elements: int, step_ms: float, line: str) -> BenchCase:
+    """Three segments of rods, long enough for three cycles."""
+    changes = {**_resolution(elements, step_ms / 1e3), "duration_s": JUDGED_S}
+    return BenchCase(f"rods, {elements} elements, {step_ms:g} ms", "judged", Case(RODS, changes), (line,))
+
+
+def timed(preset: str, n_segments: int, duration_s: float, line: str) -> BenchCase:
+    """A preset as it is, with other numbers of segments."""
+    changes: dict[str, Any] = {"body.mesh.n_segments": n_segments, "duration_s": duration_s, **_recorded_as_in(preset)}
+    if preset == CHAIN and n_segments != 3:
+        # The paper's file gives one range for each of three segments; the rods' preset has their mean.
+        changes["body.rings.length_range_m"] = _worm_body(load_config(RODS)).rings.length_range_m
+    name = f"{preset}, {n_segments} segments, {duration_s:g} s"
+    return BenchCase(name, "speed", Case(preset, changes), (line,))
+
+
+def level_of(config: RunConfig) -> str | None:
+    """Name of the level of fidelity that a configuration of three segments resolves like, or None."""
+    for name, level in LEVELS.items():
+        like = load_config(RODS, {**level.changes, "duration_s": config.duration_s})
+        if like == config:
+            return name
+    return None
+
+
+def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
+    match line:
+        case "levels":
+            return [timed(CHAIN, 3, CHAIN_S, line), *map(_level_case, LEVELS)]
+        case "steps":
+            return [judged(elements, step, line) for elements in (2, 3) for step in _STEPS_MS[effort]]
+        case "elements":
+            steps = _ELEMENT_STEPS_MS[effort]
+            return [judged(elements, step, line) for step in steps for elements in _ELEMENTS[effort]]
+        case "segments":
+            return [timed(RODS, n, SEGMENTS_S, line) for n in _SEGMENTS[effort]]
+        case "chain":
+            return [timed(CHAIN, n, CHAIN_S, line) for n in _CHAIN_SEGMENTS[effort]]
+        case "duration":
+            return [timed(RODS, 3, duration, line) for duration in _DURATIONS_S[effort]]
+        case _:
+            return []
+
+
+def _level_case(name: str) -> BenchCase:
+    config = load_config(RODS, LEVELS[name].changes)
+    elements = _worm_body(config).mesh.elements_per_side
+    return judged(elements, 1e3 * config.clock.physics_timestep_s, "levels")
+
+
+def _worm_body(config: RunConfig) -> WormBody:
+    assert isinstance(config.body, WormBody)
+    return config.body
+
+
+def _resolution(elements: int, step_s: float) -> dict[str, float | int]:
+    """A mesh and a step; every recorded sample is a new one."""
+    signals, frames = (ceil(round(interval / step_s, 6)) * step_s for interval in (_LEAST_INTERVAL_S, 0.04))
+    return {
+        "body.mesh.elements_per_side": elements,
+        "clock.physics_timestep_s": step_s,
+        "record.signals_interval_s": round(signals, 9),
+        "record.frames_interval_s": round(frames, 9),
+    }
+
+
+def _recorded_as_in(preset: str) -> dict[str, float]:
+    """States the preset's own intervals, since a study's cases are recorded sparsely unless they say otherwise."""
+    record = load_config(preset).record
+    return {f"record.{name}": value for name, value in record.model_dump().items()}
+
+
+def _joined(first: BenchCase, second: BenchCase) -> BenchCase:
+    lines = tuple(dict.fromkeys((*first.lines, *second.lines)))
+    return BenchCase(first.name, first.kind, first.case, lines)

@@ -1,0 +1,160 @@
+"""One case, measured in a process of its own: ``python -m annelid_studies.bench.measure``, its request a line on stdin.
+
+Alone in a fresh process, a case's peak memory is its own. It ends when its stdin is closed, as it is by the end of its
+parent. Every line it prints is JSON: ``{"share": ..}`` as it goes on, then ``{"measured": ..}`` or ``{"error": ..}``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from annelid.errors import AnnelidError, SimulationStopped
+from annelid.experiment.lifeline import end_after
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+
+ENGINE_S, ENGINE_WALL_S = 2.7, 5.0
+"""The engine's timers run for a cycle of the paper's worm, but no longer than the second on the clock, s."""
+_MB = 1e6
+
+
+def main() -> None:
+    """Reads the request, measures, and prints the answer."""
+    keep_to_one_core()
+    request: dict[str, Any] = json.loads(sys.stdin.readline())
+    end_after(lambda: os.read(sys.stdin.fileno(), 1))
+    try:
+        _say(measured=_measured(request))
+    except AnnelidError as error:
+        _say(error=str(error))
+
+
+def keep_to_one_core() -> None:
+    """Pins the process to the last core that it may use, where the system can do so."""
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def measure(config: RunConfig) -> dict[str, Any]:
+    """Runs a closed loop with its recording and returns its times, shares, memory and results.
+
+    Args:
+        config: A 3D worm.
+
+    Returns:
+        Numbers with their units in the keys, ready for JSON. A run that a guard stopped is measured as far as it came.
+
+    Raises:
+        ConfigError: The body cannot be built.
+    """
+    import numpy as np
+
+    from annelid.experiment.outcome import outcome
+    from annelid.simulation.assemble import build_controller
+    from annelid.simulation.coupling import start
+    from annelid.simulation.loop import simulate
+    from annelid.simulation.runfile import open_run
+    from annelid.simulation.worm import WormPlant
+    from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares
+
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+    plant = WormPlant(config)
+    controller = build_controller(config, plant)
+    stepping = Stopwatch(plant, "step", "stride", reading=lambda: plant.data.time)
+    watching, controlling = Stopwatch(plant, "alarm"), Stopwatch(controller, "step", "stride")
+
+    def progress(simulated_s: float, _: float) -> None:
+        _say(share=0.9 * simulated_s / config.duration_s)
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run"
+        try:
+            run = simulate(config, path, plant=plant, controller=controller, progress=progress)
+        except SimulationStopped:
+            run = open_run(path)
+        peak = peak_memory_bytes()
+        if run.status == "interrupted":
+            raise KeyboardInterrupt
+        read = outcome(run)
+    total_s = run.wall_time_s
+    plant_s, control_s = stepping.seconds + watching.seconds, controlling.seconds
+    simulated_s = read.summary.duration_s or 0.0
+    # From one movement to the next the whole loop goes round, recording included.
+    laps_ms = 1e3 * laps_s(stepping.ends, stepping.readings, config.clock.physics_timestep_s)
+    again = start(config, plant, controller, None)
+    engine = engine_times(again, plant, stepping, min(ENGINE_S, config.duration_s), ENGINE_WALL_S)
+    build_s, compile_s = _building(config)
+    return {
+        "status": run.status,
+        "message": read.message,
+        "wall_s": total_s,
+        "real_time_factor": read.summary.real_time_factor,
+        "simulated_s": simulated_s,
+        "step_median_ms": float(np.median(laps_ms)) if laps_ms.size else None,
+        "step_mean_ms": float(np.mean(laps_ms)) if laps_ms.size else None,
+        "shares": shares(total_s, plant_s, control_s, engine),
+        "peak_memory_MB": None if peak is None else peak / _MB,
+        "build_s": build_s,
+        "compile_s": compile_s,
+        "velocities": int(plant.model.nv),
+        "constraint_rows_mean": float(np.mean(engine.constraints or 0)),
+        "solver_iterations_mean": float(np.mean(engine.iterations or 0)),
+        "solver_iterations_max": max(engine.iterations, default=0),
+        "rhythm": {"verdict": read.rhythm.verdict, "reason": read.rhythm.reason},
+        "summary": read.summary.to_dict(),
+        "load_average_1min": load,
+    }
+
+
+def peak_memory_bytes() -> int | None:
+    """Largest resident memory of this process so far, bytes; None where the system does not tell.
+
+    Linux counts it a memory map (``VmHWM``); its ``ru_maxrss`` would also hold the peak of the process that started
+    this one. Elsewhere ``ru_maxrss`` is all there is: in bytes on macOS, in KiB on other systems.
+    """
+    status = Path("/proc/self/status")
+    if status.is_file():
+        for line in status.read_text(encoding="ascii", errors="replace").splitlines():
+            if line.startswith("VmHWM:"):
+                return 1024 * int(line.split()[1])
+    try:
+        import resource
+    except ImportError:
+        return None
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def _measured(request: dict[str, Any]) -> dict[str, Any]:
+    if "config" not in request:
+        from annelid_studies.bench.peer import peer
+
+        return peer()
+    from annelid.config import load_config
+
+    return measure(load_config(request["config"]))
+
+
+def _building(config: RunConfig) -> tuple[float, float]:
+    """Times the making of the specification and its compilation by the engine, s."""
+    from annelid.body import build_spec, compile_spec
+
+    began = perf_counter()
+    spec = build_spec(config)
+    built = perf_counter()
+    compile_spec(spec)
+    return built - began, perf_counter() - built
+
+
+def _say(**content: Any) -> None:
+    print(json.dumps(content, allow_nan=False), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,235 @@
+"""The benchmark in one picture: error against speed, cost against length, and where the time of a step goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.style import panel_title, segment_colors
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
+
+TOLERATED_PERCENT = 2.0
+"""The line in the first panels: the error that a default may have."""
+
+_MARKERS = "os^DvPX*"
+_LEAST_PERCENT = 0.02
+_LABELS = {"riddle2023": "paper's chain", "riddle2023-rods": "rods"}
+_FADED = "0.35"
+# Cold within the engine, warm around it.
+_SHARE_COLORS = ("#1b2a6b", "#3658a7", "#5f8fd0", "#35b5a0", "#8fd3c5", "#c5cdd6", "#e3b428", "#c2410c", "#7a2a0a")
+
+
+def bench_figure(report: Mapping[str, Any], stem: str | Path) -> Path:
+    """Draws a benchmark.
+
+    Above: error (the larger of elongation's and period's) against times real time, one panel for each converged run;
+    one colour for each number of elements, one marker for each step, hollow where the rhythm is not ordered; the dotted
+    line joins the cases that no other beats. Below: time of a step against the number of segments with the slope, and
+    its shares by phase. Panels for which nothing was measured stay out.
+
+    Args:
+        report: The content of ``bench.json``.
+        stem: Path of both files without suffix.
+
+    Returns:
+        Path of the PNG.
+
+    Raises:
+        RunFileError: A file cannot be written.
+    """
+    measured = [entry for entry in report["cases"] if "failed" not in entry]
+    judged = [entry for entry in measured if entry["kind"] == "judged"]
+    scaled = [entry for entry in measured if {"segments", "chain"} & set(entry["lines"])]
+    divided = _divided(measured)
+    references = list(report["fronts"]) if judged else []
+    panels: list[tuple[str, float]] = []
+    panels += [("front", 2.9)] if references else []
+    panels += [("cost", 2.7)] if scaled else []
+    panels += [("shares", 1.2 + 0.24 * len(divided))] if divided else []
+    height_in = sum(height for _, height in panels) or 1.0
+    with canvas(height_in) as figure:
+        if panels:
+            ratios = [height for _, height in panels]
+            rows = figure.subfigures(len(panels), 1, height_ratios=ratios, squeeze=False)[:, 0]
+            for part, (name, _) in zip(rows, panels, strict=True):
+                if name == "front":
+                    _fronts(part, report, judged, references)
+                elif name == "cost":
+                    _cost(part, scaled, report["cost_exponents"])
+                else:
+                    _shares(part, divided)
+        return save_both(figure, stem)
+
+
+def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any], references: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    elements = sorted({entry["elements_per_side"] for entry in judged})
+    steps = sorted({entry["physics_step_ms"] for entry in judged})
+    colors = dict(zip(elements, segment_colors(len(elements)), strict=True))
+    markers = dict(zip(steps, _MARKERS, strict=False))
+    panels = part.subplots(1, len(references), sharey=True, squeeze=False)[0]
+    for axes, reference in zip(panels, references, strict=True):
+        points = {entry["name"]: _point(entry, reference) for entry in judged}
+        best = [points[name] for name in report["fronts"][reference] if points.get(name)]
+        axes.plot(*np.array(best).T if best else ((), ()), ":", color=_FADED, linewidth=1.0, zorder=1)
+        for entry in judged:
+            point = points[entry["name"]]
+            if point is None:
+                continue
+            color = colors[entry["elements_per_side"]]
+            ordered = entry["rhythm"]["verdict"] == "ordered"
+            axes.plot(
+                *point,
+                markers[entry["physics_step_ms"]],
+                color=color,
+                markerfacecolor=color if ordered else "none",
+                markersize=5.5,
+                zorder=2,
+            )
+        _front_axes(axes, report, f"Against {reference} (0.5 ms)")
+    panels[0].set_ylabel("error of elongation or period (%)")
+    meshes = [Line2D([], [], color=color, linewidth=4, label=_count(n)) for n, color in colors.items()]
+    grey: dict[str, Any] = {"color": _FADED, "linestyle": "", "markersize": 5}
+    paces = [Line2D([], [], marker=marker, label=f"{step:g} ms", **grey) for step, marker in markers.items()]
+    if any(entry["rhythm"]["verdict"] != "ordered" for entry in judged):
+        paces.append(Line2D([], [], marker="o", markerfacecolor="none", label="not ordered", **grey))
+    spacing: dict[str, Any] = {"columnspacing": 1.2, "handletextpad": 0.5}
+    part.legend(handles=meshes, loc="outside lower left", ncols=(len(meshes) + 1) // 2, **spacing)
+    part.legend(handles=paces, loc="outside lower right", ncols=(len(paces) + 1) // 2, **spacing)
+
+
+def _count(elements: int) -> str:
+    return f"{elements} element{'s' if elements > 1 else ''}"
+
+
+def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.axhline(TOLERATED_PERCENT, color="#c2410c", linewidth=0.8, linestyle="--", zorder=0)
+    axes.annotate(
+        f"{TOLERATED_PERCENT:g} %",
+        (1.0, TOLERATED_PERCENT),
+        xycoords=axes.get_yaxis_transform(),
+        xytext=(0, 2),
+        textcoords="offset points",
+        ha="right",
+        fontsize=7.5,
+        color="#c2410c",
+    )
+    axes.axvline(1.0, color=_FADED, linewidth=0.8, zorder=0)
+    outsiders = sorted(_outsiders(report).items())
+    for speed, _ in outsiders:
+        axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
+    # Words stand to the left of their lines, but for the faster outsider's: the two lines may be close.
+    for index, (speed, words) in enumerate([*outsiders, (1.0, "real time")]):
+        right = 0 < index < len(outsiders)
+        axes.annotate(
+            words,
+            (speed, 0.99),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(2 if right else -2, 0),
+            textcoords="offset points",
+            rotation=90,
+            ha="left" if right else "right",
+            va="top",
+            fontsize=7.5,
+            color=_FADED,
+        )
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.margins(x=0.08, y=0.12)
+    axes.set_xlabel("times real time (one core, recording on)")
+    panel_title(axes, title)
+
+
+def _outsiders(report: Mapping[str, Any]) -> dict[float, str]:
+    """Speeds to compare with that have no error of the same kind: the paper's formulation and the peer."""
+    found: dict[float, str] = {}
+    for entry in report["cases"]:
+        if entry.get("real_time_factor") and entry["formulation"] == "chain" and entry["n_segments"] == 3:
+            found[entry["real_time_factor"]] = "paper's chain"
+    peer = report.get("peer") or {}
+    if peer.get("real_time_factor"):
+        found[peer["real_time_factor"]] = "PyElastica, free rods"
+    return found
+
+
+def _point(entry: Mapping[str, Any], reference: str) -> tuple[float, float] | None:
+    error, speed = entry["errors"][reference]["largest"], entry["real_time_factor"]
+    return None if error is None or speed is None else (speed, max(100.0 * error, _LEAST_PERCENT))
+
+
+def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mapping[str, float]]) -> None:
+    axes = part.subplots()
+    lines: dict[str, dict[int, Any]] = {}
+    for entry in entries:
+        if entry["step_median_ms"]:
+            lines.setdefault(entry["preset"], {})[entry["n_segments"]] = entry
+    for color, marker, (preset, points) in zip(segment_colors(4), _MARKERS, sorted(lines.items()), strict=False):
+        sizes = sorted(points)
+        slopes = [f"N^{slope:.2f} ({span.replace('-', '..')})" for span, slope in exponents.get(preset, {}).items()]
+        step = points[sizes[0]]["physics_step_ms"]
+        label = f"{_LABELS.get(preset, preset)}, steps of {step:g} ms"
+        label += f": {', '.join(slopes)}" if slopes else ""
+        axes.plot(sizes, [points[n]["step_median_ms"] for n in sizes], f"{marker}-", color=color, label=label)
+        axes.axhline(step, color=color, linewidth=0.8, linestyle=":")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    sizes = sorted({n for points in lines.values() for n in points})
+    axes.set_xticks(sizes, [str(n) for n in sizes])
+    axes.minorticks_off()
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xlabel("segments N (dotted: where a step takes as long as it simulates)")
+    axes.set_ylabel("time of a step (ms)")
+    part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=1)
+    panel_title(axes, "Cost of a step against the length of the worm")
+
+
+def _divided(measured: Sequence[Any]) -> dict[str, Any]:
+    """The cases whose shares are drawn: the levels of fidelity, and the longest worm of each line."""
+    found = {
+        f"{entry['level']}: {entry['elements_per_side']} elements, {entry['physics_step_ms']:g} ms": entry
+        for entry in sorted(measured, key=lambda entry: entry.get("real_time_factor") or 0.0)
+        if entry["level"]
+    }
+    for line in ("segments", "chain"):
+        on_line = [entry for entry in measured if line in entry["lines"] and not entry["level"]]
+        if on_line:
+            longest = max(on_line, key=lambda entry: entry["n_segments"])
+            found[f"{_LABELS.get(longest['preset'], longest['preset'])}, N = {longest['n_segments']}"] = longest
+    return found
+
+
+def _shares(part: SubFigure, entries: Mapping[str, Any]) -> None:
+    axes = part.subplots()
+    phases = list(next(iter(entries.values()))["shares"])
+    places = np.arange(len(entries))
+    left = np.zeros(len(entries))
+    for phase, color in zip(phases, _SHARE_COLORS, strict=False):
+        widths = np.array([100.0 * max(entry["shares"][phase], 0.0) for entry in entries.values()])
+        axes.barh(places, widths, 0.72, left=left, color=color, label=phase, edgecolor="w", linewidth=0.4)
+        left += widths
+    for place, entry in zip(places, entries.values(), strict=True):
+        axes.annotate(
+            f"{entry['step_mean_ms']:.3g} ms",
+            (101.0, float(place)),
+            va="center",
+            fontsize=8,
+            annotation_clip=False,
+        )
+    axes.set_yticks(places, list(entries))
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 100.0)
+    axes.grid(axis="y", visible=False)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel("share of a step of the closed loop (%)")
+    panel_title(axes, "Where the time of a step goes")
+    part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=5, columnspacing=1.2)

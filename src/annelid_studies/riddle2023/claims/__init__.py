@@ -1,0 +1,28 @@
+"""The claims of the paper, each with its verdict, its evidence and the command that makes our number.
+
+Places are those of Riddle et al. 2023, "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control".
+"""
+
+from annelid_studies.riddle2023.claims.actuation import actuation_claims
+from annelid_studies.riddle2023.claims.control import control_claims
+from annelid_studies.riddle2023.claims.discussion import discussion_claims
+from annelid_studies.riddle2023.claims.evidence import Evidence, claim_cases, rule
+from annelid_studies.riddle2023.claims.outlook import outlook_claims
+from annelid_studies.riddle2023.claims.results import result_claims
+from annelid_studies.riddle2023.claims.structure import structure_claims
+from annelid_studies.riddle2023.contents import Claim
+
+__all__ = ["Evidence", "claim_cases", "paper_claims", "rule"]
+
+
+def paper_claims(evidence: Evidence) -> list[Claim]:
+    """Judges every claim, in the order of the paper."""
+    _, main = evidence.runs[0]
+    return [
+        *structure_claims(evidence, main),
+        *actuation_claims(evidence, main),
+        *control_claims(evidence),
+        *result_claims(evidence),
+        *discussion_claims(evidence, main),
+        *outlook_claims(evidence),
+    ]

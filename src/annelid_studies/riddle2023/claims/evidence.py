@@ -1,0 +1,219 @@
+"""What the claims are judged by: one rule, the runs that they need, and every reading of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import nan
+
+import numpy as np
+
+from annelid.experiment.case import CHAIN, FAST, PLANAR, Case, chain, fast, one_after_the_other, rods
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.store import Store
+from annelid.morphology import Array
+from annelid.simulation.runfile import Run
+from annelid_studies.riddle2023.contents import Verdict
+from annelid_studies.riddle2023.examination import Effort, Findings, Results
+from annelid_studies.riddle2023.examinations.side_by_side import WORMS
+from annelid_studies.slip import detection
+
+MAIN = Case(CHAIN)
+EQUAL_RANGES = {"body.rings.length_range_m": [0.566, 1.067]}
+SHORT_MINIMUM = {"body.rings.minimum_length": 0.5, **one_after_the_other()}
+TENSION_ONLY = {"body.springs.tension_only": True}
+PERTURBATIONS = (
+    *({"arena.friction": friction} for friction in (0.99, 1.01)),
+    *({"sensor.noise_m": 1e-4, "seed": seed} for seed in (1, 2, 3, 4)),
+)
+"""Differences too small to measure on a robot: the runs are not random, so these give the spread."""
+PLANAR_CASES = {
+    300: Case(PLANAR),
+    200: Case(PLANAR, {"controller.gate_time_constant_ms": 200, "body.gain": 1.9}),
+    100: Case(PLANAR, {"controller.gate_time_constant_ms": 100, "body.gain": 3.6}),
+}
+"""The planar worm with the gate time constants (ms) and gains that go together."""
+LABELS = {worm.name: worm.label for worm in WORMS}
+"""What the worms are called, nearest to the paper's first."""
+NEGLIGIBLE = 0.01
+"""Travel in a cycle, in lengths of the body, below which we call it negligible."""
+PAPER_STEPS, PAPER_WALL_S = 5000, 210.0
+EXACT, NEAR = 0.005, 0.1
+"""Relative differences from a number of the paper up to which a claim holds, and holds within the margin given."""
+TUBE_AREA_M2, POLYETHYLENE_KG_PER_M3 = 1.7e-5, 940.0
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the claims are judged by.
+
+    Attributes:
+        store: The runs.
+        results: Their outcomes.
+        effort: Quick or full.
+        findings: What each examination found, by its name.
+    """
+
+    store: Store
+    results: Results
+    effort: Effort
+    findings: dict[str, Findings]
+
+    def number(self, examination: str, name: str) -> float:
+        """Returns a single result of an examination; NaN where a run did not come that far.
+
+        Raises:
+            KeyError: It has no number of that name; the error lists the valid ones.
+        """
+        value = self.findings[examination].numbers[name]
+        return nan if value is None else float(value)
+
+    def words(self, examination: str, name: str) -> str:
+        """Returns a single result of an examination that is a text, as `number` does."""
+        return str(self.findings[examination].numbers[name])
+
+    @cached_property
+    def runs(self) -> Sequence[tuple[Outcome, Run]]:
+        """The runs of the paper's own worm, as it is first."""
+        cases = [MAIN, *(spread_cases(self.effort) if self.effort == "full" else ())]
+        return [(self.results[case], self.store.run(case)) for case in cases]
+
+    @property
+    def worms(self) -> Sequence[str]:
+        """Names of the worms that have examinations of their own at this effort, nearest to the paper's first."""
+        return list(LABELS) if self.effort == "full" else list(LABELS)[1:]
+
+
+def spread_cases(effort: Effort) -> list[Case]:
+    """The perturbed runs: of the paper's own worm, or in a quick report fewer, of the one that takes seconds."""
+    if effort == "quick":
+        return [Case(FAST, changes) for changes in PERTURBATIONS[:3]]
+    return [Case(CHAIN, changes) for changes in PERTURBATIONS]
+
+
+def rule(evidence: Evidence) -> list[str]:
+    """Says how all claims are judged."""
+    perturbed = spread_cases(evidence.effort)
+    n, n_seeds = len(perturbed), sum("seed" in case.changes for case in perturbed)
+    swings, periods = [], []
+    for case in perturbed:
+        swings.append(readings_m(evidence.store.run(case)))
+        periods.append(evidence.results[case].rhythm.period_s or nan)
+    preset = perturbed[0].preset
+    swings = [readings_m(evidence.store.run(Case(preset))), *swings]
+    apart = float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0)))
+    spread = (
+        f"Between the {n + 1} runs, {preset} as it is and the {n}, an elongation differs by up to {100 * apart:.1f} % "
+        f"and the period by up to {1e3 * float(np.ptp(periods)):.0f} ms."
+    )
+    which = (
+        "The runs are that worm as it is, and perturbed by less than one could measure on a robot"
+        if evidence.effort == "full"
+        else "In this quick report the run is that worm as it is; a full one adds runs perturbed by less than one "
+        "could measure on a robot"
+    )
+    return [
+        "All claims are judged by one rule. A number of the paper's is compared with every reading of every run of its "
+        "own worm, riddle2023, and a property is looked for in each of them. The readings of an elongation are those "
+        "of the segment's six springs, one a helix, each peak to peak, and the largest mean of the six above rest, "
+        f"since the paper does not say which it read. {which} ({n} runs: friction 1 % lower and higher, and sensor "
+        f"noise of 0.1 mm, {n_seeds} seed{'s' if n_seeds > 1 else ''}). {spread} Where a claim is about other worms or "
+        "settings, its text names what is compared.",
+        f"It holds: all are within {100 * EXACT:g} % of the paper's number, or have the property. It holds within x: "
+        f"all are within {100 * NEAR:g} %, the farthest by x. It rests on something: some are, others are not, and "
+        "they differ in what is named, which need not be the only cause. It does not hold: none is. It "
+        "cannot be tested here: by decision, for the reason given. Geometry, formulae and arithmetic have no "
+        "spread. No time of computing enters a verdict.",
+    ]
+
+
+def readings_m(run: Run) -> Array:
+    """Every reading of the elongation of every segment, m, shape ``(n_segments, n_sensors + 1)``; see `rule`."""
+    stretch, rest = run.data["stretch_length"].values, run.data["stretch_rest_length"].values
+    mean = (stretch - rest).mean(axis=2).max(axis=0)
+    return np.column_stack([np.ptp(stretch, axis=0), mean])
+
+
+def longer_worm(n_segments: int, worm: str) -> Case:
+    """A worm of that many segments with equal muscles, each contracted in turn: the test of the interior segments."""
+    changes = {"body.mesh.n_segments": n_segments, **EQUAL_RANGES, **one_after_the_other(n_segments)}
+    return {"chain": chain, "fast": fast, "rods": rods}[worm](changes)
+
+
+def longer_worms(effort: Effort) -> list[tuple[int, str]]:
+    """Numbers of segments and worms of that test."""
+    numbers = (4, 5, 6) if effort == "full" else (4, 6)
+    pairs = [(n, worm) for worm in ("fast", "rods") for n in numbers]
+    return [*pairs, (4, "chain")] if effort == "full" else pairs
+
+
+def claim_cases(effort: Effort) -> Sequence[Case]:
+    """The runs that the claims need beside those of the examinations."""
+    return [
+        MAIN,
+        Case(FAST),
+        rods(),
+        *spread_cases(effort),
+        *(worm(changes) for worm in (fast, rods) for changes in (SHORT_MINIMUM, one_after_the_other())),
+        *(
+            worm.case(changes)
+            for worm in WORMS
+            if effort == "full" or worm is not WORMS[0]
+            for changes in ({}, TENSION_ONLY)
+        ),
+        *PLANAR_CASES.values(),
+        *(longer_worm(n, worm) for n, worm in longer_worms(effort)),
+        *(detection.CASES[name] for name in slip_runs(effort)),
+    ]
+
+
+def slip_runs(effort: Effort) -> Sequence[str]:
+    """Names of the runs that the slip detector is judged on."""
+    return list(detection.CASES) if effort == "full" else detection.QUICK
+
+
+def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:
+    """Judges readings by a number of the paper's; see `rule`.
+
+    Args:
+        ours: All of our readings; NaN is near nothing.
+        paper: The paper's number.
+        on: What tells readings that are near from others, should there be both.
+    """
+    apart = [abs(one / paper - 1.0) for one in ours]
+    if all(one <= EXACT for one in apart):
+        return "holds", ""
+    if all(one <= NEAR for one in apart):
+        return "holds within", f"{100 * max(apart):.1f} %"
+    return judged((one <= NEAR for one in apart), on)
+
+
+def judged(has: Iterable[bool], on: str = "") -> tuple[Verdict, str]:
+    """Judges whether runs or readings have a property; see `rule`.
+
+    Args:
+        has: Whether each has it.
+        on: What tells those that have it from others, should there be both.
+    """
+    found = [bool(one) for one in has]
+    if all(found):
+        return "holds", ""
+    return ("rests on", on) if any(found) else ("does not hold", "")
+
+
+def between(values: Iterable[float], scale: float = 1.0, digits: int = 2) -> str:
+    """Writes the range of some numbers, ``1.20 to 1.40``, or the number where all print alike."""
+    found = scale * np.array([*values])
+    low, high = (f"{value:.{digits}f}" for value in (found.min(), found.max()))
+    return low if low == high else f"{low} to {high}"
+
+
+def centimetres(values: Sequence[float | None] | None, digits: int = 2) -> str:
+    """Writes lengths given in m as ``1.00 / 2.00 cm``."""
+    return " / ".join("-" if value is None else f"{100 * value:.{digits}f}" for value in values or ()) + " cm"
+
+
+def order_of(outcome: Outcome) -> str:
+    """The order of onsets as ``1-2-3``."""
+    return "-".join(str(segment) for segment in outcome.rhythm.order)

@@ -1,0 +1,108 @@
+"""What the report consists of."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from annelid.draw.markdown import Table
+from annelid_studies.riddle2023.examination import Effort, Examination, Findings
+
+Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
+_COUNTED: Mapping[Verdict, tuple[str, str]] = {
+    "holds": ("holds", "hold"),
+    "holds within": ("holds within the margin given", "hold within the margin given"),
+    "rests on": ("rests on a choice that is named", "rest on a choice that is named"),
+    "does not hold": ("does not hold", "do not hold"),
+    "not testable here": ("cannot be tested here", "cannot be tested here"),
+}
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One claim of the paper and what became of it.
+
+    Attributes:
+        topic: Structure, sensing, actuation, results, discussion, future work.
+        claim: What the paper says, in our words.
+        place: Where it says so.
+        verdict: Whether it holds.
+        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
+        paper: The paper's number or words.
+        ours: Our number or words.
+        evidence: Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it.
+        command: The command that makes our number.
+    """
+
+    topic: str
+    claim: str
+    place: str
+    verdict: Verdict
+    paper: str
+    ours: str
+    evidence: str
+    command: str
+    within: str = ""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the report.
+
+    Attributes:
+        number: The paper's number of the figure.
+        title: A few words.
+        picture: The PNG; an SVG of the same stem lies beside it.
+        caption: What one sees.
+    """
+
+    number: int
+    title: str
+    picture: Path
+    caption: str
+
+
+@dataclass(frozen=True)
+class Examined:
+    """An examination with what it found and its figure."""
+
+    examination: Examination
+    findings: Findings
+    picture: Path
+
+
+@dataclass(frozen=True)
+class Report:
+    """The whole report.
+
+    Attributes:
+        effort: Quick or full.
+        summary: Paragraphs that say what was found, for those who read no further.
+        main_table: Our main numbers beside the paper's.
+        figures: The paper's figures from our own runs.
+        claims: The paper's claims.
+        examinations: The examinations in the order of the report.
+        provenance: Versions, number of runs, processor time: label and value.
+        rule: Paragraphs that say how the claims are judged.
+    """
+
+    effort: Effort
+    summary: Sequence[str]
+    main_table: Table
+    figures: Sequence[Figure]
+    claims: Sequence[Claim]
+    examinations: Sequence[Examined]
+    provenance: Mapping[str, str]
+    rule: Sequence[str] = ()
+
+
+def tally(claims: Sequence[Claim]) -> str:
+    """Counts the verdicts in words: ``18 hold, 6 rest on a choice that is named and 2 cannot be tested here``."""
+    number = Counter(claim.verdict for claim in claims)
+    parts = [
+        f"{number[verdict]} {words[number[verdict] != 1]}" for verdict, words in _COUNTED.items() if number[verdict]
+    ]
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"

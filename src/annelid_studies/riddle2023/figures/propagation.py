@@ -1,0 +1,417 @@
+"""Figures 2 and 8: how far a contraction deforms the mesh around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.analysis.rhombi import (
+    actuated,
+    deformation,
+    distance_from_ring_m,
+    plane_means,
+    rhombus_diagonals,
+    rhombus_plane,
+)
+from annelid.draw.camera import picture_axes
+from annelid.draw.canvas import WIDTH_IN, canvas, save_both
+from annelid.draw.planar_scene import rhombi as flat_rhombi
+from annelid.draw.style import panel_title
+from annelid.morphology import MeshGeometry
+from annelid_studies.riddle2023.figures.renderings import (
+    Place,
+    Posture,
+    draw_worm,
+    recorded_posture,
+    rendering_works,
+    rhombus_outline,
+    show_worm,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from annelid.simulation.runfile import Run
+
+Array = NDArray[np.float64]
+
+TIME_S = 1.5
+"""The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
+FIGURE_8_DEG = (78.0, -30.0)
+GREEN, PINK, ORANGE = "#0f8a3c", "#e0409a", "#e8710a"
+_CM, _PERCENT = 100.0, 100.0
+_GAP_M = 0.002
+"""Pins that part from their strands by more than a strand's radius show in the pictures."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A rhombus at one moment against rest.
+
+    Attributes:
+        rhombus: Its index.
+        distance_m: Along the resting body from the contracted ring, negative towards the front.
+        length_m: Axial diagonal, at rest and now.
+        width_m: Lateral diagonal, at rest and now.
+    """
+
+    rhombus: int
+    distance_m: float
+    length_m: tuple[float, float]
+    width_m: tuple[float, float]
+
+    def __str__(self) -> str:
+        (length0, length), (width0, width) = self.length_m, self.width_m
+        return (
+            f"length {_CM * length0:.1f} → {_CM * length:.1f} cm ({_change(length0, length)})\n"
+            f"width {_CM * width0:.1f} → {_CM * width:.1f} cm ({_change(width0, width)})"
+        )
+
+
+@dataclass(frozen=True)
+class Propagation:
+    """What figures 2 and 8 measure.
+
+    Attributes:
+        time_s: Time of the posture.
+        segment: The most contracted segment, counted from 0.
+        near: An unactuated rhombus next to the contracted ring, without a corner on it.
+        far: The unactuated rhombus farthest from that ring, at the other side of it where both ends are as far.
+        plane_distance_m: Distance of every plane of rhombi from the contracted ring, shape ``(n_planes - 2,)``.
+        plane_axial: Mean relative change of the axial diagonals on each of them, same shape.
+        plane_lateral: The same of the lateral diagonals.
+    """
+
+    time_s: float
+    segment: int
+    near: Measured
+    far: Measured
+    plane_distance_m: Array
+    plane_axial: Array
+    plane_lateral: Array
+
+
+def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
+    """Measures how far a contraction deforms the mesh.
+
+    Of rhombi as near to the contracted ring or as far from it as each other, those that figure 8 shows best are taken.
+
+    Args:
+        run: The run of a 3D worm.
+        time_s: Time whose nearest recorded posture is measured, s.
+
+    Returns:
+        The measurement.
+
+    Raises:
+        RunFileError: The worm is planar, or no posture was recorded at that time.
+    """
+    return _measure(recorded_posture(run, time_s))
+
+
+def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
+    """Sets rhombi that deform alone beside the same row of the compliant worm, with one segment contracted.
+
+    Args:
+        run: The run of a 3D worm.
+        stem: Path of the two files to write, without suffix.
+        time_s: Time of the posture, s.
+
+    Returns:
+        Path of the PNG file; an SVG file lies beside it.
+
+    Raises:
+        RunFileError: The worm is planar, or no posture was recorded at that time.
+    """
+    posture = recorded_posture(run, time_s)
+    rows = _side_by_side(posture)
+    with canvas(3.0) as figure:
+        rigid, compliant = figure.subplots(1, 2, sharex=True, sharey=True)
+        place = draw_worm(compliant, posture, rows.facing_deg, strength=0.45)
+        corners = place(posture.crossings_m[posture.geometry.rhombi[rows.rhombi]])
+        alone = _CM * flat_rhombi(rows.rigid_m[0], rows.rigid_m[1])
+        alone += corners[rows.own].mean(axis=0) - alone[rows.own].mean(axis=0)
+        foot = float(compliant.get_ylim()[0])
+        _draw_row(rigid, alone, rows.own, rows.rigid_m[0] / rows.rest_m[0] - 1.0, foot)
+        _draw_row(compliant, corners, rows.own, rows.compliant_m[0] / rows.rest_m[0] - 1.0, foot)
+        reach = np.concatenate([alone, corners])[..., 0]
+        compliant.set_xlim(min(compliant.get_xlim()[0], reach.min() - 1), max(compliant.get_xlim()[1], reach.max() + 1))
+        compliant.set_ylim(foot - 8.0, None)
+        figure.set_figheight(_height_over_width(compliant) * WIDTH_IN / 2 + 0.3)
+        _scale_bar(rigid, alone)
+        panel_title(rigid, "a) without propagation: each rhombus alone")
+        panel_title(compliant, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
+        return save_both(figure, stem)
+
+
+def figure_2_caption(run: Run, time_s: float = TIME_S) -> str:
+    """Says what figure 2 shows, with the numbers measured."""
+    posture = recorded_posture(run, time_s)
+    rows = _side_by_side(posture)
+    rest, alone, mesh = (float(lengths[0].sum()) for lengths in (rows.rest_m, rows.rigid_m, rows.compliant_m))
+    own_alone, own_mesh = (float(m[0][rows.own] / rows.rest_m[0][rows.own]) for m in (rows.rigid_m, rows.compliant_m))
+    beside = [k for k in (rows.own - 1, rows.own + 1) if 0 <= k < len(rows.rhombi)]
+    neighbours = float((rows.compliant_m[0] / rows.rest_m[0])[beside].mean())
+    return (
+        f"One row of rhombi along the body while segment {rows.segment + 1} contracts (orange, hatched; all others "
+        "black); below each rhombus the change of its length. a) Kinematic, with rigid sides: made as narrow as the "
+        f"contracted rhombus of b), that one lengthens by {_change(1.0, own_alone)} and its neighbours keep their "
+        f"shape. b) The compliant worm at {posture.time_s:.2f} s, drawn facing that row, the rest of the mesh pale: "
+        f"the contracted rhombus lengthens by {_change(1.0, own_mesh)}, and its neighbours in the row by "
+        f"{_change(1.0, neighbours)} on average. The row of {_CM * rest:.1f} cm becomes {_CM * alone:.1f} cm long in "
+        f"a) and {_CM * mesh:.1f} cm in b).{_pin_remark(posture, rows.segment)}"
+    )
+
+
+def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
+    """Shows the worm with one segment contracted, a near and a far rhombus, and the deformation of all of them.
+
+    Args:
+        run: The run of a 3D worm.
+        stem: Path of the two files to write, without suffix.
+        time_s: Time of the posture, s.
+
+    Returns:
+        Path of the PNG file; an SVG file lies beside it.
+
+    Raises:
+        RunFileError: The worm is planar, or no posture was recorded at that time.
+    """
+    posture = recorded_posture(run, time_s)
+    measured = _measure(posture)
+    with canvas(6.7) as figure:
+        grid = figure.add_gridspec(2, 1)
+        picture, below = figure.add_subfigure(grid[0]).subplots(), figure.add_subfigure(grid[1])
+        place = show_worm(picture, posture, FIGURE_8_DEG, WIDTH_IN)
+        heights_in = min(_height_over_width(picture) * WIDTH_IN + 0.9, 4.3), 2.5
+        grid.set_height_ratios(heights_in)
+        figure.set_figheight(sum(heights_in))
+        # The first segment is on the left.
+        near_left = measured.near.distance_m < measured.far.distance_m
+        _outline(picture, place, posture, measured.near, "near rhombus", GREEN, "-", share=0.24 if near_left else 0.78)
+        _outline(picture, place, posture, measured.far, "far rhombus", PINK, "--", share=0.78 if near_left else 0.24)
+        panel_title(picture, f"a) segment {measured.segment + 1} contracted, t = {posture.time_s:.2f} s")
+        axial, lateral = below.subplots(1, 2, sharex=True)
+        change = deformation(posture.crossings_m, posture.geometry)
+        _scatter(axial, posture.geometry, measured, change.axial, measured.plane_axial)
+        _scatter(lateral, posture.geometry, measured, change.lateral, measured.plane_lateral)
+        panel_title(axial, "b) length of each rhombus")
+        panel_title(lateral, "c) width of each rhombus")
+        axial.set_ylabel("change against rest (%)")
+        for axes in (axial, lateral):
+            axes.set_xlabel("distance from the contracted ring at rest (cm)")
+        handles, labels = axial.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), columnspacing=1.4)
+        return save_both(figure, stem)
+
+
+def figure_8_caption(run: Run, time_s: float = TIME_S) -> str:
+    """Says what figure 8 shows, with the numbers measured."""
+    posture = recorded_posture(run, time_s)
+    measured = _measure(posture)
+    how = "rendered" if rendering_works() else "drawn from the recorded posture, not rendered"
+    near, far = measured.near, measured.far
+    distance, axial = np.abs(measured.plane_distance_m), measured.plane_axial
+    most, last = int(np.argmax(np.abs(axial))), int(np.argmax(distance))
+    return (
+        f"a) The compliant worm with segment {measured.segment + 1} contracted, at {measured.time_s:.2f} s ({how}; the "
+        "contracted ring is thick and red). The near rhombus (green, solid), "
+        f"{_CM * abs(near.distance_m):.1f} cm from the ring at rest, {_muscle(posture, near)}, changes its "
+        f"length by {_change(*near.length_m)} and its width by {_change(*near.width_m)}; the far one (pink, dashed), "
+        f"{_CM * abs(far.distance_m):.1f} cm away, {_muscle(posture, far)}, by {_change(*far.length_m)} and "
+        f"{_change(*far.width_m)}. b, c) The same for every rhombus (straight lines between opposite pins) with the "
+        f"mean of each plane, front on the left: the mean change of length is largest, "
+        f"{_change(1.0, 1.0 + float(axial[most]))}, {_CM * distance[most]:.1f} cm from the ring, and "
+        f"{_change(1.0, 1.0 + float(axial[last]))} at {_CM * distance[last]:.1f} cm."
+        f"{_pin_remark(posture, measured.segment)}"
+    )
+
+
+def _muscle(posture: Posture, measured: Measured) -> str:
+    return "relaxed" if actuated(posture.geometry)[measured.rhombus] else "without a muscle of its own"
+
+
+def _pin_remark(posture: Posture, segment: int) -> str:
+    """A sentence where the contracted ring's pins part from their strands, as soft pins do."""
+    geometry = posture.geometry
+    ring = geometry.rings[segment]
+    vertex = geometry.crossing_vertex[geometry.ring_planes[segment]]
+    strands = posture.strands_m[geometry.crossing_strands[ring], vertex]
+    gap_m = float(np.linalg.norm(strands - posture.crossings_m[ring, None], axis=-1).mean())
+    if gap_m < _GAP_M:
+        return ""
+    return f" The contracted ring's pins, which are tied softly, stand {_CM * gap_m:.1f} cm off their strands."
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """A row of rhombi tip to tip, alone and in the mesh: each ``(axial, lateral)``, m, of shape ``(2, n)``."""
+
+    segment: int
+    rhombi: NDArray[np.int64]
+    own: int
+    facing_deg: tuple[float, float]
+    rest_m: Array
+    compliant_m: Array
+    rigid_m: Array
+
+
+def _side_by_side(posture: Posture) -> _Rows:
+    geometry = posture.geometry
+    segment = _contracted(posture)
+    rings_own = np.flatnonzero(rhombus_plane(geometry) == geometry.ring_planes[segment])
+    # Seen from -y, the first segment is on the left.
+    outward = _outward(geometry.crossings_m, geometry)[rings_own]
+    start, away = int(rings_own[np.argmin(outward[:, 1])]), outward[np.argmin(outward[:, 1])]
+    row = _row(geometry, start)
+    own = int(np.flatnonzero(row == start)[0])
+    rest = np.stack(rhombus_diagonals(geometry.crossings_m, geometry.rhombi[row]))
+    compliant = np.stack(rhombus_diagonals(posture.crossings_m, geometry.rhombi[row]))
+    lateral = rest[1].copy()
+    lateral[own] = compliant[1, own]
+    rigid = np.stack([np.sqrt((rest**2).sum(axis=0) - lateral**2), lateral])
+    return _Rows(segment, row, own, (90.0, float(np.degrees(np.arcsin(-away[2])))), rest, compliant, rigid)
+
+
+def _row(geometry: MeshGeometry, start: int) -> NDArray[np.int64]:
+    """The rhombi that lie tip to tip with one of them, front to back."""
+    front, rear = geometry.rhombi[:, 0].tolist(), geometry.rhombi[:, 2].tolist()
+    row = [start]
+    while front[row[0]] in rear:
+        row.insert(0, rear.index(front[row[0]]))
+    while rear[row[-1]] in front:
+        row.append(front.index(rear[row[-1]]))
+    return np.array(row)
+
+
+def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) -> None:
+    """Draws rhombi, shape ``(n, 4, 2)``, in cm, the contracted one apart, with their changes of length below."""
+    from matplotlib.patches import Polygon
+
+    axes.set_axis_off()
+    axes.set_aspect("equal")
+    for k, quad in enumerate(corners):
+        style = {"edgecolor": ORANGE, "linewidth": 2.6, "hatch": "////"} if k == own else {"edgecolor": "black"}
+        axes.add_patch(Polygon(quad, closed=True, facecolor="none", zorder=6 if k == own else 5, **style))
+        text = _change(1.0, 1.0 + float(change[k])).removesuffix(" %")
+        axes.text(quad[:, 0].mean(), foot - 1.0, text, ha="center", va="top", fontsize=8)
+    middle = (corners[..., 0].min() + corners[..., 0].max()) / 2
+    axes.text(middle, foot - 5.0, "change of length (%)", ha="center", va="top", fontsize=8)
+
+
+def _height_over_width(axes: Axes) -> float:
+    """Shape of what the limits of axes hold, where both axes have one scale."""
+    width, height = (abs(float(high - low)) for low, high in (axes.get_xlim(), axes.get_ylim()))
+    return height / width
+
+
+def _scale_bar(axes: Axes, corners: Array) -> None:
+    """Draws 10 cm above a row's left end."""
+    left, above = corners[..., 0].min(), corners[..., 1].max() + 2.5
+    axes.plot([left, left + 10.0], [above, above], color="black", linewidth=2.0, solid_capstyle="butt")
+    axes.text(left + 5.0, above + 0.6, "10 cm", ha="center", va="bottom", fontsize=8)
+
+
+def _outline(
+    axes: Axes,
+    place: Place,
+    posture: Posture,
+    measured: Measured,
+    name: str,
+    color: str,
+    linestyle: str,
+    *,
+    share: float,
+) -> None:
+    """Follows a rhombus' sides, and writes its measurement below the picture, at a share of its width."""
+    line = place(rhombus_outline(posture, measured.rhombus))
+    axes.fill(*line.T, facecolor=color, alpha=0.22, linewidth=0, zorder=7)
+    axes.plot(*line.T, color="white", linewidth=6.5, zorder=8)
+    axes.plot(*line.T, linestyle=linestyle, color=color, linewidth=3.0, zorder=9)
+    tip = line[np.argmin(axes.transData.transform(line)[:, 1])]
+    axes.annotate(
+        f"{name}\n{measured}",
+        xy=tuple(tip),
+        xytext=(share, -0.04),
+        textcoords="axes fraction",
+        color=color,
+        ha="center",
+        va="top",
+        arrowprops={"arrowstyle": "-", "color": color, "linestyle": linestyle, "shrinkB": 2},
+        zorder=10,
+    )
+
+
+def _scatter(axes: Axes, geometry: MeshGeometry, measured: Propagation, change: Array, mean: Array) -> None:
+    """Change of every rhombus over its distance from the contracted ring."""
+    distance = _CM * distance_from_ring_m(geometry, measured.segment)
+    with_muscle = actuated(geometry)
+    for mask, marker, color, name in (
+        (~with_muscle, "o", "0.35", "unactuated"),
+        (with_muscle, "s", "#1b2a6b", "with a ring muscle"),
+    ):
+        face = color if marker == "s" else "white"
+        axes.plot(
+            distance[mask], _PERCENT * change[mask], marker, color=color, markerfacecolor=face, markersize=4, label=name
+        )
+    axes.plot(_CM * measured.plane_distance_m, _PERCENT * mean, "-", color="0.1", linewidth=1.2, label="mean")
+    for one, marker, color, name in ((measured.near, "D", GREEN, "near"), (measured.far, "v", PINK, "far")):
+        place = _CM * one.distance_m, _PERCENT * change[one.rhombus]
+        axes.plot(*place, marker, color=color, markersize=8, markeredgecolor="black", label=name, zorder=5)
+    axes.axhline(0.0, color="0.5", linewidth=0.8)
+
+
+def _measure(posture: Posture) -> Propagation:
+    geometry = posture.geometry
+    segment = _contracted(posture)
+    distance = distance_from_ring_m(geometry, segment)
+    offset = np.abs(rhombus_plane(geometry) - geometry.ring_planes[segment])
+    facing = _outward(posture.crossings_m, geometry) @ -picture_axes(*FIGURE_8_DEG)[2]
+    free = np.flatnonzero(offset >= 2)
+    own_muscle = actuated(geometry)[free]
+    near = int(free[np.lexsort((-facing[free], offset[free], own_muscle))[0]])
+    same_side = np.sign(distance[free]) == np.sign(distance[near])
+    far = int(free[np.lexsort((-facing[free], same_side, -offset[free], own_muscle))[0]])
+    change = deformation(posture.crossings_m, geometry)
+    return Propagation(
+        time_s=posture.time_s,
+        segment=segment,
+        near=_measured(posture, near, float(distance[near])),
+        far=_measured(posture, far, float(distance[far])),
+        plane_distance_m=plane_means(distance, geometry),
+        plane_axial=plane_means(change.axial, geometry),
+        plane_lateral=plane_means(change.lateral, geometry),
+    )
+
+
+def _measured(posture: Posture, rhombus: int, distance_m: float) -> Measured:
+    corners = posture.geometry.rhombi[[rhombus]]
+    rest = rhombus_diagonals(posture.geometry.crossings_m, corners)
+    now = rhombus_diagonals(posture.crossings_m, corners)
+    length, width = ((float(before[0]), float(after[0])) for before, after in zip(rest, now, strict=True))
+    return Measured(rhombus, distance_m, length, width)
+
+
+def _contracted(posture: Posture) -> int:
+    """The segment whose ring is the shortest."""
+    corners = posture.crossings_m[posture.geometry.rings]
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).sum(axis=1)
+    return int(np.argmin(lengths / posture.geometry.ring_length_m))
+
+
+def _outward(crossings_m: Array, geometry: MeshGeometry) -> Array:
+    """Direction from the body axis to every rhombus, shape ``(n_rhombi, 3)``."""
+    middles = crossings_m[geometry.rhombi].mean(axis=1)
+    plane = rhombus_plane(geometry)
+    axis = np.stack([middles[plane == p].mean(axis=0) for p in np.unique(plane)])
+    away = middles - axis[plane - plane.min()]
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+def _change(before: float, after: float) -> str:
+    percent = round(_PERCENT * (after / before - 1.0))
+    return f"{percent:+d} %".replace("-", "\N{MINUS SIGN}") if percent else "0 %"

@@ -1,0 +1,87 @@
+"""Figure 9: how far each segment of the robot elongates, and of the models of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from annelid.analysis.paper import published
+from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
+from annelid.config import load_config
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.style import panel_title, segment_colors
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_CM = 100.0
+_BAR = 0.8
+_LABEL_WIDTH = 22
+
+CAPTION = (
+    "Largest elongation of each segment of the physical robot (four segments, mean of the left and the right stretch "
+    "sensor), of the paper's model and of the present simulations, a) in centimetres and b) relative to segment 1. "
+    "In the robot the two middle segments elongate 37.8 % and 22.2 % less than segment 1, and the last differs from it "
+    "by 2.75 %. The original figure shows the robot's sensors over time; numbers are given of these maxima only."
+)
+
+
+def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) -> Path:
+    """Draws the elongations of the robot, of the paper's model and of simulations as groups of bars.
+
+    Args:
+        series: For each simulation its label and the elongation of every segment, m.
+        stem: Path of the two files without their suffixes.
+
+    Returns:
+        The path of the PNG file; the SVG file lies beside it.
+    """
+    groups = _with_published(series)
+    n_segments = max(len(elongation) for elongation in groups.values())
+    colors = segment_colors(n_segments)
+    with canvas(4.6) as figure:
+        absolute, relative = figure.subplots(2, 1, sharex=True)
+        _draw_bars(absolute, {label: _CM * np.asarray(values) for label, values in groups.items()}, colors)
+        _draw_bars(relative, {label: relative_to_first(values) for label, values in groups.items()}, colors)
+        panel_title(absolute, "a) largest elongation")
+        absolute.set_ylabel("elongation (cm)")
+        panel_title(relative, "b) the same relative to segment 1")
+        relative.set_ylabel("relative elongation (1)")
+        relative.set_xticks(range(len(groups)), [fill(label, _LABEL_WIDTH) for label in groups])
+        handles = absolute.containers[np.argmax([len(values) for values in groups.values()])]
+        absolute.legend(
+            list(handles),
+            [f"segment {segment}" for segment in range(1, n_segments + 1)],
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=n_segments,
+            columnspacing=1.2,
+            handlelength=1.2,
+            borderaxespad=0.1,
+        )
+        return save_both(figure, stem)
+
+
+def _with_published(series: Mapping[str, Sequence[float]]) -> dict[str, Sequence[float]]:
+    model = published(load_config("riddle2023"))["elongation_first_helix_pp_m"].value
+    if not isinstance(model, tuple):
+        raise TypeError("the paper's elongations are one number a segment")
+    return {"robot (Wang)": ROBOT_ELONGATION_M, "the paper's model": model, **series}
+
+
+def _draw_bars(axes: Axes, groups: Mapping[str, ArrayLike], colors: Sequence[Any]) -> None:
+    """Draws one group of bars a label, one bar a segment, with its number above."""
+    width = _BAR / len(colors)
+    for center, values in enumerate(map(np.asarray, groups.values())):
+        places = center + width * (np.arange(len(values)) - (len(values) - 1) / 2)
+        bars = axes.bar(places, values, 0.92 * width, color=colors[: len(values)], edgecolor="0.1", linewidth=0.6)
+        for label in axes.bar_label(bars, labels=[f"{value:.2f}" for value in values], padding=2, fontsize=8):
+            label.set_bbox({"facecolor": "w", "edgecolor": "none", "pad": 0.6})
+    axes.grid(axis="x", visible=False)
+    axes.tick_params(axis="x", length=0)
+    axes.margins(y=0.12)

@@ -1,0 +1,380 @@
+"""How wide the range is in which a controller walks: a designed sample of worms, each walked by every controller.
+
+The sample is a Latin hypercube of 300 points over sensor noise, friction, physics step, number of segments, stiffness
+and seeds. It was drawn once, by `draw`, and lies in ``robustness.csv``. The worms are rods with rigid
+crossings. A point is *walked* if the rhythm is ordered, in one wave from front to rear, and *in time* if its period is
+also within 10 % of design. The robust controller's network starts from its design, from silence, and from random
+states in turn; the paper's from its own start, its best case. The first two turns are not judged.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
+from importlib.resources import files
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
+from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.draw.markdown import table
+from annelid.errors import ConfigError, RunFileError, suggest
+from annelid.experiment.case import RODS, SHEAR_OVER_YOUNG, Case
+from annelid.experiment.fingerprint import code_fingerprint
+from annelid.experiment.store import Store, case_key
+from annelid.experiment.workers import Workers
+from annelid.output import whole_file
+from annelid.plausibility import tolerance_window_m
+from annelid.simulation.lock import locks
+from annelid.textfiles import read_json
+
+CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
+"""The paper's with the preset's tolerance, and with the tolerance that the body needs; ours; a wave without sensing."""
+TABLE = "robustness.csv"
+RESULTS = "robustness.json"
+SETTLING_S = 2.0 * DESIGN_INTERVAL_S
+"""Not judged at the start of a run: within two turns the robust network has found its rhythm from any state, s."""
+CYCLES = 2.3
+"""How long a run is judged, in design periods: the score needs two cycles of every segment."""
+STARTS = ("design", "silent", "random")
+"""How the robust network starts, in turn."""
+TOGETHER = 8
+"""Points computed as one lot for each process, so that no process waits long for the lot's last run."""
+PERIOD_TOLERANCE = 0.1
+TIMED = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 0.0, "interval_s": DESIGN_INTERVAL_S}
+"""A wave of the paper's turns: its muscles' rhythm is in time by construction, its segments' lengthening is not."""
+
+Progress = Callable[[str, int, int, float], object]
+"""Called with the stage, the number of points done, their total, and the share of the work that is done."""
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One point of the sample.
+
+    Attributes:
+        noise_m: Standard deviation of the noise on every reading of a stretch sensor, m.
+        friction: Friction of the floor.
+        physics_timestep_ms: Step of the body, whole ms.
+        n_segments: Number of segments.
+        young_modulus_Pa: Of the strands, Pa.
+        seed: Of the noise, and of the network's start.
+    """
+
+    noise_m: float
+    friction: float
+    physics_timestep_ms: int
+    n_segments: int
+    young_modulus_Pa: float
+    seed: int
+
+    @property
+    def design_period_s(self) -> float:
+        """The period by design, s."""
+        return self.n_segments * DESIGN_INTERVAL_S
+
+    @property
+    def start(self) -> str:
+        """How the robust network starts."""
+        return STARTS[self.seed % len(STARTS)]
+
+    def case(self, controller: str) -> Case:
+        """Returns the run of this point under a controller, one of `CONTROLLERS`."""
+        case = Case(
+            RODS,
+            {
+                "sensor.noise_m": self.noise_m,
+                "arena.friction": self.friction,
+                "clock.physics_timestep_s": self.physics_timestep_ms / 1e3,
+                "body.mesh.n_segments": self.n_segments,
+                "body.strands.young_modulus_Pa": self.young_modulus_Pa,
+                "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG * self.young_modulus_Pa,
+                "seed": self.seed,
+                "duration_s": round(SETTLING_S + CYCLES * self.design_period_s, 1),
+            },
+        )
+        if controller == "sns-robust":
+            return case.but({"controller": {"kind": "sns-robust", "start": self.start}})
+        if controller == "timed":
+            return case.but({"controller": TIMED})
+        if controller == "sns-tolerance":
+            window = tolerance_window_m(case.config)
+            assert window is not None
+            return case.but({"sensor.tolerance_m": round(sum(window) / 2, 4)})
+        return case
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """How one point went under one controller.
+
+    Attributes:
+        point: Number of the point, from 0 in the order drawn.
+        controller: Kind of the controller.
+        n_segments: Segments of the worm that was run.
+        reason: What the score says, or why the run ended before its time.
+        period_s: Mean period, s; None if no segment repeats.
+        walked: Ordered, in one wave from front to rear, to the end.
+        in_time: Walked, with a period within 10 % of design.
+        lengthened: The segments lengthened in one wave from front to rear as well.
+        code: Digests of its run, with its configuration, code and engine, and of the code that judged it.
+    """
+
+    point: int
+    controller: str
+    n_segments: int
+    reason: str
+    period_s: float | None
+    walked: bool
+    in_time: bool
+    lengthened: bool
+    code: str
+
+
+def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
+    """Draws a Latin hypercube: every quantity has one point in each of ``n_points`` strata of equal weight.
+
+    Noise is spread evenly over 0 .. 5 mm; friction over 0.05 .. 1.5, step over 1 .. 10 ms and stiffness over 0.3 .. 2
+    GPa evenly in the logarithm; segments evenly over 3 .. 24. Steps are rounded to whole ms.
+
+    Args:
+        n_points: Number of points.
+        seed: Of the draw.
+    """
+    rng = np.random.default_rng(seed)
+    unit = np.column_stack([(rng.permutation(n_points) + rng.random(n_points)) / n_points for _ in range(5)])
+
+    def log_spread(share: float, low: float, high: float) -> float:
+        return low * (high / low) ** share
+
+    return [
+        Point(
+            noise_m=round(0.005 * noise, 6),
+            friction=round(log_spread(friction, 0.05, 1.5), 4),
+            physics_timestep_ms=round(log_spread(step, 1.0, 10.0)),
+            n_segments=3 + int(22 * segments),
+            young_modulus_Pa=round(log_spread(stiffness, 0.3e9, 2.0e9), -5),
+            seed=i,
+        )
+        for i, (noise, friction, step, segments, stiffness) in enumerate(unit.tolist())
+    ]
+
+
+def write_points(points: Sequence[Point], path: Path) -> None:
+    """Writes a sample as CSV with a header."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(point) for point in points)
+
+
+def points() -> tuple[Point, ...]:
+    """Returns the sample as it was drawn once."""
+    text = files("annelid_studies").joinpath(TABLE).read_text(encoding="utf-8")
+    return tuple(
+        Point(
+            noise_m=float(row["noise_m"]),
+            friction=float(row["friction"]),
+            physics_timestep_ms=int(row["physics_timestep_ms"]),
+            n_segments=int(row["n_segments"]),
+            young_modulus_Pa=float(row["young_modulus_Pa"]),
+            seed=int(row["seed"]),
+        )
+        for row in csv.DictReader(text.splitlines())
+    )
+
+
+def judge(
+    number: int, point: Point, controller: str, rhythm: RhythmScore, lengthening: RhythmScore, message: str = ""
+) -> Judged:
+    """Judges the scores of one run.
+
+    Args:
+        number: Number of the point.
+        point: The point.
+        controller: Kind of the controller.
+        rhythm: The score of its activation.
+        lengthening: The score of its segments' lengthening.
+        message: Why the run ended before its time; empty if it did not.
+    """
+    walked = not message and rhythm.is_one_wave
+    period = rhythm.period_s
+    return Judged(
+        point=number,
+        controller=controller,
+        n_segments=point.n_segments,
+        reason=message or rhythm.reason,
+        period_s=period,
+        walked=walked,
+        in_time=walked and period is not None and abs(period / point.design_period_s - 1.0) <= PERIOD_TOLERANCE,
+        lengthened=not message and lengthening.is_one_wave,
+        code=_made_by(point, controller),
+    )
+
+
+def _made_by(point: Point, controller: str) -> str:
+    return f"{case_key(point.case(controller))} {code_fingerprint(__name__)}"
+
+
+@locks("folder")
+def robustness(
+    folder: Path,
+    n_points: int,
+    *,
+    controllers: Sequence[str] = CONTROLLERS,
+    n_segments: int | None = None,
+    keep: bool = False,
+    jobs: int | None = None,
+    workers: Workers | None = None,
+    progress: Progress | None = None,
+) -> list[Judged]:
+    """Walks the first points of the sample under each controller, as far as the folder does not tell how that goes.
+
+    Args:
+        folder: Folder of the results; runs go to ``runs`` within it. Written after every run, so that a stopped study
+            shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
+        n_points: How many points, in the order drawn.
+        controllers: Kinds of controllers, of `CONTROLLERS`.
+        n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
+            that costs less; None for the sample as it is.
+        keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
+        jobs: Processes; default: one a core.
+        workers: Who computes the runs instead of processes of this machine.
+        progress: Called before the first and after every run.
+
+    Returns:
+        The judgements that the folder holds now, by controller and point.
+
+    Raises:
+        ConfigError: No points, more than the sample has, or an unknown controller.
+        RunFileError: ``robustness.json`` is damaged.
+        AnnelidError: A run cannot be built or written.
+    """
+    sample = points()
+    if not 1 <= n_points <= len(sample):
+        raise ConfigError(f"points must be in 1 .. {len(sample)}, the size of the sample, not {n_points}")
+    for controller in controllers:
+        if controller not in CONTROLLERS:
+            raise ConfigError(f"unknown controller {controller!r}: {suggest(controller, CONTROLLERS)}")
+    chosen = sample if n_segments is None else tuple(replace(point, n_segments=n_segments) for point in sample)
+    judged = {
+        (one.controller, one.point): one
+        for one in read_judged(folder)
+        if one.n_segments == chosen[one.point].n_segments
+        and (keep or one.code == _made_by(chosen[one.point], one.controller))
+    }
+    missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
+    cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
+    store, total_s, before_s = Store(folder / "runs", workers), sum(case.cost_s for case in cases.values()), 0.0
+
+    def judge_what_is_there() -> None:
+        for (kind, i), case in cases.items():
+            if (kind, i) not in judged and case in store:
+                judged[kind, i] = _judged_run(store, case, i, chosen[i], kind)
+        _write(_sorted(judged), folder)
+
+    def tell(lot_s: float, _: int, __: int, share: float) -> None:
+        judge_what_is_there()
+        if progress is not None:
+            done = sum(key in judged for key in cases)
+            progress("robustness", done, len(cases), (before_s + share * lot_s) / total_s)
+
+    in_order = list(cases.values())
+    size = TOGETHER * (jobs or os.cpu_count() or 1)
+    for lot in (in_order[first : first + size] for first in range(0, len(in_order), size)):
+        lot_s = sum(case.cost_s for case in lot)
+        store.compute(lot, jobs=jobs, progress=partial(tell, lot_s))
+        before_s += lot_s
+    return _sorted(judged)
+
+
+def _judged_run(store: Store, case: Case, number: int, point: Point, controller: str) -> Judged:
+    """Judges a point whose run the store has."""
+    run = store.run(case)
+    scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+    return judge(number, point, controller, *scores, store[case].message)
+
+
+def read_judged(folder: Path) -> list[Judged]:
+    """Reads the judgements that a folder holds; none if it has no ``robustness.json``.
+
+    Raises:
+        RunFileError: The file is damaged.
+    """
+    path = folder / RESULTS
+    if not path.exists():
+        return []
+    try:
+        return [Judged(**one) for one in read_json(path)["judged"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise RunFileError(f"{path} is not what this version of annelid writes; move it away") from error
+
+
+def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
+    """Counts by controller.
+
+    Returns:
+        For every controller the number of points, of those walked, in time, and in time with their segments lengthening
+        in the same order, and the share in time with its 95 % interval after Wilson.
+    """
+    found: dict[str, dict[str, Any]] = {}
+    for controller in dict.fromkeys(one.controller for one in judged):
+        of_it = [one for one in judged if one.controller == controller]
+        n, good = len(of_it), sum(one.in_time for one in of_it)
+        low, high = wilson(good, n)
+        walked = sum(one.walked for one in of_it)
+        found[controller] = {
+            "points": n,
+            "walked": walked,
+            "in_time": good,
+            "lengthened": sum(one.in_time and one.lengthened for one in of_it),
+            "share": good / n,
+            "interval": [low, high],
+        }
+    return found
+
+
+def wilson(successes: int, n: int, z: float = 1.959964) -> tuple[float, float]:
+    """Interval of a share of ``successes`` out of ``n``, after Wilson 1927; by default of 95 %."""
+    share, z2 = successes / n, z * z / n
+    middle = (share + z2 / 2.0) / (1.0 + z2)
+    half = z * sqrt(share * (1.0 - share) / n + z2 / (4.0 * n)) / (1.0 + z2)
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
+    """Returns what `shares` counted as a Markdown table."""
+    rows = [
+        [
+            f"`{controller}`",
+            str(of["points"]),
+            str(of["walked"]),
+            str(of["in_time"]),
+            str(of["lengthened"]),
+            f"{100 * of['share']:.0f} ({100 * of['interval'][0]:.0f} .. {100 * of['interval'][1]:.0f})",
+        ]
+        for controller, of in found.items()
+    ]
+    head = ["controller", "points", "walked 1-2-..-N", "in time: within 10 % of the period", "and so lengthened"]
+    return table([*head, "share in time (%)"], rows)
+
+
+def _sorted(judged: Mapping[tuple[str, int], Judged]) -> list[Judged]:
+    return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
+
+
+def _write(judged: Sequence[Judged], folder: Path) -> None:
+    found = shares(judged)
+    content = {"shares": found, "judged": [asdict(one) for one in judged]}
+    folder.mkdir(parents=True, exist_ok=True)
+    texts = {RESULTS: json.dumps(content, indent=1), "robustness.md": shares_table(found)}
+    for name, text in texts.items():
+        with whole_file(folder / name) as draft:
+            draft.write_text(text + "\n", encoding="utf-8")

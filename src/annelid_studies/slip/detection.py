@@ -1,0 +1,107 @@
+"""How well a robot can tell from stretch and pressure that it slips, over gaits and frictions.
+
+The detector's constants were chosen on one run, `CHOSEN_ON`; the others test it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from annelid.analysis.detector import Detection, Score, detect, precision_recall, score
+from annelid.experiment.case import Case
+from annelid.experiment.progress import StudyProgress, in_stage
+from annelid.experiment.store import Store
+from annelid.morphology import Array
+from annelid.output import write_csv
+from annelid_studies.slip.feedback import DURATION_S, PLAIN, PRESET, PRESSURE, case
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+LIMIT_M_PER_S = 0.1
+"""The detector's own limit."""
+LIMITS_M_PER_S = np.geomspace(0.005, 1.0, 60)
+TIMED = {
+    "controller": {"kind": "timed", "rise_s": 0.1, "hold_s": 0.5, "fall_s": 0.1, "interval_s": 0.38},
+    "arena.friction": 0.7,
+    "duration_s": DURATION_S,
+}
+CHOSEN_ON = "sns, friction 0.7"
+CASES: dict[str, Case] = {
+    CHOSEN_ON: case(PLAIN, 0.7),
+    "sns, friction 0.3": case(PLAIN, 0.3),
+    "sns, friction 1.5": case(PLAIN, 1.5),
+    "sns-pressure, friction 0.3": case(PRESSURE, 0.3),
+    "sns-pressure, friction 1": case(PRESSURE, 1.0),
+    "timed wave, friction 0.7": Case(PRESET, TIMED),
+}
+QUICK = (CHOSEN_ON, "sns-pressure, friction 1")
+
+
+def slip_detection(
+    store: Store, names: Sequence[str] | None = None, *, jobs: int | None = None, progress: StudyProgress | None = None
+) -> dict[str, Detection]:
+    """Runs the worms, as far as the store does not have them, and lets the detector read each.
+
+    Args:
+        store: Where runs are kept.
+        names: Which of `CASES`; default: all.
+        jobs: Runs at a time, by default as many as there are cores.
+        progress: Called at the start and after every run.
+
+    Raises:
+        AnnelidError: A run cannot be made.
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    cases = {name: CASES[name] for name in names or CASES}
+    store.compute(cases.values(), jobs=jobs, progress=in_stage(progress, "detector"))
+    return {name: detect(store.run(one)) for name, one in cases.items()}
+
+
+def scores(detections: Mapping[str, Detection]) -> dict[str, Score]:
+    """Scores every run at the detector's own limit, and all of them but the one that it was chosen on together."""
+    each = {name: score([one], LIMIT_M_PER_S) for name, one in detections.items()}
+    unseen = [one for name, one in detections.items() if name != CHOSEN_ON]
+    return each | ({"all but the first": score(unseen, LIMIT_M_PER_S)} if unseen else {})
+
+
+def curves(detections: Mapping[str, Detection]) -> dict[str, tuple[Array, Array]]:
+    """Returns recall and precision of every run over `LIMITS_M_PER_S`."""
+    return {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}
+
+
+def write_scores(told: Mapping[str, Score], path: Path) -> None:
+    """Writes one row a run as CSV with a header.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    rows = ([name, *(f"{number:.5g}" for number in astuple(one))] for name, one in told.items())
+    write_csv(path, ["run", *(field.name for field in fields(Score))], rows)
+
+
+def detection_table(told: Mapping[str, Score]) -> Table:
+    """Tabulates the scores."""
+    from rich.table import Table
+
+    table = Table("run", title=f"slip told above {100 * LIMIT_M_PER_S:g} cm/s")
+    for heading in ("precision", "recall", "blind", "found", "episodes", "delay (ms)", "false (1/s)", "correlation"):
+        table.add_column(heading, justify="right")
+    for name, one in told.items():
+        table.add_row(
+            name,
+            f"{one.precision:.2f}",
+            f"{one.recall:.2f}",
+            f"{one.base_rate:.2f}",
+            f"{one.found:.2f}",
+            f"{one.episodes}",
+            f"{1e3 * one.delay_s:.0f}",
+            f"{one.false_alarms_per_s:.1f}",
+            f"{one.correlation:.2f}",
+        )
+    return table

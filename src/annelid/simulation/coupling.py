@@ -89,12 +89,26 @@ class Coupling:
             activation = np.asarray(controller.stride(self.sensation, n_steps), dtype=np.float64)
             self.check_activation(activation)
             self.sensation = plant.stride(activation, n_steps)
-        self.step += n_steps
-        self.activation = activation
-        if self.step % self._watch_every < n_steps:
-            self.watch()
+        step = self.step + n_steps
+        self.advanced(self.sensation, activation, step, step % self._watch_every < n_steps)
 
-    def watch(self) -> None:
+    def advanced(self, sensation: Sensation, activation: Array, step: int, watch: bool) -> None:
+        """Takes note of control steps, whoever has taken them.
+
+        Args:
+            sensation: What the body feels after them.
+            activation: What the controller gave at last.
+            step: How many have been taken since time zero.
+            watch: The body has moved, so that its numbers may have run away.
+
+        Raises:
+            SimulationStopped: A value is not finite, or plant or controller is alarmed.
+        """
+        self.sensation, self.activation, self.step = sensation, activation, step
+        if watch:
+            self._watch()
+
+    def _watch(self) -> None:
         """Stops a run whose numbers have run away."""
         total = 0.0
         for name in self._watched:

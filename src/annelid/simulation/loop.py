@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
@@ -31,8 +31,6 @@ from annelid.simulation.recorder import (
 from annelid.simulation.resume import Origin, continued_config, origin_of
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
 
-FLUSH_INTERVAL_S = 0.5
-CHECKPOINT_INTERVAL_S = 1.0
 PROGRESS_INTERVAL_S = 0.2
 
 # Checkpoints of a large state are spaced so that they take no more than this share of the time.
@@ -88,123 +86,202 @@ def simulate(
         raise ConfigError("a run needs a configuration, or a run to continue")
     plant = plant or build_plant(config)
     simulation = start(config, plant, as_controller(controller, config, plant), origin)
-    recorder = recorder_of(config, simulation, origin, out / FILE_NAME)
-    with reporting(progress, simulation.schedule.start * simulation.schedule.timestep_s, config.duration_s) as report:
-        _record(simulation, recorder, report)
+    run = RecordedRun(config, simulation, out / FILE_NAME, origin)
+    with (
+        reporting(progress, simulation.schedule.start * simulation.schedule.timestep_s, config.duration_s) as report,
+        Interruption() as interruption,
+    ):
+        Loop([run]).run(interruption, report)
+    if run.error is not None:
+        raise run.error
     return open_run(out / FILE_NAME)
 
 
-def recorder_of(config: RunConfig, simulation: Coupling, origin: Origin | None, path: Path) -> Recorder:
-    """Lays out the run file of a simulation that is about to begin.
+class RecordedRun:
+    """A worm with its controller and its run file, which says how the run ended, however it ends.
 
-    Args:
-        config: The configuration, which the file carries whole.
-        simulation: Plant and controller at their start.
-        origin: The run that it continues, or None.
-        path: The run file.
-
-    Raises:
-        RunFileError: The file cannot be made.
+    Attributes:
+        coupling: Plant and controller.
+        status: How it ended, one of `annelid.simulation.runfile.STATUSES`.
+        message: Why it ended before its time; empty if it did not.
+        error: What ended it; None if nothing did.
     """
-    plant = simulation.plant
-    of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(simulation.sensation)
-    parts = [of_plant, recordable_of(simulation.controller), loop_signals(plant.n_muscles)]
-    first = simulation.checkpoint()
-    packed = None if first is None else first.to_bytes()
-    plan = layout(simulation.schedule, parts, simulation.sensation.rest_stretch_m, packed)
-    # The configured controller overrides this with its own attribute; without it the file would name that one.
-    attrs: dict[str, Any] = {"controller": getattr(simulation.controller, "name", type(simulation.controller).__name__)}
-    attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
-    recorder = Recorder(path, plan, attrs)
-    if packed is not None:
-        recorder.checkpoint(packed)
-    return recorder
 
+    def __init__(self, config: RunConfig, coupling: Coupling, path: Path, origin: Origin | None = None) -> None:
+        """Lays out the run file of a simulation that is about to begin.
 
-def _record(simulation: Coupling, recorder: Recorder, report: ProgressCallback | None) -> None:
-    """Runs to the end and sees to it that the file says how it ended, however it ends."""
-    with Interruption() as interruption:
-        try:
-            _run(simulation, recorder, report, interruption)
-            interrupted = simulation.step < simulation.schedule.end
-            checkpoint = simulation.checkpoint()
-            if checkpoint is not None:
-                recorder.checkpoint(checkpoint.to_bytes())
-            if interrupted:
-                _finish(simulation, recorder, "interrupted", simulation.at(f"{interruption.requested} ended the run"))
+        Args:
+            config: The configuration, which the file carries whole.
+            coupling: Plant and controller at their start.
+            path: The run file.
+            origin: The run that it continues, or None.
+
+        Raises:
+            RunFileError: The file cannot be made.
+        """
+        self.coupling = coupling
+        self.status = "running_or_killed"
+        self.message = ""
+        self.error: BaseException | None = None
+        plant, controller = coupling.plant, coupling.controller
+        of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(coupling.sensation)
+        parts = [of_plant, recordable_of(controller), loop_signals(plant.n_muscles)]
+        first = coupling.checkpoint()
+        packed = None if first is None else first.to_bytes()
+        plan = layout(coupling.schedule, parts, coupling.sensation.rest_stretch_m, packed)
+        # The configured controller overrides this with its own attribute; without it the file would name that one.
+        attrs: dict[str, Any] = {"controller": getattr(controller, "name", type(controller).__name__)}
+        attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
+        self._recorder = Recorder(path, plan, attrs)
+        if packed is not None:
+            self._recorder.checkpoint(packed)
+        self._read_plant = plant.read if isinstance(plant, Records) else self._read_sensation
+        self._read_controller = controller.read if isinstance(controller, Records) else _nothing
+
+    def record(self, wall_time_s: float) -> None:
+        """Records a sample and a frame, where one is due."""
+        coupling, schedule = self.coupling, self.coupling.schedule
+        if coupling.step % schedule.sample_every == 0:
+            own: Values = {"activation": coupling.activation, "wall_time": wall_time_s}
+            self._recorder.sample(self._read_plant(False), self._read_controller(False), own)
+        if coupling.step % schedule.frame_every == 0:
+            self._recorder.frame(self._read_plant(True), self._read_controller(True))
+
+    def flush(self) -> None:
+        """Writes what was recorded so far."""
+        self._recorder.flush()
+
+    def checkpoint(self) -> None:
+        """Writes the state, so that the run can be continued from here, and what is doubtful so far."""
+        state = self.coupling.checkpoint()
+        if state is not None:
+            self._recorder.checkpoint(state.to_bytes())
+        self._recorder.warn(self.coupling.doubts())
+
+    def finish(self, interrupted_by: str | None) -> None:
+        """Writes all that is left and closes the file: the run is complete, or a signal of that name ended it."""
+        self.checkpoint()
+        if interrupted_by is None:
+            self._end("complete")
+        else:
+            self._end("interrupted", self.coupling.at(f"{interrupted_by} ended the run"))
+
+    def end_with(self, error: BaseException) -> None:
+        """Ends the run because of an error; a file that is closed stays as it is."""
+        self.error = self.error or error
+        if self._recorder.closed:
+            return
+        with suppress(RunFileError):
+            if isinstance(error, SimulationStopped):
+                self._recorder.warn(self.coupling.doubts())
+                self._end("stopped_by_guard", str(error))
+            elif isinstance(error, RunFileError):
+                self._end("disk_failure", str(error), whole=False)
+            elif isinstance(error, KeyboardInterrupt):
+                # A second one asks to leave now; it may also have come in the middle of a write.
+                self._end("interrupted", self.coupling.at("interrupted"), whole=False)
             else:
-                _finish(simulation, recorder, "complete")
-        except SimulationStopped as stop:
-            with suppress(RunFileError):
-                _finish(simulation, recorder, "stopped_by_guard", str(stop))
-            raise
-        except RunFileError as failure:
-            with suppress(RunFileError):
-                recorder.close("disk_failure", str(failure))
-            raise
-        except KeyboardInterrupt:
-            # A second one asks to leave now; it may also have come in the middle of a write.
-            with suppress(RunFileError):
-                recorder.close("interrupted", simulation.at("interrupted"))
-            raise
+                self._end("failed", self.coupling.at(f"{type(error).__name__}: {error}"))
+
+    def _end(self, status: str, message: str = "", whole: bool = True) -> None:
+        self.status, self.message = status, message
+        (self._recorder.finish if whole else self._recorder.close)(status, message)
+
+    def _read_sensation(self, frame: bool) -> Values:
+        return {} if frame else sensation_values(self.coupling.sensation)
+
+
+def _nothing(frame: bool) -> Values:
+    return {}
+
+
+class Loop:
+    """The loop of a run, or of runs that go on together in one thread: they advance, and each is recorded.
+
+    Attributes:
+        runs: All of them.
+        going: Those that have not ended, by their number.
+    """
+
+    flush_interval_s = 0.5
+    checkpoint_interval_s = 1.0
+
+    def __init__(self, runs: Sequence[RecordedRun]) -> None:
+        """Takes runs that are at the same step, of the same schedule."""
+        self.runs = runs
+        self.going = dict(enumerate(runs))
+        self._schedule = runs[0].coupling.schedule
+
+    @property
+    def simulated_s(self) -> float:
+        """How far it has come, s; where all runs have ended it has come to the end."""
+        step = next((run.coupling.step for run in self.going.values()), self._schedule.end)
+        return step * self._schedule.timestep_s
+
+    def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
+        """Runs to the end; a run that fails ends with that error, and the others go on.
+
+        Args:
+            interruption: Asks to end all of them early.
+            report: Called at most 5 times a second.
+        """
+        began = now = perf_counter()
+        due = {"flush": began + self.flush_interval_s, "checkpoint": began + self.checkpoint_interval_s}
+        due["report"] = began
+        try:
+            if self._schedule.start == 0:
+                self.each(lambda run: run.record(0.0))
+            while (step := self._step()) < self._schedule.end and interruption.requested is None:
+                self.advance(step)
+                now = perf_counter()
+                self.record(now - began)
+                if now >= due["flush"]:
+                    self.each(RecordedRun.flush)
+                    due["flush"] = now + self.flush_interval_s
+                if now >= due["checkpoint"]:
+                    self.settle()
+                    self.each(RecordedRun.checkpoint)
+                    cost_s = perf_counter() - now
+                    due["checkpoint"] = now + max(self.checkpoint_interval_s, cost_s / _CHECKPOINT_SHARE)
+                if report is not None and now >= due["report"]:
+                    report(self.simulated_s, now - began)
+                    due["report"] = now + PROGRESS_INTERVAL_S
+            self.settle()
+            by = interruption.requested if self._step() < self._schedule.end else None
+            self.each(lambda run: run.finish(by))
+            if report is not None:
+                report(self.simulated_s, now - began)
         except BaseException as error:
-            with suppress(RunFileError):
-                recorder.finish("failed", simulation.at(f"{type(error).__name__}: {error}"))
+            for run in self.going.values():
+                run.end_with(error)
             raise
 
+    def advance(self, step: int) -> None:
+        """Takes control steps up to the next event, from ``step`` on."""
+        self.each(lambda run: run.coupling.advance())
 
-def _finish(simulation: Coupling, recorder: Recorder, status: str, message: str = "") -> None:
-    recorder.warn(simulation.doubts())
-    recorder.finish(status, message)
+    def settle(self) -> None:
+        """Brings all controllers up to the step that was reached, where something of them is read."""
 
+    def record(self, wall_time_s: float) -> None:
+        """Records every run that is due."""
+        self.each(lambda run: run.record(wall_time_s))
 
-def _run(simulation: Coupling, recorder: Recorder, report: ProgressCallback | None, interruption: Interruption) -> None:
-    schedule = simulation.schedule
-    sample_every, frame_every = schedule.sample_every, schedule.frame_every
-    began = now = perf_counter()
-    next_flush, next_report = began + FLUSH_INTERVAL_S, began
-    next_checkpoint = began + CHECKPOINT_INTERVAL_S
-    read_plant, read_controller = _reader(simulation)
+    def each(self, action: Callable[[RecordedRun], None]) -> None:
+        """Does something with every run that is going on; one that fails ends, and the others go on."""
+        self.each_numbered(lambda _, run: action(run))
 
-    def record() -> None:
-        if simulation.step % sample_every == 0:
-            own: Values = {"activation": simulation.activation, "wall_time": now - began}
-            recorder.sample(read_plant(False), read_controller(False), own)
-        if simulation.step % frame_every == 0:
-            recorder.frame(read_plant(True), read_controller(True))
+    def each_numbered(self, action: Callable[[int, RecordedRun], None]) -> None:
+        """Does as `each` with every run and its number."""
+        for number, run in tuple(self.going.items()):
+            try:
+                action(number, run)
+            except Exception as error:
+                self.drop(number, error)
 
-    if simulation.step == 0:
-        record()
-    while simulation.step < schedule.end and interruption.requested is None:
-        simulation.advance()
-        now = perf_counter()
-        record()
-        if now >= next_flush:
-            recorder.flush()
-            next_flush = now + FLUSH_INTERVAL_S
-        if now >= next_checkpoint:
-            checkpoint = simulation.checkpoint()
-            if checkpoint is not None:
-                recorder.checkpoint(checkpoint.to_bytes())
-            recorder.warn(simulation.doubts())
-            cost = perf_counter() - now
-            next_checkpoint = now + max(CHECKPOINT_INTERVAL_S, cost / _CHECKPOINT_SHARE)
-        if report is not None and now >= next_report:
-            report(simulation.step * schedule.timestep_s, now - began)
-            next_report = now + PROGRESS_INTERVAL_S
-    if report is not None:
-        report(simulation.step * schedule.timestep_s, now - began)
+    def drop(self, number: int, error: Exception) -> None:
+        """Ends one run because of an error."""
+        self.going.pop(number).end_with(error)
 
-
-def _reader(simulation: Coupling) -> tuple[Callable[[bool], Values], Callable[[bool], Values]]:
-    """Returns what reads the plant's and the controller's present values, of frames or of signals."""
-    plant, controller = simulation.plant, simulation.controller
-    nothing: Values = {}
-
-    def read_sensation(frame: bool) -> Values:
-        return nothing if frame else sensation_values(simulation.sensation)
-
-    return (
-        plant.read if isinstance(plant, Records) else read_sensation,
-        controller.read if isinstance(controller, Records) else lambda frame: nothing,
-    )
+    def _step(self) -> int:
+        return next((run.coupling.step for run in self.going.values()), self._schedule.end)

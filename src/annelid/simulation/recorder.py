@@ -313,6 +313,11 @@ class Recorder:
         self._writer = RawWriter(path, extents)
         self._began_cpu_s = process_time()
 
+    @property
+    def closed(self) -> bool:
+        """Whether the file is closed."""
+        return self._writer.closed
+
     def sample(self, *sources: Values) -> None:
         """Takes one sample of the signals from mappings that together name all of them."""
         self._put(self._samples, sources)

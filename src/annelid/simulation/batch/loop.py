@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,16 +18,14 @@ from annelid.simulation.anatomy import Anatomy, Movement
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BodyBatch, compile_worms
 from annelid.simulation.batch.controllers import ControllerBatch
-from annelid.simulation.batch.member import Member
 from annelid.simulation.batch.structure import checked_configs
 from annelid.simulation.coupling import start
 from annelid.simulation.interruption import Interruption
 from annelid.simulation.lock import locks
+from annelid.simulation.loop import Loop, RecordedRun
 from annelid.simulation.progress import ProgressCallback, reporting
-from annelid.simulation.runfile import Run, open_run, refuse_used_folder
+from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
 
-FLUSH_INTERVAL_S = 2.0
-CHECKPOINT_INTERVAL_S = 10.0
 PROGRESS_INTERVAL_S = 0.2
 
 
@@ -103,32 +101,31 @@ def simulate_batch(
     for folder in folders:
         refuse_used_folder(folder, overwrite)
     anatomies = compile_worms(own)
-    members: list[Member] = []
-    teams: list[_Team] = []
+    runs: list[RecordedRun] = []
+    teams: list[Team] = []
     try:
         for numbers in np.array_split(np.arange(len(own)), threads_for(len(own), threads)):
             share = slice(int(numbers[0]), int(numbers[-1]) + 1)
-            team = _Team(own[share], anatomies[share], folders[share], members)
-            teams.append(team)
+            teams.append(Team(own[share], anatomies[share], folders[share], runs))
     except BaseException as error:
-        for member in members:
-            member.end_with(error)
+        for run in runs:
+            run.end_with(error)
         raise
     with reporting(progress, 0.0, own[0].duration_s) as report:
         wall_time_s = _run_all(teams, report)
     return BatchResult(
         tuple(folders),
-        tuple(member.status for member in members),
-        tuple(member.message for member in members),
+        tuple(run.status for run in runs),
+        tuple(run.message for run in runs),
         wall_time_s,
     )
 
 
-def _run_all(teams: Sequence[_Team], report: ProgressCallback | None) -> float:
+def _run_all(teams: Sequence[Team], report: ProgressCallback | None) -> float:
     """Runs every team in a thread of its own to the end; returns the wall-clock time, s."""
     began = perf_counter()
     with Interruption() as interruption, ThreadPoolExecutor(len(teams)) as pool:
-        running = {pool.submit(team.run, began, interruption) for team in teams}
+        running = {pool.submit(team.run, interruption) for team in teams}
         try:
             left = running
             while left:
@@ -155,120 +152,75 @@ def threads_for(n_worms: int, threads: int | None) -> int:
     return min(n_worms, threads or os.cpu_count() or 1)
 
 
-class _Team:
+class Team(Loop):
     """Worms that one thread steps, from the start of the run to its end.
 
     The engine steps without Python's lock, so that the networks and files of one team are served while the bodies of
     another move.
     """
 
+    flush_interval_s = 2.0
+    checkpoint_interval_s = 10.0
+
     def __init__(
         self,
         configs: Sequence[RunConfig],
         anatomies: Sequence[Anatomy],
         folders: Sequence[Path],
-        all_members: list[Member],
+        all_runs: list[RecordedRun],
     ) -> None:
-        """Lays out the worms' run files and adds each worm to ``all_members`` once its file is there.
+        """Lays out the worms' run files and adds each run to ``all_runs`` once its file is there.
 
         Raises:
             ConfigError: Worms that do not fit into one batch.
             RunFileError: A run file cannot be made.
         """
         self._bodies = BodyBatch(configs, anatomies)
+        self._worms = self._bodies.worms
         couplings = [
             start(config, worm, build_controller(config, worm), None)
-            for config, worm in zip(configs, self._bodies.worms, strict=True)
+            for config, worm in zip(configs, self._worms, strict=True)
         ]
         self._controllers = ControllerBatch(configs, couplings)
-        self._members: list[Member] = []
-        for config, coupling, worm, folder in zip(configs, couplings, self._bodies.worms, folders, strict=True):
-            member = Member(len(self._members), config, coupling, worm, folder)
-            self._members.append(member)
-            all_members.append(member)
-        self._rows = list(range(len(self._members)))
-        self._schedule = couplings[0].schedule
-        self._step = 0
-        self._began = 0.0
-        self._next: dict[str, float] = {}
+        first = len(all_runs)
+        for config, coupling, folder in zip(configs, couplings, folders, strict=True):
+            all_runs.append(RecordedRun(config, coupling, folder / FILE_NAME))
+        super().__init__(all_runs[first:])
 
-    @property
-    def simulated_s(self) -> float:
-        """How far the team has come, s; a team whose worms have all ended has come to the end."""
-        return (self._step if self._rows else self._schedule.end) * self._schedule.timestep_s
-
-    def run(self, began: float, interruption: Interruption) -> None:
-        """Runs to the end and sees to it that every file says how its worm ended."""
-        self._began = began
-        self._next = dict.fromkeys(("flush", "checkpoint"), began)
-        try:
-            self._each(lambda member: member.record(0.0))
-            while self._rows and self._step < self._schedule.end and interruption.requested is None:
-                self._advance(self._steps_to_event())
-                self._write_what_is_due()
-            self._controllers.settle()
-            early = self._step < self._schedule.end
-            self._each(lambda member: member.finish(interruption.requested if early else None))
-        except BaseException as error:
-            for row in self._rows:
-                self._members[row].end_with(error)
-            raise
-
-    def _steps_to_event(self) -> int:
-        """Control steps up to the next one after which a body moves, something is recorded, or the run ends."""
-        return min(self._members[self._rows[0]].worm.steps_to_move(), self._schedule.steps_to_record(self._step))
-
-    def _advance(self, n_steps: int) -> None:
-        """Takes control steps, at whose end the bodies may move, and records what is due then."""
+    def advance(self, step: int) -> None:
+        """Takes control steps up to the next one after which a body moves or something is recorded."""
+        one, schedule = next(iter(self.going)), self._schedule
+        n_steps = min(self._worms[one].steps_to_move(), schedule.steps_to_record(step))
         activation, errors = self._controllers.advance(n_steps)
-        self._drop(errors)
-        self._each(lambda member: member.coupling.check_activation(activation[member.row]))
+        for number, error in errors.items():
+            self.drop(number, error)
+        self.each_numbered(lambda number, run: run.coupling.check_activation(activation[number]))
         moved = self._move(n_steps, activation)
-        self._step += n_steps
-        schedule = self._schedule
-        due = self._step % schedule.sample_every == 0 or self._step % schedule.frame_every == 0
-        if moved or due:
-            self._controllers.settle()
-        wall_time_s = perf_counter() - self._began
-        self._each(lambda member: member.advance(n_steps, self._step, activation[member.row], moved.get(member.row)))
-        if due:
-            self._each(lambda member: member.record(wall_time_s))
+        step += n_steps
+        if moved or step % schedule.sample_every == 0 or step % schedule.frame_every == 0:
+            self.settle()
+        self.each_numbered(
+            lambda number, run: run.coupling.advanced(
+                self._worms[number].strode(n_steps, moved.get(number)), activation[number], step, number in moved
+            )
+        )
+
+    def settle(self) -> None:
+        """Brings every worm's own controller up to the state that the batch has reached."""
+        self._controllers.settle()
+
+    def drop(self, number: int, error: Exception) -> None:
+        """Ends one run because of an error, and leaves its controller out."""
+        super().drop(number, error)
+        self._controllers.drop(number)
 
     def _move(self, n_steps: int, activation: Mapping[int, Array]) -> dict[int, Movement]:
         """Moves the bodies if they are due to move; returns what each of those that could be moved has come to."""
-        if not self._rows:
-            return {}
-        due = self._members[self._rows[0]].worm.moves_due(n_steps)
+        due = self._worms[next(iter(self.going))].moves_due(n_steps) if self.going else 0
         if not due:
             return {}
-        stacked = np.stack([activation[row] for row in self._rows])
-        reasons = self._bodies.move(self._rows, stacked, due)
-        self._drop({row: SimulationStopped(reason) for row, reason in reasons.items()})
-        return dict(zip(self._rows, self._bodies.moved(self._rows), strict=True))
-
-    def _write_what_is_due(self) -> None:
-        """Hands samples to the files and writes checkpoints, each at its interval."""
-        now = perf_counter()
-        if now >= self._next["flush"]:
-            self._each(lambda member: member.flush())
-            self._next["flush"] = now + FLUSH_INTERVAL_S
-        if now >= self._next["checkpoint"]:
-            self._controllers.settle()
-            self._each(lambda member: member.checkpoint())
-            self._next["checkpoint"] = perf_counter() + CHECKPOINT_INTERVAL_S
-
-    def _each(self, action: Callable[[Member], None]) -> None:
-        """Does something with every worm that is still running; one that fails ends, and the others go on."""
-        errors: dict[int, Exception] = {}
-        for row in self._rows:
-            try:
-                action(self._members[row])
-            except Exception as error:
-                errors[row] = error
-        self._drop(errors)
-
-    def _drop(self, errors: Mapping[int, Exception]) -> None:
-        for row, error in errors.items():
-            self._members[row].end_with(error)
-            self._controllers.drop(row)
-            self._rows.remove(row)
+        rows = list(self.going)
+        for row, reason in self._bodies.move(rows, np.stack([activation[row] for row in rows]), due).items():
+            self.drop(row, SimulationStopped(reason))
+        rows = list(self.going)
+        return dict(zip(rows, self._bodies.moved(rows), strict=True))

@@ -176,6 +176,7 @@ def test_the_worms_rhythm_is_stable(n_segments):
     assert np.abs(cycle.multipliers[1:]).max() <= 0.01
 
 
+@pytest.mark.slow
 def test_time_in_steps_loses_the_shift_along_the_cycle():
     continuous, located, stepped = (cycle_of(3, time) for time in ("continuous", "located", "stepped"))
     assert stepped.period_s == pytest.approx(located.period_s, abs=1e-3)

@@ -291,7 +291,7 @@ def _data(content: h5py.File) -> xarray.Dataset:
         coordinates |= set(str(attrs.pop("coordinates", "")).split())
         rows = tuple(written.get(dim, slice(None)) for dim in dims)
         values = part[rows] if part.dtype.kind in "fiu" else np.array(part.asstr()[rows], dtype=str)
-        variables[name] = xarray.Variable(dims, values, attrs)
+        variables[name] = xarray.Variable(dims, values, attrs, fastpath=True)
     data = xarray.Dataset({name: variables[name] for name in content if name in variables}, attrs=_attributes(content))
     return data.set_coords(coordinates & variables.keys())
 

@@ -107,7 +107,12 @@ def test_longer_worms_walk_two_ordered_cycles(tmp_path: Path, preset: str, n_seg
 
 
 def test_a_longer_rod_worm_walks_in_order(tmp_path: Path) -> None:
-    """A cheap representative of the slow runs above: four segments, one cycle, coarse steps."""
-    changes = {"body.mesh.n_segments": 4, "clock.physics_timestep_s": 0.01, "record.signals_interval_s": 0.01}
+    """A cheap representative of the slow runs above: four segments, one cycle, coarse steps and strands."""
+    changes = {
+        "body.mesh.n_segments": 4,
+        "body.mesh.elements_per_side": 1,
+        "clock.physics_timestep_s": 0.01,
+        "record.signals_interval_s": 0.01,
+    }
     _, result = crawl("riddle2023-rods", tmp_path, **changes, duration_s=4.4)
     assert result.order[:6] == [1, 2, 3, 4, 1, 2]

@@ -158,7 +158,10 @@ def cycle_of(n_segments: int, time) -> LimitCycle:
     return limit_cycle(worm(n_segments), time=time, n_phases=40)
 
 
-@pytest.mark.parametrize(("n_segments", "n_states", "published_ms"), [(3, 21, 2625.0), (6, 42, 5250.0)])
+@pytest.mark.parametrize(
+    ("n_segments", "n_states", "published_ms"),
+    [(3, 21, 2625.0), pytest.param(6, 42, 5250.0, marks=pytest.mark.slow)],
+)
 def test_the_worms_period_is_the_published_one(n_segments, n_states, published_ms):
     cycle = cycle_of(n_segments, "located")
     assert len(cycle.labels) == n_states
@@ -173,6 +176,7 @@ def test_the_worms_rhythm_is_stable(n_segments):
     assert np.abs(cycle.multipliers[1:]).max() <= 0.01
 
 
+@pytest.mark.slow
 def test_time_in_steps_loses_the_shift_along_the_cycle():
     continuous, located, stepped = (cycle_of(3, time) for time in ("continuous", "located", "stepped"))
     assert stepped.period_s == pytest.approx(located.period_s, abs=1e-3)
@@ -190,6 +194,7 @@ def test_the_segments_follow_each_other_by_a_third_of_the_cycle():
     assert second.state[0, segment[1]] == first.state[0, segment[0]] == 10.0
 
 
+@pytest.mark.slow
 def test_kicks_of_the_worm_measure_what_the_adjoint_says():
     config = worm()
     flow, _, _ = flow_of(config)

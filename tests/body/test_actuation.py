@@ -120,7 +120,15 @@ def test_against_a_stiff_ring_a_servo_stalls_at_its_force_limit(timestep_s: floa
         assert felt.muscle_force_N == pytest.approx(LIMIT_N - rate * step * timestep_s, abs=0.06 * LIMIT_N)
 
 
-@pytest.mark.parametrize("formulation", [{}, {"body.formulation.kind": "chain", "clock.physics_timestep_s": 0.001}])
+@pytest.mark.parametrize(
+    "formulation",
+    [
+        {},
+        pytest.param(
+            {"body.formulation.kind": "chain", "clock.physics_timestep_s": 0.001}, marks=pytest.mark.slow, id="chain"
+        ),
+    ],
+)
 def test_a_servo_never_pushes_nor_pulls_above_its_limit(formulation: dict[str, Any]) -> None:
     """Cables far too short, suddenly told to shorten or to let go."""
     plant = worm(**formulation, **{"body.rings.length_range_m": [0.6, 0.9], "body.rings.speed_limit_m_per_s": 5.0})

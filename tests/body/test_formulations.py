@@ -137,6 +137,7 @@ def test_rods_and_tight_chain_agree_on_a_ring_contracted_by_a_third() -> None:
     assert middle < 0.7 * 0.96
 
 
+@pytest.mark.slow
 def test_rods_and_tight_chain_agree_on_the_sag_under_their_weight() -> None:
     assert_rings_and_springs_agree(0.0, 3.0)
 

@@ -17,6 +17,7 @@ RODS = "riddle2023-rods"
 TINY = ("--duration", "0.1", "--no-video", "--jobs", "1")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command) -> None:
     command = ("run", RODS, "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")
     done = annelid(*command)
@@ -97,6 +98,7 @@ def test_wrong_usage_says_what_is_missing(annelid: Command, arguments: tuple[str
     assert says in done.err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_force_replaces_a_run(annelid: Command) -> None:
     command = ("run", "riddle2022-planar", "--duration", "0.1", "--no-video", "-q", "-o", "here")
     assert annelid(*command).exit_code == 0

@@ -300,7 +300,9 @@ def rods(kind: str, duration_s: float) -> RunConfig:
     return load_config("riddle2023-rods", {"controller": {"kind": kind}, **coarse})
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind not in ("sine", "shc"))) for kind in KINDS]
+)
 def test_a_worm_of_rods_is_driven_and_continues_bit_for_bit(kind: str, tmp_path: Path) -> None:
     whole = simulate(rods(kind, 0.4), tmp_path / "3", progress=False)
     first = simulate(rods(kind, 0.2), tmp_path / "1", progress=False)

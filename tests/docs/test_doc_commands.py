@@ -94,6 +94,9 @@ ELSEWHERE = {
 }
 """Commands that are not executed here, and why."""
 
+FAST = ("README.md", "docs/start.md", "docs/how_to/continue_a_run.md", "docs/how_to/read_a_run.md")
+"""Pages whose commands the fast tests execute; those of the others are understood there, and executed by the slow."""
+
 SCRIPTS_ELSEWHERE = {
     "docs/tutorials/": "tests/docs/test_site.py runs the tutorials",
     "docs/upstream/": "whole reproductions of what the engine does, half a minute each",
@@ -215,7 +218,9 @@ def test_every_command_is_executed_somewhere() -> None:
             assert any(rule is not None for rule in known), f"{page}: no rule for {command}"
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(
+    "page", [pytest.param(page, marks=[pytest.mark.slow] * (not page.startswith(FAST))) for page in PAGES]
+)
 def test_what_takes_seconds_is_executed(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(ROOT / "examples")

@@ -81,6 +81,7 @@ def test_without_capacitance_the_period_is_that_of_slow_motion() -> None:
 
 @settings(max_examples=8, deadline=None)
 @given(drive=st.floats(0.0, 0.95), scale=st.floats(0.2, 5.0))
+@pytest.mark.slow
 def test_slow_motion_scales_with_the_gate_and_quickens_with_the_drive(drive: float, scale: float) -> None:
     here = half_period_ms(drive)
     slower = replace(PAPER, gate_time_constant_ms=300.0 * scale)

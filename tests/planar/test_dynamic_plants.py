@@ -169,9 +169,9 @@ def test_contraction_spreads_to_the_neighbours_of_bending_sides_over_a_range() -
     [
         {},
         {"wall_friction": 0.2},
-        {"torsion_stiffness_Nm_per_rad": 0.0},
-        {"pipe_diameter_m": 0.104},
-        {"joint_mass_kg": 0.02, "vertex_mass_kg": 0.02},
+        pytest.param({"torsion_stiffness_Nm_per_rad": 0.0}, marks=pytest.mark.slow),
+        pytest.param({"pipe_diameter_m": 0.104}, marks=pytest.mark.slow),
+        pytest.param({"joint_mass_kg": 0.02, "vertex_mass_kg": 0.02}, marks=pytest.mark.slow),
         pytest.param({"wall_friction": 1.0}, marks=pytest.mark.slow),
         pytest.param({"torsion_stiffness_Nm_per_rad": 0.1}, marks=pytest.mark.slow),
         pytest.param({"wall_stiffness_N_per_m": 5000.0}, marks=pytest.mark.slow),

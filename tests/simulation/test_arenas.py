@@ -151,7 +151,7 @@ def test_setae_rectify_a_breath_without_a_wave() -> None:
     assert abs(alike) < 0.2 * forwards
 
 
-@pytest.mark.parametrize("arena", ["pipe.s", "setae"])
+@pytest.mark.parametrize("arena", [pytest.param("pipe.s", marks=pytest.mark.slow), "setae"])
 def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     configs = [config(arena), config(arena, arena__friction=0.6), config(arena)]
     bodies = BodyBatch(configs, compile_worms(configs))
@@ -183,7 +183,7 @@ def test_worms_in_pipes_of_different_shapes_make_one_batch() -> None:
         assert worm.step(np.zeros(3)).center_of_mass_m[2] == pytest.approx(0.16, abs=0.02)
 
 
-@pytest.mark.parametrize("arena", ["pipe.taper", "setae"])
+@pytest.mark.parametrize("arena", ["pipe.taper", pytest.param("setae", marks=pytest.mark.slow)])
 def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path, arena: str) -> None:
     whole = simulate(config(arena, duration_s=0.2), tmp_path / "whole", progress=False)
     simulate(config(arena, duration_s=0.1), tmp_path / "first", progress=False)

@@ -59,7 +59,7 @@ def test_a_falling_worm_turns_potential_into_kinetic_energy() -> None:
     assert np.abs(read["muscle_work"]).max() + abs(float(read["damping_loss"])) < 1e-9
 
 
-@pytest.mark.parametrize("damping", [0.0, 0.002])
+@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 0.002])
 def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float) -> None:
     """Weightless, set moving lengthwise: what is missing shrinks with the step."""
     missing, swapped, lost = [], [], []

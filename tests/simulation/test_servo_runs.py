@@ -23,6 +23,7 @@ def test_a_continued_run_is_the_whole_run_bit_for_bit(tmp_path: Path) -> None:
     assert_equal(rest, whole, n_first)
 
 
+@pytest.mark.slow
 def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
     own: tuple[dict[str, Any], ...] = (
         {},

@@ -194,6 +194,7 @@ def die_at_seed_5(task: Task) -> Files | None:
     return attempt(task)
 
 
+@pytest.mark.slow
 def test_killed_workers_lose_and_double_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("annelid.experiment.workers.attempt", die_at_seed_5)
     cases = [*(planar(seed) for seed in range(12)), IMPOSSIBLE]

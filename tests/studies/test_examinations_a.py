@@ -79,7 +79,10 @@ def results(examination, effort, make) -> Results:
     return Results({case_key(case): make(case) for case in examination.cases(effort)}, case_key)
 
 
-@pytest.mark.parametrize(("effort", "rhythm"), [("quick", SILENT), ("full", WAVE)], ids=["quick", "full"])
+@pytest.mark.parametrize(
+    ("effort", "rhythm"),
+    [pytest.param("quick", SILENT, id="quick", marks=pytest.mark.slow), pytest.param("full", WAVE, id="full")],
+)
 @pytest.mark.parametrize("examination", ALL, ids=lambda examination: examination.name)
 def test_every_examination_is_whole_at_either_effort(examination, effort, rhythm, short, tmp_path):
     made = results(examination, effort, lambda case: synthetic(short, case, 0.4, rhythm))

@@ -103,6 +103,7 @@ def test_without_weight_the_neighbours_stiffness_alone_holds_the_middle_back(ben
     assert rough.elongation_m == pytest.approx(bench(2, force_limited(FORCE_N), **four).elongation_m, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_weight_on_a_rough_ground_weakens_the_middle_further(bench: Bench) -> None:
     usual = force_limited(FORCE_N)
     base, slippery = bench.deficit(usual), bench.deficit(usual, **{"arena.friction": 0.05})

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, RunFileError, listed
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
-from annelid.simulation.container import NO_VARIABLE
 from annelid.simulation.digest import Finding, examine
 from annelid.simulation.lock import LOCK_NAME
 
@@ -53,6 +51,8 @@ _OF_NETCDF = {
     "_Netcdf4Dimid",
     "_Netcdf4Coordinates",
 }
+_NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
+"""Begins the name of a dimension without labels."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -278,9 +278,9 @@ def _data(content: h5py.File) -> xarray.Dataset:
     coordinates: set[str] = set()
     for name in content.keys() - {*_BOOKKEEPING, WARNINGS, CPU_TIME}:
         part = content[name]
-        if not isinstance(part, h5py.Dataset) or part.attrs.get("NAME", b"").startswith(NO_VARIABLE.encode()):  # type: ignore[union-attr]
+        if isinstance(part, h5py.Group) or part.attrs.get("NAME", b"").startswith(_NO_VARIABLE):
             continue
-        dims = (name,) if part.is_scale else tuple(str(dim[0].name).removeprefix("/") for dim in part.dims)
+        dims = (name,) if part.is_scale else tuple(dim[0].name.removeprefix("/") for dim in part.dims)
         # Labels of a dimension may be words.
         labels = dims == (name,)
         if part.dtype.kind not in "fiu" and not labels:
@@ -298,7 +298,7 @@ def _data(content: h5py.File) -> xarray.Dataset:
 
 def _attributes(part: h5py.HLObject) -> dict[str, Any]:
     """Attributes apart from those by which netCDF keeps its books; netCDF wraps a number in a list of one."""
-    found: dict[str, Any] = {name: part.attrs[name] for name in part.attrs if name not in _OF_NETCDF}
+    found = {name: part.attrs[name] for name in part.attrs if name not in _OF_NETCDF}
     return {name: value[0] if getattr(value, "shape", ()) == (1,) else value for name, value in found.items()}
 
 

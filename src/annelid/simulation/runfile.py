@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
@@ -278,9 +279,9 @@ def _data(content: h5py.File) -> xarray.Dataset:
     coordinates: set[str] = set()
     for name in content.keys() - {*_BOOKKEEPING, WARNINGS, CPU_TIME}:
         part = content[name]
-        if isinstance(part, h5py.Group) or part.attrs.get("NAME", b"").startswith(_NO_VARIABLE):
+        if not isinstance(part, h5py.Dataset) or part.attrs.get("NAME", b"").startswith(_NO_VARIABLE):  # type: ignore[union-attr]
             continue
-        dims = (name,) if part.is_scale else tuple(dim[0].name.removeprefix("/") for dim in part.dims)
+        dims = (name,) if part.is_scale else tuple(str(dim[0].name).removeprefix("/") for dim in part.dims)
         # Labels of a dimension may be words.
         labels = dims == (name,)
         if part.dtype.kind not in "fiu" and not labels:
@@ -298,7 +299,7 @@ def _data(content: h5py.File) -> xarray.Dataset:
 
 def _attributes(part: h5py.HLObject) -> dict[str, Any]:
     """Attributes apart from those by which netCDF keeps its books; netCDF wraps a number in a list of one."""
-    found = {name: part.attrs[name] for name in part.attrs if name not in _OF_NETCDF}
+    found: dict[str, Any] = {name: part.attrs[name] for name in part.attrs if name not in _OF_NETCDF}
     return {name: value[0] if getattr(value, "shape", ()) == (1,) else value for name, value in found.items()}
 
 

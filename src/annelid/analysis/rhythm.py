@@ -94,12 +94,6 @@ def startup_end(time_s: ArrayLike) -> float:
     return float(times[min(1, times.size - 1)]) if times.size else 0.0
 
 
-def segment_onsets(time_s: Array, found: Sequence[Array]) -> list[Array]:
-    """Returns each segment's onsets, s, from its `contractions`; in a continued run none at the first sample."""
-    continued = is_continued(time_s)
-    return [of_one[of_one[:, 0] > time_s[0], 0] if continued else of_one[:, 0] for of_one in found]
-
-
 def in_order(onsets_s: Sequence[Array]) -> list[tuple[float, int]]:
     """Returns the onsets of all segments with the segment (from 1), by time; simultaneous ones by segment."""
     return sorted((float(onset), i + 1) for i, of_one in enumerate(onsets_s) for onset in of_one)
@@ -123,7 +117,8 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     """
     times = np.asarray(time_s, dtype=float)
     signals = np.asarray(activation, dtype=float).T
-    onsets = segment_onsets(times, [contractions(times, signal) for signal in signals])
+    continued = is_continued(times)
+    onsets = [contractions(times, one)[int(continued and one[0] >= CONTRACTED) :, 0] for one in signals]
     events = in_order(onsets)
     order = tuple(segment for _, segment in events)
     periods = segment_intervals(onsets, startup_end(times))
@@ -132,7 +127,7 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
         onsets_s=tuple(onset for onset, _ in events),
         period_s=float(periods.mean()) if periods.size else None,
         period_std_s=float(periods.std()) if periods.size > 1 else None,
-        wave=is_wave(order, len(signals), any_start=is_continued(times)),
+        wave=is_wave(order, len(signals), any_start=continued),
         full_cycles=full_cycles(order, len(signals)),
     )
 

@@ -14,9 +14,9 @@ from annelid.analysis.rhythm import (
     CONTRACTED,
     contractions,
     in_order,
+    is_continued,
     segment_activation,
     segment_intervals,
-    segment_onsets,
     startup_end,
 )
 from annelid.config import SnsController
@@ -188,7 +188,7 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     if n < 3:
         raise ValueError(f"a rhythm needs at least 3 segments, not {n}")
     found = [contractions(times, of_segment, shortest_s=SHORTEST_S) for of_segment in values.T]
-    onsets = segment_onsets(times, found)
+    onsets = [c[c[:, 0] > times[0], 0] if is_continued(times) else c[:, 0] for c in found]
     events = in_order(onsets)
     started = startup_end(times)
     judged = [of_segment[of_segment > started] for of_segment in onsets]

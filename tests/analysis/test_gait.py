@@ -17,7 +17,7 @@ from synthetic import wave_data
 
 import annelid
 from annelid.analysis import Gait, gait
-from annelid.analysis.circle import fitted_circle
+from annelid.analysis.track import fitted_circle
 from annelid.config import check_config
 from annelid.draw.gait_table import gait_rows
 from annelid.simulation.runfile import Run

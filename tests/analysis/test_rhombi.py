@@ -14,7 +14,6 @@ from annelid.analysis.rhombi import (
     plane_means,
     rhombus_diagonals,
     rhombus_plane,
-    run_deformation,
 )
 from annelid.config import load_config
 from annelid.errors import RunFileError
@@ -111,20 +110,18 @@ def recorded() -> tuple[Run, MeshGeometry]:
 
 def test_a_run_is_measured_over_time_and_at_a_time(recorded: tuple[Run, MeshGeometry]) -> None:
     run, mesh = recorded
-    over_time = run_deformation(run, mesh)
+    over_time = deformation(run.data["crossing_position"].values, mesh)
     assert over_time.axial.shape == (3, len(mesh.rhombi))
     np.testing.assert_allclose(plane_means(over_time.axial, mesh)[:, 0], [0.0, 1.0, 2.0], atol=1e-12)
     assert nearest_frame(run, 0.14) == 1
-    np.testing.assert_allclose(run_deformation(run, mesh, 0.14).axial, 1.0)
 
 
 def test_times_and_runs_without_postures_are_refused(recorded: tuple[Run, MeshGeometry]) -> None:
-    run, mesh = recorded
+    run, _ = recorded
     with pytest.raises(RunFileError, match=r"no posture at 1\.5 s: it was recorded from 0 to 0\.2 s"):
-        run_deformation(run, mesh, 1.5)
+        nearest_frame(run, 1.5)
     empty = Run(run.path, run.data.isel(frame=slice(0)), run.config, run.status, "")
     planar = Run(run.path, run.data.drop_vars("crossing_position"), run.config, run.status, "")
     for poor in (empty, planar):
-        for time_s in (None, 0.1):
-            with pytest.raises(RunFileError, match="no recorded postures"):
-                run_deformation(poor, mesh, time_s)
+        with pytest.raises(RunFileError, match="no recorded postures"):
+            nearest_frame(poor, 0.1)

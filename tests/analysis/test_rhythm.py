@@ -6,20 +6,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic import wave_activation
 
-from annelid.analysis.rhythm import full_cycles, is_wave, onset_times, rhythm, segment_activation
+from annelid.analysis.rhythm import contractions, full_cycles, is_wave, rhythm, segment_activation
 
 
 def test_onset_is_interpolated_between_samples() -> None:
     # From 0.2 to 0.8 within a second: half way at 1.5 s.
-    assert onset_times([0.0, 1.0, 2.0, 3.0], [0.0, 0.2, 0.8, 0.1]) == pytest.approx([1.5])
+    assert contractions([0.0, 1.0, 2.0, 3.0], [0.0, 0.2, 0.8, 0.1])[:, 0] == pytest.approx([1.5])
 
 
 def test_contracted_at_the_first_sample_counts_as_an_onset_there() -> None:
-    assert onset_times([0.0, 1.0, 2.0, 3.0], [0.9, 0.1, 0.1, 0.9]) == pytest.approx([0.0, 2.5])
+    assert contractions([0.0, 1.0, 2.0, 3.0], [0.9, 0.1, 0.1, 0.9])[:, 0] == pytest.approx([0.0, 2.5])
 
 
 def test_touching_the_threshold_from_below_is_one_onset_at_that_sample() -> None:
-    assert onset_times([0.0, 1.0, 2.0], [0.0, 0.5, 1.0]) == pytest.approx([1.0])
+    assert contractions([0.0, 1.0, 2.0], [0.0, 0.5, 1.0])[:, 0] == pytest.approx([1.0])
 
 
 @settings(deadline=None)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import annelid
 from annelid.analysis import Gait, Summary
-from annelid.analysis.balance import EnergyBalance
+from annelid.analysis.gait import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
 from annelid.experiment.attempt import attempt

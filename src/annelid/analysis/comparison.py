@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 Number = float | Sequence[float | None] | None
 """One number, one a segment, or None for what a run does not have."""
 
-NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
-UNLIKE = ("name", "summary")
-"""Fields of the configuration that change nothing in a run."""
+_NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
+# Fields of the configuration that change nothing in a run.
+_WORDS = ("name", "summary")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,23 +44,15 @@ class Comparison:
     lacking: Mapping[str, tuple[bool, ...]]
 
     def differences(self, field: str) -> list[Number]:
-        """Returns how much a number of each run differs from the first run's, in shares of its size.
-
-        Returns:
-            A share, one a segment, or None: for the first run, for what either lacks, and where there is nothing to
-            divide by or the numbers of segments differ.
-        """
+        """Returns the `relative_difference` of each run's number to the first run's; None for the first."""
         first, *others = self.numbers[field]
         return [None, *(relative_difference(first, other) for other in others)]
 
     def to_dict(self) -> dict[str, Any]:
         """Returns plain lists, numbers, strings and None, ready for JSON."""
-        runs = zip(self.labels, self.paths, self.statuses, self.orders, strict=True)
+        runs = zip(self.labels, self.paths, self.statuses, map(list, self.orders), strict=True)
         return {
-            "runs": [
-                {"label": label, "path": path, "status": status, "order": list(order)}
-                for label, path, status, order in runs
-            ],
+            "runs": [dict(zip(("label", "path", "status", "order"), run, strict=True)) for run in runs],
             "numbers": {
                 field: {"values": list(values), "differences": self.differences(field)}
                 for field, values in self.numbers.items()
@@ -70,13 +62,15 @@ class Comparison:
 
 
 def compare(runs: Sequence[Run]) -> Comparison:
-    """Lays runs side by side; they may be of any kinds of worm.
-
-    Args:
-        runs: At least one; the first is what the others are compared with.
-    """
+    """Lays runs of any kinds of worm side by side; the first is what the others are compared with."""
     summaries = [summary(run) for run in runs]
-    rows = [_numbers(one.to_dict(), gait(run).to_dict()) for one, run in zip(summaries, runs, strict=True)]
+    rows: list[dict[str, Number]] = []
+    for one, run in zip(summaries, runs, strict=True):
+        walking = gait(run).to_dict()
+        energy = walking.pop("energy") or {}
+        rows.append({field: value for field, value in one.to_dict().items() if field not in _NOT_NUMBERS})
+        rows[-1] |= {f"gait.{field}": value for field, value in walking.items()}
+        rows[-1] |= {f"gait.energy.{part}": share for part, share in energy.items()}
     names = list(dict.fromkeys(field for row in rows for field in row))
     fields, lacking = differing_fields([run.config for run in runs])
     return Comparison(
@@ -103,8 +97,7 @@ def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
 def relative_difference(first: Number, other: Number) -> Number:
     """Returns ``(other - first) / |first|``, segment by segment where there is one number a segment.
 
-    Returns:
-        None where either is None, the first is 0, or their numbers of segments differ.
+    None where either is None, the first is 0, or their numbers of segments differ.
     """
     if first is None or other is None:
         return None
@@ -119,13 +112,13 @@ def relative_difference(first: Number, other: Number) -> Number:
 def differing_fields(
     configs: Sequence[RunConfig],
 ) -> tuple[dict[str, tuple[Any, ...]], dict[str, tuple[bool, ...]]]:
-    """Finds the fields in which configurations differ.
+    """Finds the fields in which configurations differ, by dotted path.
 
     Returns:
-        The values of each such field by its dotted path, None for a configuration without it; and which lack it.
+        The values of each such field, None for a configuration without it; and which lack it.
     """
     own = [fields_of(config) for config in configs]
-    paths = [path for path in dict.fromkeys(path for each in own for path in each) if path not in UNLIKE]
+    paths = [path for path in dict.fromkeys(path for each in own for path in each) if path not in _WORDS]
     fields, lacking = {}, {}
     for path in paths:
         lacks = tuple(path not in each for each in own)
@@ -134,16 +127,6 @@ def differing_fields(
         if any(value != values[0] for value in values) or len(set(lacks)) > 1:
             fields[path], lacking[path] = values, lacks
     return fields, lacking
-
-
-def _numbers(numbers: Mapping[str, Any], walking: Mapping[str, Any]) -> dict[str, Number]:
-    found = {field: value for field, value in numbers.items() if field not in NOT_NUMBERS}
-    for field, value in walking.items():
-        if field == "energy":
-            found |= {f"gait.energy.{part}": share for part, share in (value or {}).items()}
-        else:
-            found[f"gait.{field}"] = value
-    return found
 
 
 def _plain(value: Any) -> Any:

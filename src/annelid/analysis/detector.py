@@ -72,11 +72,7 @@ class Score:
 
 
 def detect(run: Run, detector: SlipDetector | None = None) -> Detection:
-    """Lets a detector read a run sample by sample, and lays the true slip beside it.
-
-    Args:
-        run: A run with touch and slip.
-        detector: By default `SlipDetector` as it is set.
+    """Lets a detector (by default `SlipDetector` as it is) read a run sample by sample, the true slip beside it.
 
     Raises:
         RunFileError: The run has no touch.
@@ -113,39 +109,34 @@ def _windowed(values: Array, load_N: Array, interval_s: float) -> tuple[Array, A
 
 
 def score(detections: list[Detection], limit_m_per_s: float) -> Score:
-    """Scores a detector over some runs together.
-
-    Args:
-        detections: Of one run each.
-        limit_m_per_s: Estimated speed above which it tells slip, m/s.
-    """
-    hits = tells = slips = samples = alarms = episodes = 0
-    seconds, delays = 0.0, list[float]()
-    for one in detections:
-        told = one.told(limit_m_per_s)
-        hits += int((told & one.slips).sum())
-        tells += int(told.sum())
-        slips += int(one.slips.sum())
-        samples += one.slips.size
-        seconds += float(one.time_s[-1] - one.time_s[0])
-        for of_segment, truly in zip(told.T, one.slips.T, strict=True):
+    """Scores a detector, which tells slip above an estimated speed, over the runs of some detections together."""
+    alarms = episodes = 0
+    delays = list[float]()
+    told = [one.told(limit_m_per_s) for one in detections]
+    for one, alarm in zip(detections, told, strict=True):
+        for of_segment, truly in zip(alarm.T, one.slips.T, strict=True):
             alarms += sum(not truly[first:last].any() for first, last in _stretches(of_segment))
             for first, last in _stretches(truly):
                 if one.time_s[last - 1] - one.time_s[first] >= WINDOW_S:
                     episodes += 1
                     within = np.flatnonzero(of_segment[first:last])
                     delays += [float(one.time_s[first + within[0]] - one.time_s[first])] if within.size else []
-    nan = float("nan")
+    hits = sum(int((alarm & one.slips).sum()) for one, alarm in zip(detections, told, strict=True))
+    slips = sum(int(one.slips.sum()) for one in detections)
     return Score(
-        precision=hits / tells if tells else nan,
-        recall=hits / slips if slips else nan,
-        base_rate=slips / samples if samples else nan,
-        false_alarms_per_s=alarms / seconds if seconds else nan,
+        precision=_share(hits, sum(int(alarm.sum()) for alarm in told)),
+        recall=_share(hits, slips),
+        base_rate=_share(slips, sum(one.slips.size for one in detections)),
+        false_alarms_per_s=_share(alarms, sum(float(one.time_s[-1] - one.time_s[0]) for one in detections)),
         episodes=episodes,
-        found=len(delays) / episodes if episodes else nan,
-        delay_s=float(np.median(delays)) if delays else nan,
+        found=_share(len(delays), episodes),
+        delay_s=float(np.median(delays)) if delays else float("nan"),
         correlation=_correlation(detections),
     )
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole else float("nan")
 
 
 def _correlation(detections: list[Detection]) -> float:
@@ -159,16 +150,11 @@ def _correlation(detections: list[Detection]) -> float:
 
 def _stretches(on: Bools) -> list[tuple[int, int]]:
     """Returns from which sample up to which (not with it) a signal is on, without a break."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(np.diff(on, prepend=False, append=False))
     return list(zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def precision_recall(detections: list[Detection], limits_m_per_s: Array) -> tuple[Array, Array]:
-    """Returns recall and precision for every limit, ``(n_limits,)`` each.
-
-    Args:
-        detections: Of one run each.
-        limits_m_per_s: Estimated speeds above which the detector tells slip, m/s.
-    """
+    """Returns recall and precision over some runs together for every limit, ``(n_limits,)`` each."""
     scores = [score(detections, float(limit)) for limit in limits_m_per_s]
     return np.array([one.recall for one in scores]), np.array([one.precision for one in scores])

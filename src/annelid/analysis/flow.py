@@ -1,10 +1,17 @@
-"""A closed loop of plant and controller as an autonomous map of one vector: what its limit cycle is sought with."""
+"""Autonomous flows of one state vector: the closed loop of plant and controller, and steps that end at a switch.
+
+A step of a `Flow` is smooth as long as its switches, such as stretch sensors that are on or off, keep still. When one
+moves within a step, the step is shortened to the instant of the switch, which bisection finds, and a new one begins
+there. So a perturbed copy switches earlier or later by what its perturbation says, and the finite differences carry the
+jump of the vector field at the switch (the saltation matrix; Leine & Nijmeijer 2004, ch. 7). With ``refine=False``
+switches move at whole steps only, as in a plain run, and the derivative misses the saltations.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, cast, runtime_checkable
+from typing import NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +23,8 @@ Switches = NDArray[np.bool_]
 
 MOST_STATES = 400
 """Continuous states beyond which a monodromy by finite differences is refused."""
+# Halvings of a step that locate an event: to 1e-9 of the step.
+_HALVINGS = 30
 
 
 class Flow(Protocol):
@@ -47,16 +56,13 @@ class Flow(Protocol):
         ...
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
-        """Takes shares of steps, up to the move of a switch or to the section.
+        """Returns the states after shares of steps, up to the move of a switch or to the section.
 
         Args:
             state: Where the steps begin, ``(n_copies, n_states)``.
             switches: The switches in force, ``(n_copies, n_switches)``.
             ahead: What `step` returned for these.
             share: In [0, 1], ``(n_copies,)``.
-
-        Returns:
-            The states there; new.
         """
         ...
 
@@ -105,22 +111,25 @@ class Piecewise(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class _Slot:
-    """Where an array of a part's state lies in the vector of all."""
+class _Slot(NamedTuple):
+    """Where an array of the plant's (part 0) or the controller's (1) state lies in the vector of all."""
 
+    part: int
     name: str
     shape: tuple[int, ...]
     where: slice
+
+    @property
+    def size(self) -> int:
+        return self.where.stop - self.where.start
 
 
 class ClosedLoop:
     """Plant and controller as a `Flow`.
 
-    The state is every array of floats in `get_state` of both, plant first; the switches are every array of booleans,
-    so that a sensor's threshold is found without being told. Integers, such as the number of steps taken, are held at
-    their values when this is made: what depends on them, a kick at the first step or a hold at the start, must be
-    over by then.
+    The state is every array of floats in `get_state` of both, plant first; the switches are every array of booleans.
+    Integers, such as the number of steps taken, are held at their values when this is made: what depends on them, a
+    kick at the first step or a hold at the start, must be over by then.
 
     All copies advance in one call where plant and controller are batched (`BatchedPlant`, `BatchedController`).
     Otherwise each copy is restored, stepped and saved by itself: a period then costs one run per copy.
@@ -130,10 +139,6 @@ class ClosedLoop:
         labels: Names of the states: a neuron's name for a potential, else such as ``height[2]``.
         switch_labels: Names of the switches.
         batched: Whether all copies advance in one call.
-
-    Raises:
-        ConfigError: Plant or controller cannot be saved and restored, the plant cannot tell what it feels, there are
-            more than `MOST_STATES` states, or the loop depends on time itself.
     """
 
     def __init__(
@@ -147,6 +152,10 @@ class ClosedLoop:
             control_timestep_s: Duration of a control step, s.
             stride: Control steps a step, more than 1 where the body moves in coarser steps than the controller.
             kinks: Count kinks of the controller's equations among the switches, where it tells them (`Piecewise`).
+
+        Raises:
+            ConfigError: Plant or controller cannot be saved and restored, the plant cannot tell what it feels, or
+                there are more than `MOST_STATES` states.
         """
         for part, what in ((plant, "plant"), (controller, "controller")):
             if not isinstance(part, Stateful):
@@ -157,25 +166,16 @@ class ClosedLoop:
         self.timestep_s = control_timestep_s * stride
         self._stride = stride
         self._parts = (plant, controller)
+        self._piecewise = controller if kinks and isinstance(controller, Piecewise) else None
         states = self._states()
-        self._floats = [list(_slots(state, np.floating, start)) for state, start in _starts(states, np.floating)]
-        self._bools = [list(_slots(state, np.bool_, start)) for state, start in _starts(states, np.bool_)]
+        self._floats, self._bools = _slots(states, "f"), _slots(states, "b")
         self._rest: list[State] = [
             {name: array for name, array in state.items() if array.dtype.kind not in "fb"} for state in states
         ]
-        self.labels = tuple(
-            label
-            for part, slots in zip(self._parts, self._floats, strict=True)
-            for slot in slots
-            for label in _labels(part, slot)
-        )
-        self.switch_labels = tuple(
-            f"{slot.name}[{i}]" for slots in self._bools for slot in slots for i in range(int(np.prod(slot.shape)))
-        )
-        self._n_sensed = len(self.switch_labels)
-        self._piecewise = controller if kinks and isinstance(controller, Piecewise) else None
-        n_pieces = self.present()[1].shape[1] - self._n_sensed
-        self.switch_labels += tuple(f"piece[{i}]" for i in range(n_pieces))
+        self.labels = tuple(label for slot in self._floats for label in _labels(self._parts[slot.part], slot))
+        sensors = tuple(f"{slot.name}[{i}]" for slot in self._bools for i in range(slot.size))
+        n_pieces = self.present()[1].shape[1] - len(sensors)
+        self.switch_labels = sensors + tuple(f"piece[{i}]" for i in range(n_pieces))
         if len(self.labels) > MOST_STATES:
             raise ConfigError(
                 f"{type(plant).__name__} and {type(controller).__name__} have {len(self.labels)} continuous states; "
@@ -189,27 +189,26 @@ class ClosedLoop:
     def present(self) -> tuple[Array, Switches]:
         """Returns states ``(1, n_states)`` and switches ``(1, n_switches)`` of plant and controller."""
         states = self._states()
-        state, switches = _pack(states, self._floats, np.float64), _pack(states, self._bools, np.bool_)
-        return state, self._with_pieces(self._unpack(state, switches), switches)
+        state, switches = _packed(states, self._floats, 1), _packed(states, self._bools, 1).astype(bool)
+        return state, self._with_pieces(self._unpacked(state, switches), switches)
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Advances copies by one step, as `Flow.step` says."""
-        parts = self._unpack(state, switches)
-        after = self._step_batch(parts) if self.batched else self._step_each(parts, len(state))
-        sensed = _unbatch(after, self._bools, len(state)).astype(bool)
-        return _unbatch(after, self._floats, len(state)), self._with_pieces(parts, sensed)
+        parts, n_copies = self._unpacked(state, switches), len(state)
+        after = self._step_batch(parts) if self.batched else self._step_each(parts, n_copies)
+        sensed = _packed(after, self._bools, n_copies).astype(bool)
+        return _packed(after, self._floats, n_copies), self._with_pieces(parts, sensed)
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
         """Takes shares of steps, each the same share of the change of the whole: exact for forward Euler."""
         part = state + share[:, np.newaxis] * (ahead - state)
         return np.where(share[:, np.newaxis] == 1.0, ahead, part)
 
-    def _unpack(self, state: Array, switches: Switches) -> list[State]:
-        parts: list[State] = []
-        for floats, bools in zip(self._floats, self._bools, strict=True):
-            part: State = {slot.name: state[:, slot.where].reshape(-1, *slot.shape) for slot in floats}
-            part |= {slot.name: switches[:, slot.where].reshape(-1, *slot.shape) for slot in bools}
-            parts.append(part)
+    def _unpacked(self, state: Array, switches: Switches) -> list[State]:
+        parts: list[State] = [{}, {}]
+        for slots, values in ((self._floats, state), (self._bools, switches)):
+            for slot in slots:
+                parts[slot.part][slot.name] = values[:, slot.where].reshape(-1, *slot.shape)
         return parts
 
     def _with_pieces(self, parts: list[State], sensed: Switches) -> Switches:
@@ -222,7 +221,7 @@ class ClosedLoop:
 
     def _step_batch(self, parts: list[State]) -> list[State]:
         plant, controller = cast(BatchedPlant, self._parts[0]), cast(BatchedController, self._parts[1])
-        of_plant, of_controller = ({**part, **rest} for part, rest in zip(parts, self._rest, strict=True))
+        of_plant, of_controller = (part | rest for part, rest in zip(parts, self._rest, strict=True))
         for _ in range(self._stride):
             of_controller, activation = controller.step_copies(of_controller, plant.sense_copies(of_plant))
             of_plant = plant.step_copies(of_plant, activation)
@@ -239,6 +238,33 @@ class ClosedLoop:
                 sensation = plant.step(controller.step(sensation))
             ends.append(self._states())
         return [{name: np.stack([end[i][name] for end in ends]) for name in part} for i, part in enumerate(parts)]
+
+
+def _slots(states: list[State], kind: str) -> list[_Slot]:
+    """Lays arrays of a kind of dtype out in one vector."""
+    slots: list[_Slot] = []
+    for part, state in enumerate(states):
+        for name, array in state.items():
+            if array.dtype.kind == kind:
+                start = slots[-1].where.stop if slots else 0
+                slots.append(_Slot(part, name, array.shape, slice(start, start + array.size)))
+    return slots
+
+
+def _packed(states: list[State], slots: list[_Slot], n_copies: int) -> NDArray:
+    flat = [states[slot.part][slot.name].reshape(n_copies, -1) for slot in slots]
+    return np.concatenate([np.empty((n_copies, 0)), *flat], axis=1)
+
+
+def _labels(part: object, slot: _Slot) -> list[str]:
+    """A neuron's own name for its potential, else the array's name with the index, counted from 0."""
+    if isinstance(part, Records):
+        recordable = part.recordable()
+        for signal in recordable.signals:
+            names = recordable.coords.get(signal.dims[0], ()) if len(signal.dims) == 1 else ()
+            if signal.name == slot.name and len(names) == slot.size:
+                return [str(name) for name in names]
+    return [f"{slot.name}[{i}]" for i in range(slot.size)]
 
 
 class Continuous:
@@ -285,41 +311,78 @@ class Continuous:
         return (after - state) * self._ratio, switches
 
 
-def _starts(states: list[State], kind: type[np.generic]) -> Iterator[tuple[State, int]]:
-    start = 0
-    for state in states:
-        yield state, start
-        start += sum(array.size for array in state.values() if np.issubdtype(array.dtype, kind))
+@dataclass(slots=True)
+class Copies:
+    """Copies on their way: state, switches in force, and where a whole step from here leads."""
+
+    state: Array
+    switches: Switches
+    ahead: Array
+
+    @classmethod
+    def at(cls, flow: Flow, state: Array, before: Switches) -> Copies:
+        """Copies about to take a step; ``before`` are their switches as they were."""
+        ahead, switches = flow.step(state, before)
+        return cls(state, switches, ahead)
+
+    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Copies:
+        return Copies(self.state[rows], self.switches[rows], self.ahead[rows])
+
+    def __setitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_], those: Copies) -> None:
+        self.state[rows], self.switches[rows], self.ahead[rows] = those.state, those.switches, those.ahead
+
+    def part(self, flow: Flow, share: Array) -> Array:
+        """States after a share of the step."""
+        return flow.part(self.state, self.switches, self.ahead, share)
 
 
-def _slots(state: Mapping[str, NDArray[np.generic]], kind: type[np.generic], start: int) -> Iterator[_Slot]:
-    for name, array in state.items():
-        if np.issubdtype(array.dtype, kind):
-            yield _Slot(name, array.shape, slice(start, start + array.size))
-            start += array.size
+def advance(flow: Flow, here: Copies, share: Array, refine: bool) -> tuple[Copies, Array]:
+    """Takes a share of one step, or less, up to the first move of a switch; returns the share taken."""
+    there = Copies.at(flow, here.part(flow, share), here.switches)
+    moved = np.flatnonzero((there.switches != here.switches).any(axis=1) & (share > 0.0))
+    if not (refine and moved.size):
+        return there, share
+    base = here[moved]
+
+    def past(state: Array) -> NDArray[np.bool_]:
+        return (flow.step(state, base.switches)[1] != base.switches).any(axis=1)
+
+    share = share.copy()
+    share[moved] = first_share(flow, base, share[moved], past)
+    there[moved] = Copies.at(flow, base.part(flow, share[moved]), base.switches)
+    return there, share
 
 
-def _pack(states: list[State], slots: list[list[_Slot]], kind: type[np.generic]) -> NDArray:
-    flat = [state[slot.name].ravel() for state, own in zip(states, slots, strict=True) for slot in own]
-    return np.concatenate([np.empty(0), *flat])[np.newaxis].astype(kind)
+def first_share(flow: Flow, here: Copies, share: Array, past: Callable[[Array], NDArray[np.bool_]]) -> Array:
+    """Bisects for the share of the step at which an event has just passed; it has by the share given."""
+    low, high = np.zeros(len(share)), share
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        over = past(here.part(flow, middle))
+        low, high = np.where(over, low, middle), np.where(over, middle, high)
+    return high
 
 
-def _unbatch(states: list[State], slots: list[list[_Slot]], n_copies: int) -> NDArray:
-    flat = [state[slot.name].reshape(n_copies, -1) for state, own in zip(states, slots, strict=True) for slot in own]
-    return np.concatenate([np.empty((n_copies, 0)), *flat], axis=1)
+def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, refine: bool = True) -> Copies:
+    """Lets copies run, each for a duration of its own, and returns them at their ends.
 
-
-def _labels(part: object, slot: _Slot) -> list[str]:
-    """A neuron's own name for its potential, else the array's name with the index, counted from 0."""
-    size = int(np.prod(slot.shape))
-    if isinstance(part, Records):
-        recordable = part.recordable()
-        for signal in recordable.signals:
-            if (
-                signal.name == slot.name
-                and len(signal.dims) == 1
-                and len(recordable.coords.get(signal.dims[0], ())) == size
-            ):
-                names = recordable.coords[signal.dims[0]]
-                return [str(name) for name in names]
-    return [f"{slot.name}[{i}]" for i in range(size)]
+    Args:
+        flow: The system.
+        state: Shape ``(n_copies, n_states)``.
+        before: Switches as they were before, ``(n_copies, n_switches)``.
+        duration_s: Shape ``(n_copies,)``, s.
+        refine: Whether steps end where a switch moves.
+    """
+    left = np.asarray(duration_s, dtype=float) / flow.timestep_s
+    done = Copies.at(flow, state, before)
+    rows, here = np.arange(len(left)), done
+    while rows.size:
+        # A remainder of 1e-9 steps is the rounding of sums of steps.
+        share = np.where(np.abs(left[rows] - 1.0) < 1e-9, 1.0, np.minimum(left[rows], 1.0))
+        here, taken = advance(flow, here, share, refine)
+        left[rows] -= taken
+        ended = left[rows] < 1e-9
+        if ended.any():
+            done[rows[ended]] = here[ended]
+            rows, here = rows[~ended], here[~ended]
+    return done

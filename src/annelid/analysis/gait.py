@@ -1,7 +1,7 @@
-"""How a worm gets along: speed, stride, slip, cost of transport, turning, and where its muscles' work went.
+"""Locomotion metrics: speed, stride, slip, cost of transport, turning, and where the muscles' work went.
 
-Everything is told for whole cycles behind the first one, from one contraction of segment 1 to a later one; the energy
-balance for the whole run. docs/gait.md has the definitions with their formulae and sources.
+Everything is computed over complete cycles behind the first one, from one contraction of segment 1 to a later one; the
+energy balance over the whole run. docs/gait.md has the definitions with their formulae and sources.
 """
 
 from __future__ import annotations
@@ -11,31 +11,58 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from annelid.analysis.balance import EnergyBalance, energy_balance
-from annelid.analysis.circle import fitted_circle
 from annelid.analysis.forces import net_work, positive_work
-from annelid.analysis.rhythm import rhythm, segment_activation
+from annelid.analysis.rhythm import run_rhythm
+from annelid.analysis.track import fitted_circle, track_of
 from annelid.analysis.travel import first_heading
 from annelid.config import WormBody
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from annelid.simulation.runfile import Run
 
-Array = NDArray[np.float64]
+
+@dataclass(frozen=True, slots=True)
+class EnergyBalance:
+    """The muscles' work from the first sample of a run to its last, and what became of it, J.
+
+    ``muscle_work = kinetic + elastic + potential + slip + constraints + damping + numerical``. What a worm does not
+    have (a planar one no weight) is None and counts as nothing.
+
+    Attributes:
+        muscle_work_J: Net work that the ring muscles did on the body.
+        kinetic_J: Gain of kinetic energy.
+        elastic_J: Gain of the energy of strands and springs.
+        potential_J: Gain of the energy of the weight.
+        slip_J: Lost to friction of what slides.
+        constraints_J: Lost to contacts along their normal and to other constraints; soft contacts may give back.
+        damping_J: Lost to dampers.
+        numerical_J: What is left: lost to the integrator.
+        numerical_share: That over the muscles' work; None without any.
+    """
+
+    muscle_work_J: float
+    kinetic_J: float
+    elastic_J: float
+    potential_J: float | None
+    slip_J: float | None
+    constraints_J: float | None
+    damping_J: float
+    numerical_J: float
+    numerical_share: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """How a worm gets along. A number that cannot be told is None (null in JSON), never NaN.
+    """How a worm moves. A number that cannot be computed is None (null in JSON), never NaN.
 
     Attributes:
-        start_s: Beginning of the first whole cycle that counts, s.
+        start_s: Beginning of the first complete cycle that counts, s.
         end_s: End of the last one, s.
-        cycles: Number of whole cycles between them.
+        cycles: Number of complete cycles between them.
         period_s: Mean duration of these cycles, s.
         speed_m_per_s: Way of the centre of mass towards the front over time, negative backwards, m/s.
         speed_body_lengths_per_s: The same over the length of the body at rest, 1/s.
@@ -78,27 +105,29 @@ class Gait:
 
 
 def gait(run: Run) -> Gait:
-    """Reads how a worm gets along from its run.
+    """Reads the locomotion metrics of a run, opened with `annelid.open_run`.
 
-    Args:
-        run: A finished, stopped or interrupted run, opened with `annelid.simulation.runfile.open_run`.
-
-    Returns:
-        The record; all but the energy balance is None where there is no whole cycle behind the first one.
+    All but the energy balance is None where there is no complete cycle behind the first one.
     """
     energy = energy_balance(run.data)
     marks = cycle_marks(run)
     if marks.size < 2 or "center_of_mass" not in run.data:
         return Gait(energy=energy)
-    data, duration = _between(run.data, marks[0], marks[-1]), float(marks[-1] - marks[0])
-    cycles = marks.size - 1
+    time = run.data["time"].values
+    data = run.data.isel(time=np.flatnonzero((time >= marks[0]) & (time <= marks[-1])))
+    duration, cycles = float(marks[-1] - marks[0]), marks.size - 1
+    centre = data["center_of_mass"].sel(axis=["x", "y"]).values
     steps, headings = _steps(run, marks)
     ahead = (steps * headings).sum(axis=1)
     left = steps[:, 1] * headings[:, 0] - steps[:, 0] * headings[:, 1]
     forwards, way = float(ahead.sum()), float(np.hypot(*steps.T).sum())
-    length_m = run.data.attrs.get("body_length_m")
-    weight_N = _weight(run)
+    # Along the mean heading of the window.
+    moves = np.diff(centre @ _steps(run, data["time"].values[[0, -1]])[1][0])
+    length_m = data.attrs.get("body_length_m")
+    mass_kg, arena = data.attrs.get("total_mass_kg"), run.config.arena
+    push_J = None if mass_kg is None or arena is None else mass_kg * arena.gravity_m_per_s2 * way
     angles = np.unwrap(np.arctan2(headings[:, 1], headings[:, 0]))
+    circle = fitted_circle(centre)
     return Gait(
         start_s=float(marks[0]),
         end_s=float(marks[-1]),
@@ -110,44 +139,51 @@ def gait(run: Run) -> Gait:
         stride_body_lengths=_ratio(forwards / cycles, length_m),
         contact_duty=_duty(data),
         slip_ratio=_ratio(_slid(data), way),
-        backward_ratio=_backward_ratio(run, data),
-        cost_of_transport=_ratio(_total(positive_work(data)), _product(weight_N, way)),
-        cost_of_transport_net=_ratio(_total(net_work(data)), _product(weight_N, way)),
-        cost_of_transport_cables=_ratio(_cable_work(data), _product(weight_N, way)),
+        backward_ratio=_ratio(float(-moves[moves < 0].sum()), float(moves[moves > 0].sum())),
+        cost_of_transport=_ratio(_total(positive_work(data)), push_J),
+        cost_of_transport_net=_ratio(_total(net_work(data)), push_J),
+        cost_of_transport_cables=_ratio(_cable_work(data), push_J),
         lateral_drift=_ratio(float(left.sum()), forwards),
         heading_change_rad=float(angles[-1] - angles[0]) if isinstance(run.config.body, WormBody) else None,
-        turning_radius_m=_turning_radius(data),
+        turning_radius_m=circle.signed_radius_m if circle is not None and circle.is_told else None,
         energy=energy,
     )
 
 
+def energy_balance(data: xr.Dataset) -> EnergyBalance | None:
+    """Reads the balance from a run's signals; None where energies were not recorded, or there are no two samples."""
+    recorded = ("muscle_work", "kinetic_energy", "elastic_energy", "damping_loss")
+    optional = ("potential_energy", "slip_loss", "constraint_loss")
+    if any(name not in data for name in recorded) or data.sizes.get("time", 0) < 2:
+        return None
+    work, kinetic, elastic, damping = (_summed_gain(data, name) for name in recorded)
+    potential, slip, constraint = (_summed_gain(data, name) if name in data else None for name in optional)
+    other = None if constraint is None else constraint - (slip or 0.0)
+    left = work - sum((kinetic, elastic, damping, potential or 0.0, slip or 0.0, other or 0.0))
+    return EnergyBalance(work, kinetic, elastic, potential, slip, other, damping, left, left / work if work else None)
+
+
 def cycle_marks(run: Run) -> Array:
     """Returns the times between which cycles lie, s: onsets of segment 1's contractions but the first one."""
-    data, n_segments = run.data, run.config.body.n_segments
-    if "activation" not in data or data.sizes.get("time", 0) < 2:
+    beat = run_rhythm(run) if run.data.sizes.get("time", 0) > 1 else None
+    if beat is None:
         return np.empty(0)
-    beat = rhythm(data["time"].values, segment_activation(data["activation"].values, n_segments))
-    of_first = [onset for segment, onset in zip(beat.order, beat.onsets_s, strict=True) if segment == 1]
-    return np.array(of_first[1:])
+    return np.array([onset for segment, onset in zip(beat.order, beat.onsets_s, strict=True) if segment == 1][1:])
 
 
-def _between(data: xr.Dataset, start_s: float, end_s: float) -> xr.Dataset:
-    """Cuts all signals to the samples from one time to another."""
-    time = data["time"].values
-    return data.isel(time=np.flatnonzero((time >= start_s) & (time <= end_s)))
+def _summed_gain(data: xr.Dataset, name: str) -> float:
+    """What a signal, summed over muscles or segments, has gained from the first sample to the last."""
+    ends = data[name].values[[0, -1]]
+    return float(np.sum(ends[1]) - np.sum(ends[0]))
 
 
 def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     """Returns the centre of mass's way and the mean heading in each cycle, seen from above, ``(n_cycles, 2)`` each."""
     time = run.data["time"].values
     centre = run.data["center_of_mass"].sel(axis=["x", "y"]).values
-    places = np.array([np.interp(marks, time, along) for along in centre.T])
-    steps = np.diff(places.T, axis=0)
+    steps = np.diff(np.array([np.interp(marks, time, along) for along in centre.T]).T, axis=0)
     if not isinstance(run.config.body, WormBody) or run.data.sizes.get("frame", 0) < 2:
         return steps, np.broadcast_to(first_heading(run), steps.shape)
-    # The mesh comes with the engine, which the numbers of a planar worm do without.
-    from annelid.analysis.track import track_of
-
     track = track_of(run)
     # Evenly over each cycle, whatever the interval of the frames.
     times = marks[:-1, np.newaxis] + np.diff(marks)[:, np.newaxis] * np.linspace(0.0, 1.0, 64, endpoint=False)
@@ -158,20 +194,11 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
 def _duty(data: xr.Dataset) -> list[float] | None:
     if "contact_force" not in data:
         return None
-    touches = (data["contact_force"] != 0.0).any("axis")
-    return touches.mean("time").values.tolist()
+    return (data["contact_force"] != 0.0).any("axis").mean("time").values.tolist()
 
 
 def _slid(data: xr.Dataset) -> float | None:
     return float(np.ptp(data["slip_distance"].values, axis=0).mean()) if "slip_distance" in data else None
-
-
-def _backward_ratio(run: Run, data: xr.Dataset) -> float | None:
-    """Way of the centre of mass against the heading over that along it, along the mean heading of the window."""
-    centre = data["center_of_mass"].sel(axis=["x", "y"]).values
-    ends = data["time"].values[[0, -1]]
-    ahead = np.diff(centre @ _steps(run, ends)[1][0])
-    return _ratio(float(-ahead[ahead < 0].sum()), float(ahead[ahead > 0].sum()))
 
 
 def _total(work_J: Array | None) -> float | None:
@@ -184,20 +211,6 @@ def _cable_work(data: xr.Dataset) -> float | None:
         return None
     changes = np.abs(np.diff(data["ring_length"].values, axis=0))
     return float((data["muscle_force"].values[1:] * changes).sum() / 2)
-
-
-def _weight(run: Run) -> float | None:
-    mass_kg = run.data.attrs.get("total_mass_kg")
-    return None if mass_kg is None or run.config.arena is None else mass_kg * run.config.arena.gravity_m_per_s2
-
-
-def _turning_radius(data: xr.Dataset) -> float | None:
-    circle = fitted_circle(data["center_of_mass"].sel(axis=["x", "y"]).values)
-    return circle.signed_radius_m if circle is not None and circle.is_told else None
-
-
-def _product(a: float | None, b: float | None) -> float | None:
-    return None if a is None or b is None else a * b
 
 
 def _ratio(of: float | None, to: float | None) -> float | None:

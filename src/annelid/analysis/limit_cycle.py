@@ -1,24 +1,24 @@
-"""Limit cycles of a worm under its nervous system: its closed loop as a flow, and the orbit found in it.
+"""Limit cycles of a worm under its nervous system: found by shooting, linearised, and kicked.
 
-`annelid.analysis.events` locates switches within steps, `poincare` the returns to a section; `shooting` closes the
-orbit, `floquet` linearises round it, and `phase_response` tells what a perturbation does to its phase.
+The return map of a section is iterated, or solved by Newton's method, until the orbit closes; state-transition
+matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
+ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks, at which the equations
+change piece within a step, take it further away. `Continuous` and `Piecewise` of `annelid.analysis.flow` take care of
+both.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Literal, cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-from annelid.analysis.events import travel
-from annelid.analysis.flow import ClosedLoop, Continuous, Flow, Switches
-from annelid.analysis.orbit import LimitCycle, NoLimitCycle, Section
-from annelid.analysis.phase_response import kicked_phase_response
-from annelid.analysis.poincare import crossing_times, section_at
-from annelid.analysis.shooting import find_limit_cycle
+from annelid.analysis.flow import ClosedLoop, Continuous, Copies, Flow, Switches, advance, first_share, travel
 from annelid.clock import StepRatio
 from annelid.config import RunConfig, SnsController, load_config
-from annelid.errors import ConfigError, suggest
+from annelid.errors import AnnelidError, ConfigError, suggest
 from annelid.protocols import Array, Controller, Plant, Stateful
 from annelid.simulation import build_controller, build_plant
 
@@ -43,6 +43,74 @@ Time = Literal["continuous", "located", "stepped"]
 # Step whose change tells the vector field, and the step that the field is integrated with, s.
 _FIELD_STEP_S = 1e-5
 _CONTINUOUS_STEP_S = 1e-3
+_MOST_RETURNS, _MOST_NEWTON = 40, 12
+# A closing error that shrinks by less than this factor a return calls for Newton's method.
+_SLOW = 0.5
+# Copies that run at once, for the processor's cache.
+_MOST_COPIES = 2048
+
+
+class NoLimitCycle(AnnelidError):
+    """No periodic orbit was found: the section was not met, or the orbit did not close."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """The event that ends a cycle: a state rising through a threshold.
+
+    Attributes:
+        state: Index of the state.
+        threshold: In its unit.
+    """
+
+    state: int
+    threshold: float
+
+
+@dataclass(frozen=True, slots=True)
+class LimitCycle:
+    """A periodic orbit, its linearisation and its phase response; arrays hold ``n_phases + 1`` instants of one cycle.
+
+    Attributes:
+        labels: Names of the states.
+        period_s: Period, s.
+        timestep_s: Step that it was computed with, s.
+        section: Where the cycle begins and ends.
+        closing_error: Largest distance between beginning and end in any state, as a share of its range.
+        n_returns: Returns to the section (or Newton steps) that it took to close the orbit.
+        time_s: Instants, s, from 0 to the period, ``(n_phases + 1,)``.
+        state: Shape ``(n_phases + 1, n_states)``.
+        switches: Switches in force there, ``(n_phases + 1, n_switches)``.
+        switch_time_s: When a switch moves, s, ``(n_moves,)``.
+        range: Peak to peak of every state over the cycle (1 for one that does not move), ``(n_states,)``.
+        transitions: State-transition matrices from each instant to the next, ``(n_phases, n_states, n_states)``.
+        monodromy: Their product, the state-transition matrix of a period, ``(n_states, n_states)``.
+        multipliers: Floquet multipliers, its eigenvalues, by falling magnitude, ``(n_states,)``, complex.
+        eigenvectors: Its right eigenvectors at the section in the same order, one a column, of norm 1 when every
+            state is measured by its range, ``(n_states, n_states)``, complex.
+        trivial: Index of the multiplier nearest to 1, whose eigenvector is along the orbit.
+        phase_response: Infinitesimal phase response curves, ``(n_phases + 1, n_states)``: by how many seconds a
+            cycle is advanced by a unit of perturbation of each state at each instant; where a state rests on a kink,
+            the mean of what perturbations to either side do.
+    """
+
+    labels: tuple[str, ...]
+    period_s: float
+    timestep_s: float
+    section: Section
+    closing_error: float
+    n_returns: int
+    time_s: Array
+    state: Array
+    switches: Switches = field(repr=False)
+    switch_time_s: Array = field(repr=False)
+    range: Array = field(repr=False)
+    transitions: Array = field(repr=False)
+    monodromy: Array = field(repr=False)
+    multipliers: NDArray[np.complex128]
+    eigenvectors: NDArray[np.complex128] = field(repr=False)
+    trivial: int
+    phase_response: Array = field(repr=False)
 
 
 def limit_cycle(
@@ -66,9 +134,6 @@ def limit_cycle(
         threshold_mV: Relative to rest; default: half of the operating range R.
         settle_s: Simulated time before the search begins, s, longer than ``sensor.startup_hold_s``.
         n_phases: Arcs that the orbit is cut into.
-
-    Returns:
-        The limit cycle.
 
     Raises:
         ConfigError: A controller without neurons, no such neuron, sensor noise, a loop that depends on time itself
@@ -116,7 +181,20 @@ def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0)
     flow, state, switches = settled(plant, controller, clock.control_timestep_s, settle_s, stride=stride)
     if time != "continuous":
         return flow, state, switches
-    loop = _infinitesimal(config, plant, controller)
+    # The same loop in forward Euler steps so short that they tell the vector field.
+    tree = config.model_dump()
+    tree["clock"] = {"control_timestep_s": _FIELD_STEP_S, "physics_timestep_s": _FIELD_STEP_S}
+    if isinstance(config.controller, SnsController):
+        tree["controller"]["scheme"] = "euler"
+    # Time runs slower there, and must not come back into the hold.
+    tree["sensor"]["startup_hold_s"] = 0.0
+    tree["record"] = {"signals_interval_s": config.duration_s, "frames_interval_s": config.duration_s}
+    short = load_config(tree)
+    body = build_plant(short)
+    nerves = build_controller(short, body)
+    for new, old in ((body, plant), (nerves, controller)):
+        cast(Stateful, new).set_state(cast(Stateful, old).get_state())
+    loop = ClosedLoop(body, nerves, _FIELD_STEP_S, kinks=True)
     return Continuous(loop, _CONTINUOUS_STEP_S), *loop.present()
 
 
@@ -157,18 +235,294 @@ def settled(
     return loop, state, switches
 
 
-def _infinitesimal(config: RunConfig, plant: Plant, controller: Controller) -> ClosedLoop:
-    """The same loop in forward Euler steps so short that they tell the vector field."""
-    tree = config.model_dump()
-    tree["clock"] = {"control_timestep_s": _FIELD_STEP_S, "physics_timestep_s": _FIELD_STEP_S}
-    if isinstance(config.controller, SnsController):
-        tree["controller"]["scheme"] = "euler"
-    # Time runs slower there, and must not come back into the hold.
-    tree["sensor"]["startup_hold_s"] = 0.0
-    tree["record"] = {"signals_interval_s": config.duration_s, "frames_interval_s": config.duration_s}
-    short = load_config(tree)
-    body = build_plant(short)
-    nerves = build_controller(short, body)
-    for new, old in ((body, plant), (nerves, controller)):
-        cast(Stateful, new).set_state(cast(Stateful, old).get_state())
-    return ClosedLoop(body, nerves, _FIELD_STEP_S, kinks=True)
+def section_at(flow: Flow, label: str, threshold: float) -> Section:
+    """Returns where the state of that label rises through a threshold, in its unit.
+
+    Raises:
+        ConfigError: No such state.
+    """
+    if label not in flow.labels:
+        raise ConfigError(f"there is no state {label!r}: {suggest(label, flow.labels)}")
+    return Section(flow.labels.index(label), threshold)
+
+
+def find_limit_cycle(
+    flow: Flow,
+    state: Array,
+    switches: Switches,
+    section: Section,
+    *,
+    n_phases: int = 100,
+    tolerance: float = 1e-9,
+    perturbation: float = 1e-6,
+    longest_s: float = 60.0,
+    refine: bool = True,
+) -> LimitCycle:
+    """Finds the periodic orbit near a state, and linearises round it.
+
+    The return map of the section is iterated until the orbit closes; where it contracts by less than a half a
+    cycle, Newton's method on the return map takes over. The orbit is then cut into ``n_phases`` arcs. Every state is
+    perturbed both ways at the beginning of every arc; the central differences at the ends are the arcs'
+    state-transition matrices, whose product is the monodromy. The phase response is the left eigenvector of the trivial
+    multiplier, carried round the orbit backwards by the transposed transition matrices (the adjoint method).
+
+    Args:
+        flow: The system.
+        state: Where to begin, in the orbit's basin, ``(1, n_states)``.
+        switches: Switches as they were before, ``(1, n_switches)``.
+        section: The event that ends a cycle.
+        n_phases: Arcs, at least 1.
+        tolerance: Closing error at which the orbit counts as closed, as a share of each state's range.
+        perturbation: Size of a perturbation, as a share of the state's range.
+        longest_s: Longest cycle to wait for, s.
+        refine: Whether steps end where a switch moves; without, the derivative misses the saltations.
+
+    Raises:
+        NoLimitCycle: The section is not met, or the orbit does not close.
+        ConfigError: No arcs, or a perturbation or a tolerance that is not positive.
+    """
+    for name, value in (("n_phases", n_phases), ("tolerance", tolerance), ("perturbation", perturbation)):
+        if not value > 0:
+            raise ConfigError(f"{name} = {value:g} must be greater than 0")
+    _, state, switches = crossing_times(flow, state, switches, section, longest_s, refine=refine)
+    closing, n_returns, newton = np.inf, 0, 0
+    while True:
+        orbit = _first_return(flow, state, switches, section, longest_s, refine)
+        end, last = orbit.state[-1:], orbit.switches[-1:]
+        n_returns += 1
+        before, closing = closing, float((np.abs(end - state) / orbit.range).max())
+        if closing <= tolerance:
+            break
+        if n_returns >= _MOST_RETURNS or newton >= _MOST_NEWTON:
+            raise NoLimitCycle(
+                f"the orbit does not close: after {n_returns} returns to the section its ends differ by {closing:.2g} "
+                f"of a state's range, more than {tolerance:g}"
+            )
+        if refine and (newton or (n_returns > 3 and closing > _SLOW * before)):
+            newton += 1
+            transition = _product(_transitions(flow, orbit, _arcs(orbit, n_phases), perturbation, refine))
+            along = flow.step(end, last)[0][0] - end[0]
+            project = np.eye(state.size)
+            project[:, section.state] -= along / along[section.state]
+            correction = np.linalg.solve(np.eye(state.size) - project @ transition, (end - state)[0])
+            end = state + correction
+            end[:, section.state] = section.threshold
+        state, switches = end, last
+    arcs = _arcs(orbit, n_phases)
+    transitions = _transitions(flow, orbit, arcs, perturbation, refine)
+    monodromy = _product(transitions)
+    multipliers, eigenvectors, adjoint = _decomposed(monodromy, orbit.range)
+    state, switches = orbit.state[arcs], orbit.switches[arcs]
+    velocity = (flow.step(state, switches)[0] - state) / flow.timestep_s
+    carried = [adjoint]
+    for transition in transitions[::-1]:
+        carried.append(transition.T @ carried[-1])
+    response = np.array(carried[::-1])
+    return LimitCycle(
+        labels=flow.labels,
+        period_s=float(orbit.time[-1] * flow.timestep_s),
+        timestep_s=flow.timestep_s,
+        section=section,
+        closing_error=closing,
+        n_returns=n_returns,
+        time_s=orbit.time[arcs] * flow.timestep_s,
+        state=state,
+        switches=switches,
+        switch_time_s=orbit.time[orbit.moved] * flow.timestep_s,
+        range=orbit.range,
+        transitions=transitions,
+        monodromy=monodromy,
+        multipliers=multipliers,
+        eigenvectors=eigenvectors,
+        trivial=int(np.argmin(np.abs(multipliers - 1.0))),
+        phase_response=response / (response * velocity).sum(axis=1, keepdims=True),
+    )
+
+
+@dataclass(slots=True)
+class _Orbit:
+    """Every step of one cycle: instants (in steps), states and switches there, and when switches moved."""
+
+    time: Array
+    state: Array
+    switches: Switches
+    moved: NDArray[np.intp]
+
+    @property
+    def range(self) -> Array:
+        """Peak to peak of every state, 1 for one that does not move."""
+        range_ = np.ptp(self.state, axis=0)
+        return np.where(range_ > 0.0, range_, 1.0)
+
+
+def crossing_times(
+    flow: Flow,
+    state: Array,
+    before: Switches,
+    section: Section,
+    longest_s: float,
+    *,
+    count: int = 1,
+    refine: bool = True,
+) -> tuple[Array, Array, Switches]:
+    """Lets copies run until they have met the section.
+
+    Args:
+        flow: The system.
+        state: Shape ``(n_copies, n_states)``.
+        before: Switches as they were before, ``(n_copies, n_switches)``.
+        section: The event.
+        longest_s: Simulated time after which to give up, s.
+        count: Which of the events to stop at, from 1.
+        refine: Whether steps end where a switch moves.
+
+    Returns:
+        Times, s, ``(n_copies,)``; states and switches there.
+
+    Raises:
+        NoLimitCycle: A copy has not met the section so often in that time.
+    """
+    here = Copies.at(flow, state, before)
+    rows, times, counts = np.arange(len(state)), np.zeros(len(state)), np.zeros(len(state), dtype=int)
+    end = here[rows]
+    while rows.size:
+        _refuse_waiting(flow, section, count, float(times[rows].max()), longest_s)
+        there, taken = advance(flow, here, np.ones(rows.size), refine)
+        met = _meets(section, here, there)
+        counts[rows] += met
+        final = met & (counts[rows] == count)
+        if final.any():
+            end[rows[final]], taken[final] = _stop(flow, section, here[final], taken[final])
+        times[rows] += taken * flow.timestep_s
+        rows, here = rows[~final], there[~final]
+    return times, end.state, end.switches
+
+
+def _first_return(
+    flow: Flow, state: Array, before: Switches, section: Section, longest_s: float, refine: bool
+) -> _Orbit:
+    """One copy's way from the section back to it, step by step."""
+    here = Copies.at(flow, state, before)
+    time, states, switches, moved = [0.0], [here.state[0]], [here.switches[0]], []
+    met = False
+    while not met:
+        _refuse_waiting(flow, section, 1, time[-1] * flow.timestep_s, longest_s)
+        there, taken = advance(flow, here, np.ones(1), refine)
+        met = bool(_meets(section, here, there)[0])
+        if met:
+            there, taken = _stop(flow, section, here, taken)
+        elif (there.switches != here.switches).any():
+            moved.append(len(time))
+        here = there
+        time.append(time[-1] + float(taken[0]))
+        states.append(here.state[0])
+        switches.append(here.switches[0])
+    return _Orbit(np.array(time), np.array(states), np.array(switches), np.array(moved, dtype=np.intp))
+
+
+def _meets(section: Section, here: Copies, there: Copies) -> NDArray[np.bool_]:
+    low, high = here.state[:, section.state], there.state[:, section.state]
+    return (low < section.threshold) & (high >= section.threshold)
+
+
+def _stop(flow: Flow, section: Section, here: Copies, share: Array) -> tuple[Copies, Array]:
+    """Ends steps on the section, which they meet within the share given; returns the share taken."""
+    share = first_share(flow, here, share, lambda state: state[:, section.state] >= section.threshold)
+    state = here.part(flow, share)
+    # On the section to the last bit, so that a copy that starts from here does not meet it at once.
+    state[:, section.state] = section.threshold
+    return Copies.at(flow, state, here.switches), share
+
+
+def _refuse_waiting(flow: Flow, section: Section, count: int, time_s: float, longest_s: float) -> None:
+    if time_s > longest_s:
+        raise NoLimitCycle(
+            f"{flow.labels[section.state]} does not rise through {section.threshold:g} "
+            f"{'' if count == 1 else f'{count} times '}within {longest_s:g} s: "
+            "choose another threshold or neuron, or a worm that oscillates"
+        )
+
+
+def _arcs(orbit: _Orbit, n_phases: int) -> NDArray[np.intp]:
+    """Indices of the steps between which the arcs lie: even in time, at whole steps, and none beside a switch."""
+    last = len(orbit.time) - 1
+    allowed = np.ones(last, dtype=bool)
+    for offset in (-1, 0, 1):
+        allowed[np.clip(orbit.moved + offset, 1, last - 1)] = False
+    allowed[0] = True
+    candidates = np.flatnonzero(allowed)
+    wanted = orbit.time[-1] * np.arange(n_phases) / n_phases
+    nearest = np.searchsorted(orbit.time[candidates], wanted)
+    return np.append(np.unique(candidates[np.minimum(nearest, len(candidates) - 1)]), last)
+
+
+def _transitions(flow: Flow, orbit: _Orbit, arcs: NDArray[np.intp], perturbation: float, refine: bool) -> Array:
+    """State-transition matrices of the arcs by central differences, ``(n_arcs, n_states, n_states)``."""
+    size = perturbation * orbit.range
+    kicks = np.concatenate([np.diag(size), -np.diag(size)])
+    duration_s = np.diff(orbit.time[arcs]) * flow.timestep_s
+    ends = np.empty((len(duration_s), *kicks.shape))
+    at_once = max(1, _MOST_COPIES // len(kicks))
+    for first in range(0, len(duration_s), at_once):
+        some = slice(first, first + at_once)
+        starts = orbit.state[arcs[:-1][some], np.newaxis] + kicks
+        switches = orbit.switches[arcs[:-1][some]].repeat(len(kicks), axis=0)
+        durations = duration_s[some].repeat(len(kicks))
+        end = travel(flow, starts.reshape(-1, size.size), switches, durations, refine=refine)
+        ends[some] = end.state.reshape(starts.shape)
+    plus, minus = ends[:, : size.size], ends[:, size.size :]
+    return ((plus - minus) / (2.0 * size[:, np.newaxis])).transpose(0, 2, 1)
+
+
+def _product(transitions: Array) -> Array:
+    """State-transition matrix of a whole period: the product of those of its arcs."""
+    product = np.eye(transitions.shape[1])
+    for transition in transitions:
+        product = transition @ product
+    return product
+
+
+def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128], Array]:
+    """Multipliers and right eigenvectors, as `LimitCycle` has them, and the left eigenvector of the trivial one."""
+    scaled = monodromy * scale / scale[:, np.newaxis]
+    multipliers, vectors = np.linalg.eig(scaled)
+    order = np.argsort(-np.abs(multipliers), kind="stable")
+    multipliers, vectors = multipliers[order].astype(complex), vectors[:, order].astype(complex)
+    of_left, left = np.linalg.eig(scaled.T)
+    adjoint = np.real(left[:, np.argmin(np.abs(of_left - 1.0))]) / scale
+    return multipliers, (scale[:, np.newaxis] * vectors).astype(complex), adjoint
+
+
+def kicked_phase_response(
+    flow: Flow,
+    cycle: LimitCycle,
+    kicks: Array,
+    phases: NDArray[np.intp],
+    *,
+    n_cycles: int = 3,
+    longest_s: float = 60.0,
+) -> Array:
+    """Measures phase response directly: kicks the system at a phase, and sees when it next meets the section.
+
+    Args:
+        flow: The system of the cycle.
+        cycle: Its limit cycle.
+        kicks: What is added to the states at once, ``(n_kicks, n_states)``; any size.
+        phases: Indices into the cycle's instants, ``(n_kicked,)``.
+        n_cycles: Which meeting with the section to compare, from 1; by then the kick should have died away but for
+            its phase.
+        longest_s: Longest cycle to wait for, s.
+
+    Returns:
+        Advance of each phase by each kick, s, ``(n_kicked, n_kicks)``, within half a period of 0.
+
+    Raises:
+        NoLimitCycle: A kick has thrown the system off the cycle.
+    """
+    plain = np.zeros((1, kicks.shape[1]))
+    state = (cycle.state[phases, np.newaxis] + np.concatenate([plain, kicks])).reshape(-1, kicks.shape[1])
+    switches = cycle.switches[phases].repeat(len(kicks) + 1, axis=0)
+    times, _, _ = crossing_times(flow, state, switches, cycle.section, n_cycles * longest_s, count=n_cycles)
+    times = times.reshape(len(phases), -1)
+    advance_s = times[:, :1] - times[:, 1:]
+    return advance_s - cycle.period_s * np.round(advance_s / cycle.period_s)

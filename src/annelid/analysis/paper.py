@@ -46,10 +46,9 @@ class Published:
 def published(config: RunConfig) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
-    Numbers are given for the configurations named after a paper, whatever else was overridden but the kind of
-    controller: the three-segment worm of ``riddle2023`` and its rods, the four-segment robot ``wang``, and the planar
-    worms of ``riddle2022`` with the gate time constants and gains that go together. For all others the result is
-    empty.
+    Only configurations named after a paper and with its kind of controller have such numbers: the three-segment worm of
+    ``riddle2023`` and its rods, the four-segment robot ``wang``, and the planar worms of ``riddle2022`` with the gate
+    time constants and gains that go together.
     """
     if not isinstance(config.controller, SnsController):
         return {}
@@ -58,15 +57,10 @@ def published(config: RunConfig) -> dict[str, Published]:
     if config.name == "wang" and config.body.n_segments == len(ROBOT_ELONGATION_M):
         return dict(_ROBOT)
     if config.name.startswith("riddle2022") and isinstance(config.body, PlanarBody):
-        key = (
-            config.body.n_segments,
-            config.controller.gate_time_constant_ms,
-            config.body.gain,
-        )
-        period_s = _PLANAR_PERIODS_S.get(key)
-        if period_s is not None:
+        key = (config.body.n_segments, config.controller.gate_time_constant_ms, config.body.gain)
+        if key in _PLANAR_PERIODS_S:
             return {
-                "period_s": Published(period_s, PAPER_2022, "the authors' code"),
+                "period_s": Published(_PLANAR_PERIODS_S[key], PAPER_2022, "the authors' code"),
                 "order": Published("1-2-3..", PAPER_2022, "Fig. 4"),
             }
     return {}
@@ -110,32 +104,37 @@ def formulation() -> Summary:
 
 
 def references(config: RunConfig) -> dict[str, Published]:
-    """Returns what the numbers of a run are laid beside, keyed by the fields of `Summary`.
+    """Returns what the numbers of a run are compared with, keyed by the fields of `Summary`.
 
-    These are the published numbers; beside worms of rods that stand for the paper's, also those of the paper's own
-    formulation. Published elongations of a single sensor stand beside the range over all sensors as well.
+    These are the published numbers; for worms of rods that stand for the paper's, also those of the paper's own
+    formulation. A published elongation of a single sensor is compared with the range over all sensors as well.
     """
     beside = published(config)
     single = beside.get("elongation_first_helix_pp_m")
     if single is not None:
         beside |= dict.fromkeys(SPREAD, single)
     if stands_for_the_papers(config):
-        numbers = formulation()
-        place = f"annelid run {FORMULATION}"
-        beside |= {field: Published(_plain(getattr(numbers, field)), FORMULATION, place) for field in _IN_ITS_RUN}
+        for field in _IN_ITS_RUN:
+            value = getattr(formulation(), field)
+            value = tuple(value) if isinstance(value, list) else value
+            beside[field] = Published(value, FORMULATION, f"annelid run {FORMULATION}")
     return beside
 
 
 def stands_for_the_papers(config: RunConfig) -> bool:
     """Tells whether a worm is of rods and of the paper's kind, to be compared with the paper's own formulation."""
-    body = config.body
-    return _is_of_2023(config) and isinstance(body, WormBody) and isinstance(body.formulation, Rods)
+    return _is_of_2023(config) and _rods(config) is not None
 
 
 def has_rigid_crossings(config: RunConfig) -> bool:
     """Tells whether a worm's strands share a vertex at each crossing."""
+    rods = _rods(config)
+    return rods is not None and rods.pins == "shared"
+
+
+def _rods(config: RunConfig) -> Rods | None:
     body = config.body
-    return isinstance(body, WormBody) and isinstance(body.formulation, Rods) and body.formulation.pins == "shared"
+    return body.formulation if isinstance(body, WormBody) and isinstance(body.formulation, Rods) else None
 
 
 def changed_fields(config: RunConfig) -> list[str]:
@@ -154,26 +153,13 @@ def changed_fields(config: RunConfig) -> list[str]:
 
 
 def agreement(numbers: Summary) -> Agreement:
-    """Compares a run of three segments with the paper's own formulation.
-
-    Args:
-        numbers: The run's numbers.
-    """
+    """Compares the numbers of a run of three segments with the paper's own formulation."""
     theirs = formulation()
-    apart = relative_difference(theirs.elongation_mean_max_m, numbers.elongation_mean_max_m)
+    elongation = relative_difference(theirs.elongation_mean_max_m, numbers.elongation_mean_max_m)
     period = relative_difference(theirs.period_s, numbers.period_s)
     assert not isinstance(period, Sequence)
-    return Agreement(
-        order=numbers.order == theirs.order,
-        period=period,
-        elongation=tuple(apart) if isinstance(apart, Sequence) else (None,) * theirs.n_segments,
-    )
-
-
-def _plain(value: float | list[float | None] | None) -> float | tuple[float, ...]:
-    """A number of the formulation's run as `Published` has it."""
-    assert value is not None
-    return tuple(one for one in value if one is not None) if isinstance(value, list) else value
+    of_each = tuple(elongation) if isinstance(elongation, Sequence) else (None,) * theirs.n_segments
+    return Agreement(numbers.order == theirs.order, period, of_each)
 
 
 def _is_of_2023(config: RunConfig) -> bool:

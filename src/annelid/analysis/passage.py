@@ -7,17 +7,15 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.analysis.track import Track, track_of
 from annelid.arena.course import bore_of, course_of
 from annelid.config import Pipe
 from annelid.errors import RunFileError
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -59,10 +57,9 @@ class Passage:
         worms are compared over the same way; or to the end for one that does not get so far. NaN if it never came.
         """
         inside = np.flatnonzero(self.front_m >= self.reach_m[0])
-        if not inside.size:
-            return float("nan")
-        out = np.flatnonzero(self.front_m >= self.reach_m[1]) if self.reach_m[1] > self.reach_m[0] else np.empty(0)
-        first, last = int(inside[0]), int(out[0]) if out.size else len(self.time_s) - 1
+        past = np.flatnonzero(self.front_m >= self.reach_m[1])
+        last = past[0] if past.size and self.reach_m[1] > self.reach_m[0] else len(self.time_s) - 1
+        first = inside[0] if inside.size else last
         if last <= first:
             return float("nan")
         return float((self.front_m[last] - self.front_m[first]) / (self.time_s[last] - self.time_s[first]))

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.errors import RunFileError
-from annelid.morphology import MeshGeometry
+from annelid.morphology import Indices, MeshGeometry
+from annelid.protocols import Array
 from annelid.simulation.runfile import Run
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +26,7 @@ class Deformation:
     lateral: Array
 
 
-def rhombus_diagonals(crossings_m: ArrayLike, rhombi: NDArray[np.int64]) -> tuple[Array, Array]:
+def rhombus_diagonals(crossings_m: ArrayLike, rhombi: Indices) -> tuple[Array, Array]:
     """Measures the straight lines between opposite corners.
 
     Args:
@@ -49,32 +48,10 @@ def deformation(crossings_m: ArrayLike, geometry: MeshGeometry) -> Deformation:
     Args:
         crossings_m: Positions of the crossings, m, shape ``(..., n_crossings, 3)``.
         geometry: The mesh at rest.
-
-    Returns:
-        The relative change of both diagonals; 0 at rest.
     """
     axial, lateral = rhombus_diagonals(crossings_m, geometry.rhombi)
     rest_axial, rest_lateral = rhombus_diagonals(geometry.crossings_m, geometry.rhombi)
     return Deformation(axial / rest_axial - 1.0, lateral / rest_lateral - 1.0)
-
-
-def run_deformation(run: Run, geometry: MeshGeometry, time_s: float | None = None) -> Deformation:
-    """Measures the deformation of every rhombus of a run.
-
-    Args:
-        run: The run of a 3D worm.
-        geometry: Its mesh at rest.
-        time_s: Time whose nearest recorded posture is measured, s; by default all of them.
-
-    Returns:
-        The deformation, arrays of shape ``(n_rhombi,)`` at a time and ``(n_frames, n_rhombi)`` over time.
-
-    Raises:
-        RunFileError: No postures recorded, or not at that time.
-    """
-    _require_postures(run)
-    frame = slice(None) if time_s is None else nearest_frame(run, time_s)
-    return deformation(run.data["crossing_position"].values[frame], geometry)
 
 
 def nearest_frame(run: Run, time_s: float) -> int:
@@ -83,7 +60,8 @@ def nearest_frame(run: Run, time_s: float) -> int:
     Raises:
         RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.
     """
-    _require_postures(run)
+    if "crossing_position" not in run.data or run.data.sizes.get("frame", 0) == 0:
+        raise RunFileError(f"{run.path} holds no recorded postures of a 3D worm")
     times = run.data["frame_time"].values
     margin = float(np.diff(times).max()) if len(times) > 1 else 0.0
     if not times[0] - margin <= time_s <= times[-1] + margin:
@@ -93,7 +71,7 @@ def nearest_frame(run: Run, time_s: float) -> int:
     return int(np.abs(times - time_s).argmin())
 
 
-def rhombus_plane(geometry: MeshGeometry) -> NDArray[np.int64]:
+def rhombus_plane(geometry: MeshGeometry) -> Indices:
     """Crossing plane of each rhombus' left and right corner, through its middle, shape ``(n_rhombi,)``."""
     return geometry.crossing_plane[geometry.rhombi[:, 1]]
 
@@ -104,33 +82,15 @@ def actuated(geometry: MeshGeometry) -> NDArray[np.bool_]:
 
 
 def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
-    """Distance along the resting body from a segment's ring to the middle of each rhombus.
+    """Distance along the resting body from the ring of a segment (from 0) to the middle of each rhombus.
 
-    Args:
-        geometry: The mesh at rest.
-        segment: Segment of the ring, counted from 0.
-
-    Returns:
-        Distances, m, negative towards the front, shape ``(n_rhombi,)``.
+    In m, negative towards the front, shape ``(n_rhombi,)``.
     """
     return geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[segment]]
 
 
 def plane_means(values: ArrayLike, geometry: MeshGeometry) -> Array:
-    """Averages a quantity of the rhombi round each plane that has rhombi, front to back.
-
-    Args:
-        values: One value a rhombus, shape ``(..., n_rhombi)``.
-        geometry: The mesh.
-
-    Returns:
-        Means, shape ``(..., n_planes - 2)``: the first and the last plane have no complete rhombus.
-    """
+    """Averages values, ``(.., n_rhombi)``, round each plane that has rhombi, front to back, ``(.., n_planes - 2)``."""
     array = np.asarray(values, dtype=float)
     plane = rhombus_plane(geometry)
     return np.stack([array[..., plane == p].mean(axis=-1) for p in np.unique(plane)], axis=-1)
-
-
-def _require_postures(run: Run) -> None:
-    if "crossing_position" not in run.data or run.data.sizes.get("frame", 0) == 0:
-        raise RunFileError(f"{run.path} holds no recorded postures of a 3D worm")

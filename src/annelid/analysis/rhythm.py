@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from annelid.protocols import Array
+
+if TYPE_CHECKING:
+    from annelid.simulation.runfile import Run
 
 CONTRACTED = 0.5
 """Activation above which a muscle counts as contracted (half of its range)."""
@@ -33,7 +39,7 @@ class Rhythm:
     full_cycles: int
 
 
-def segment_activation(activation: ArrayLike, n_segments: int) -> NDArray[np.float64]:
+def segment_activation(activation: ArrayLike, n_segments: int) -> Array:
     """Averages activation over each segment's muscles (one ring, or a left and a right half).
 
     Args:
@@ -47,9 +53,7 @@ def segment_activation(activation: ArrayLike, n_segments: int) -> NDArray[np.flo
     return values.reshape(len(values), n_segments, values.shape[1] // n_segments).mean(axis=2)
 
 
-def contractions(
-    time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRACTED, shortest_s: float = 0.0
-) -> NDArray[np.float64]:
+def contractions(time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRACTED, shortest_s: float = 0.0) -> Array:
     """Finds from when to when one signal is at or above a threshold, interpolating linearly between samples.
 
     Args:
@@ -77,48 +81,27 @@ def contractions(
     return np.stack([onsets, releases], axis=1)[seen_s >= shortest_s]
 
 
-def onset_times(time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRACTED) -> list[float]:
-    """Finds when one signal rises through a threshold, interpolating linearly between samples.
-
-    Args:
-        time_s: Sample times, s, rising, shape ``(n_times,)``.
-        signal: Same shape. A signal at or above the threshold at the first sample has an onset there.
-        threshold: In the signal's unit.
-
-    Returns:
-        Onset times, s, rising.
-    """
-    return contractions(time_s, signal, threshold)[:, 0].tolist()
-
-
 def is_continued(time_s: ArrayLike) -> bool:
     """Tells a run that continues another, whose first sample is later than time zero."""
     return bool(np.size(time_s)) and bool(np.asarray(time_s)[0] > 0)
 
 
 def startup_end(time_s: ArrayLike) -> float:
-    """Returns until when onsets belong to the initial state, s: the first sampling interval of a run.
-
-    A continued run has no initial state: minus infinity.
-    """
+    """Returns until when onsets belong to the initial state, s: the first sampling interval, minus infinity without."""
     times = np.asarray(time_s, dtype=float)
     if is_continued(times):
         return -np.inf
     return float(times[min(1, times.size - 1)]) if times.size else 0.0
 
 
-def segment_intervals(onsets_s: Sequence[ArrayLike], after_s: float) -> NDArray[np.float64]:
-    """Returns the intervals between successive onsets of the same segment that begin after ``after_s``.
+def in_order(onsets_s: Sequence[Array]) -> list[tuple[float, int]]:
+    """Returns the onsets of all segments with the segment (from 1), by time; simultaneous ones by segment."""
+    return sorted((float(onset), i + 1) for i, of_one in enumerate(onsets_s) for onset in of_one)
 
-    Args:
-        onsets_s: Onset times of each segment, s, rising.
-        after_s: Such as `startup_end`, s.
 
-    Returns:
-        Intervals of all segments, s, shape ``(n_intervals,)``.
-    """
-    of_each = [np.asarray(onsets, dtype=float) for onsets in onsets_s]
-    return np.concatenate([np.empty(0), *(np.diff(onsets[onsets > after_s]) for onsets in of_each)])
+def segment_intervals(onsets_s: Sequence[Array], after_s: float) -> Array:
+    """Returns the intervals between successive onsets of the same segment that begin after ``after_s``, s."""
+    return np.concatenate([np.empty(0), *(np.diff(onsets[onsets > after_s]) for onsets in onsets_s)])
 
 
 def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
@@ -131,28 +114,30 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     Args:
         time_s: Sample times, s, shape ``(n_times,)``.
         activation: Activation of each segment, in [0, 1], shape ``(n_times, n_segments)``.
-
-    Returns:
-        The rhythm. Simultaneous onsets are ordered by segment.
     """
     times = np.asarray(time_s, dtype=float)
-    values = np.asarray(activation, dtype=float)
-    n_segments = values.shape[1]
+    signals = np.asarray(activation, dtype=float).T
     continued = is_continued(times)
-    by_segment = [
-        onset_times(times, values[:, i])[int(continued and values[0, i] >= CONTRACTED) :] for i in range(n_segments)
-    ]
-    events = sorted((onset, i + 1) for i, onsets in enumerate(by_segment) for onset in onsets)
+    onsets = [contractions(times, one)[int(continued and one[0] >= CONTRACTED) :, 0] for one in signals]
+    events = in_order(onsets)
     order = tuple(segment for _, segment in events)
-    periods = segment_intervals(by_segment, startup_end(times))
+    periods = segment_intervals(onsets, startup_end(times))
     return Rhythm(
         order=order,
         onsets_s=tuple(onset for onset, _ in events),
         period_s=float(periods.mean()) if periods.size else None,
         period_std_s=float(periods.std()) if periods.size > 1 else None,
-        wave=is_wave(order, n_segments, any_start=continued),
-        full_cycles=full_cycles(order, n_segments),
+        wave=is_wave(order, len(signals), any_start=continued),
+        full_cycles=full_cycles(order, len(signals)),
     )
+
+
+def run_rhythm(run: Run) -> Rhythm | None:
+    """Describes the rhythm in which a run's muscles are activated; None without samples of activation."""
+    data = run.data
+    if "activation" not in data or not data.sizes.get("time"):
+        return None
+    return rhythm(data["time"].values, segment_activation(data["activation"].values, run.config.body.n_segments))
 
 
 def is_wave(order: tuple[int, ...], n_segments: int, any_start: bool = False) -> bool | None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from annelid.protocols import Array
 
 ROBOT_ELONGATION_M = (0.0615, 0.0382, 0.0478, 0.0598)
 """Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m: each the mean of the left
@@ -12,14 +14,7 @@ time as a graph; numbers are given of these maxima only.
 """
 
 
-def relative_to_first(elongation_m: ArrayLike) -> NDArray[np.float64]:
-    """Divides the elongations of segments by that of segment 1.
-
-    Args:
-        elongation_m: Shape ``(n_segments,)``, m.
-
-    Returns:
-        Shape ``(n_segments,)``; the first is 1.
-    """
+def relative_to_first(elongation_m: ArrayLike) -> Array:
+    """Divides the elongations of segments, m, ``(n_segments,)``, by that of segment 1."""
     elongation = np.asarray(elongation_m, dtype=float)
     return elongation / elongation[0]

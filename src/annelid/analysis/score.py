@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.analysis.rhythm import (
     CONTRACTED,
     contractions,
+    in_order,
     is_continued,
     segment_activation,
     segment_intervals,
     startup_end,
 )
 from annelid.config import SnsController
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -98,20 +100,14 @@ def rhythm_score(run: Run, after_s: float = 0.0) -> RhythmScore:
         run: A run, opened with `annelid.open_run`.
         after_s: Judge only what comes after this simulated time, as if the run continued another, s.
 
-    Returns:
-        The score.
-
     Raises:
         ValueError: The run file holds no activation.
     """
-    if "activation" not in run.data:
-        raise ValueError(f"{run.path} holds no activation")
+    times, judged = _judged(run, "activation", after_s)
     controller = run.config.controller
     gate_ms = controller.gate_time_constant_ms if isinstance(controller, SnsController) else _DESIGN_GATE_MS
-    times = run.data["time"].values
-    judged = times >= after_s
     activation = segment_activation(run.data["activation"].values, run.config.body.n_segments)
-    return score(times[judged], activation[judged], DESIGN_INTERVAL_S * gate_ms / _DESIGN_GATE_MS)
+    return score(times, activation[judged], DESIGN_INTERVAL_S * gate_ms / _DESIGN_GATE_MS)
 
 
 def lengthening_score(run: Run, after_s: float = 0.0) -> RhythmScore:
@@ -121,23 +117,26 @@ def lengthening_score(run: Run, after_s: float = 0.0) -> RhythmScore:
     that is below 5 mm.
 
     Args:
-        run: A run, opened with `annelid.open_run`.
-        after_s: Judge only what comes after this simulated time, as if the run continued another, s.
-
-    Returns:
-        The score.
+        run: As for `rhythm_score`.
+        after_s: As for `rhythm_score`.
 
     Raises:
         ValueError: The run file holds no stretch sensors.
     """
-    if "stretch_length" not in run.data:
-        raise ValueError(f"{run.path} holds no stretch_length")
-    times = run.data["time"].values
-    judged = times >= after_s
+    times, judged = _judged(run, "stretch_length", after_s)
     lengthening = (run.data["stretch_length"] - run.data["stretch_rest_length"]).mean("sensor")
     lengthening = lengthening.transpose("time", "segment").values[judged]
     largest = np.maximum(lengthening.max(axis=0, initial=0.0), 2.0 * LEAST_LENGTHENING_M)
-    return score(times[judged], lengthening / largest)
+    return score(times, lengthening / largest)
+
+
+def _judged(run: Run, signal: str, after_s: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Times of the samples from one on, and which of all they are."""
+    if signal not in run.data:
+        raise ValueError(f"{run.path} holds no {signal}")
+    times = run.data["time"].values
+    judged = times >= after_s
+    return times[judged], judged
 
 
 def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_INTERVAL_S) -> RhythmScore:
@@ -188,16 +187,15 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     n = values.shape[1]
     if n < 3:
         raise ValueError(f"a rhythm needs at least 3 segments, not {n}")
-    found = [contractions(times, values[:, i], shortest_s=SHORTEST_S) for i in range(n)]
+    found = [contractions(times, of_segment, shortest_s=SHORTEST_S) for of_segment in values.T]
     onsets = [c[c[:, 0] > times[0], 0] if is_continued(times) else c[:, 0] for c in found]
-    events = sorted((float(onset), i + 1) for i, of_segment in enumerate(onsets) for onset in of_segment)
+    events = in_order(onsets)
     started = startup_end(times)
     judged = [of_segment[of_segment > started] for of_segment in onsets]
     periods = segment_intervals(onsets, started)
     cycle_lags = [_lags(judged[i], judged[(i + 1) % n]) for i in range(n)]
     lags = [np.concatenate([np.empty(0), *of_pair]) for of_pair in cycle_lags]
     pooled = np.concatenate(lags)
-
     from_s = min((of_segment[0] for of_segment in judged if of_segment.size), default=-np.inf)
     contracted = (values[times >= from_s] >= CONTRACTED).sum(axis=1)
     mean_contracted = float(contracted.mean()) if contracted.size else 0.0
@@ -207,9 +205,11 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     verdict: Verdict | None
     if silence := _silence(times, events, periods.size > 0, interval_s):
         stuck = [i + 1 for i, c in enumerate(found) if c.size and np.isinf(c[-1, 1])]
-        verdict, reason = "silent", f"stalled: {_named(stuck)} contracted" if stuck else silence
-    elif fault := _fault(cycle_lags):
-        verdict, reason = "disordered", fault
+        one = len(stuck) == 1
+        named = f"segment{'' if one else 's'} {', '.join(map(str, stuck))} stay{'s' if one else ''}"
+        verdict, reason = "silent", f"stalled: {named} contracted" if stuck else silence
+    elif pair := next((i + 1 for i, of_pair in enumerate(cycle_lags) if any(len(lag) != 1 for lag in of_pair)), 0):
+        verdict, reason = "disordered", f"segments {pair} and {pair % n + 1} do not take turns"
     elif min(map(len, onsets)) < 2 or min(map(len, lags)) < 1:
         verdict, reason = None, "too short: fewer than two cycles"
     elif period_cv is not None and period_cv > MOST_PERIOD_CV:
@@ -217,12 +217,16 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     elif min(map(_resultant, lags)) < LEAST_CONCENTRATION:
         verdict, reason = "disordered", "lags between neighbours wander"
     else:
-        winding, strays = _wave([_mean_phase(of_pair) for of_pair in lags])
-        if strays > WAVE_TOLERANCE or not 0 < winding < n:
+        mean_lags = [_mean_phase(of_pair) for of_pair in lags]
+        winding = round(sum(mean_lags))
+        # How far segments stray from the even wave, in steps of 1/N.
+        excess = np.cumsum([0.0, *mean_lags[:-1]]) - np.arange(n) * winding / n
+        if float(np.ptp(excess) / 2 * n) > WAVE_TOLERANCE or not 0 < winding < n:
             verdict, reason = "disordered", UNEVEN
         else:
             direction, fronts = _fronts(winding, n, mean_contracted)
-            verdict, reason = "ordered", _wave_in_words(direction, fronts)
+            way = {1: " from front to rear", -1: " from rear to front", 0: ""}[direction]
+            verdict, reason = "ordered", f"a wave of {fronts} front{'' if fronts == 1 else 's'}{way}"
     return RhythmScore(
         verdict=verdict,
         reason=reason,
@@ -237,16 +241,16 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     )
 
 
-def _lags(front: NDArray[np.float64], rear: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _lags(front: Array, rear: Array) -> list[Array]:
     """Lags of ``rear`` behind ``front``, an array for each cycle of either."""
     return [*_phases(front, rear), *(1.0 - phases for phases in _phases(rear, front))]
 
 
-def _phases(cycles: NDArray[np.float64], onsets: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def _phases(cycles: Array, onsets: Array) -> list[Array]:
     return [(onsets[(onsets >= a) & (onsets < b)] - a) / (b - a) for a, b in pairwise(cycles)]
 
 
-def _silence(times: NDArray[np.float64], events: Sequence[tuple[float, int]], cycled: bool, interval_s: float) -> str:
+def _silence(times: Array, events: Sequence[tuple[float, int]], cycled: bool, interval_s: float) -> str:
     """Says since when nothing has begun, or nothing while that is not long."""
     if not times.size:
         return ""
@@ -258,30 +262,13 @@ def _silence(times: NDArray[np.float64], events: Sequence[tuple[float, int]], cy
     return f"no contraction begins after {last:.2f} s" if events else "no contraction begins"
 
 
-def _fault(cycle_lags: Sequence[Sequence[NDArray[np.float64]]]) -> str:
-    """Names the first pair of neighbours that do not take turns, or nothing."""
-    for i, of_pair in enumerate(cycle_lags):
-        counts = [len(of_cycle) for of_cycle in of_pair]
-        if any(count != 1 for count in counts):
-            return f"segments {i + 1} and {(i + 1) % len(cycle_lags) + 1} do not take turns"
-    return ""
-
-
-def _resultant(phases: NDArray[np.float64]) -> float:
+def _resultant(phases: Array) -> float:
     return float(np.abs(np.exp(2j * np.pi * phases).mean()))
 
 
-def _mean_phase(phases: NDArray[np.float64]) -> float:
+def _mean_phase(phases: Array) -> float:
     """Circular mean, in [0, 1)."""
     return float(np.angle(np.exp(2j * np.pi * phases).mean()) / (2 * np.pi) % 1.0)
-
-
-def _wave(mean_lags: Sequence[float]) -> tuple[int, float]:
-    """Winding number of the lags round the ring, and how far a segment strays from an even wave, in steps of 1/N."""
-    n = len(mean_lags)
-    winding = round(sum(mean_lags))
-    excess = np.cumsum([0.0, *mean_lags[:-1]]) - np.arange(n) * winding / n
-    return winding, float(np.ptp(excess) / 2 * n)
 
 
 def _fronts(winding: int, n: int, mean_contracted: float) -> tuple[Literal[-1, 0, 1], int]:
@@ -291,14 +278,3 @@ def _fronts(winding: int, n: int, mean_contracted: float) -> tuple[Literal[-1, 0
     smaller, larger = sorted((winding, n - winding))
     fronts = larger if abs(mean_contracted - larger) <= COUNT_TOLERANCE else smaller
     return 1 if fronts == winding else -1, fronts
-
-
-def _wave_in_words(direction: int, fronts: int) -> str:
-    way = {1: " from front to rear", -1: " from rear to front", 0: ""}[direction]
-    return f"a wave of {fronts} front{'' if fronts == 1 else 's'}{way}"
-
-
-def _named(segments: Sequence[int]) -> str:
-    if len(segments) == 1:
-        return f"segment {segments[0]} stays"
-    return f"segments {', '.join(map(str, segments))} stay"

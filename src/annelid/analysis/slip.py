@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SlipCost:
-    """Speed and loss over whole cycles, from the second contraction of segment 1 to its last.
+    """Speed and loss over complete cycles, from the second contraction of segment 1 to its last.
 
     Attributes:
-        cycles: Number of whole cycles.
+        cycles: Number of complete cycles.
         period_s: Mean duration of a cycle, s.
         speed_m_per_s: Way of the centre of mass towards where the worm leads at first, over time, m/s.
         loss_W: Work lost to friction over time, W.
@@ -34,29 +34,12 @@ class SlipCost:
 
 
 def slip_cost(run: Run) -> SlipCost | None:
-    """Reads what a run lost to friction.
-
-    Args:
-        run: A run that recorded ``slip_loss``.
-
-    Returns:
-        The record; None where segment 1 contracts fewer than three times.
-    """
-    data, marks = run.data, cycle_marks(run)
+    """Reads what a run that recorded ``slip_loss`` lost to friction; None for fewer than three contractions."""
+    marks = cycle_marks(run)
     if len(marks) < 2:
         return None
-    time = data["time"].values
-    first, last = np.searchsorted(time, marks[[0, -1]])
-    duration = float(time[last] - time[first])
-    ahead = way_ahead(run)
-    way = float(ahead[last] - ahead[first])
-    loss = data["slip_loss"].values.sum(axis=1)
-    lost = float(loss[last] - loss[first])
+    ends = np.searchsorted(run.data["time"].values, marks[[0, -1]])
+    loss = run.data["slip_loss"].values.sum(axis=1)
+    duration, way, lost = (float(np.diff(each[ends])[0]) for each in (run.data["time"].values, way_ahead(run), loss))
     cycles = len(marks) - 1
-    return SlipCost(
-        cycles=cycles,
-        period_s=duration / cycles,
-        speed_m_per_s=way / duration,
-        loss_W=lost / duration,
-        loss_J_per_m=lost / way if way > 0.0 else float("inf"),
-    )
+    return SlipCost(cycles, duration / cycles, way / duration, lost / duration, lost / way if way > 0.0 else np.inf)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.elongation import Elongation, elongation, end_difference, middle_deficit
+from annelid.analysis.elongation import elongation, end_difference, middle_deficit
 from annelid.analysis.forces import contraction_forces, net_work, positive_work
-from annelid.analysis.rhythm import Rhythm, rhythm, segment_activation
+from annelid.analysis.rhythm import Rhythm, run_rhythm
 from annelid.analysis.travel import net_travel, path_travel, way_ahead
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,18 +105,16 @@ class Summary:
 
 
 def summary(run: Run) -> Summary:
-    """Reads the numbers of a run from its file.
+    """Reads the numbers of a run, opened with `annelid.open_run`.
 
-    Args:
-        run: A finished, stopped or interrupted run, opened with `annelid.simulation.runfile.open_run`.
-
-    Returns:
-        The record. Quantities whose variables the file lacks (a planar run has no edges) are None.
+    Quantities whose variables the file lacks (a planar run has no edges) are None.
     """
     data = run.data
     n_segments = run.config.body.n_segments
-    beat = _rhythm(data, n_segments)
-    read = _elongation(data)
+    beat = run_rhythm(run) or Rhythm((), (), None, None, None, 0)
+    read = None
+    if "stretch_length" in data and data.sizes.get("time"):
+        read = elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
     first_helix, mean = (read.first_helix_pp_m, read.mean_max_m) if read else (None, None)
     spread = read if read and data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
@@ -140,8 +139,8 @@ def summary(run: Run) -> Summary:
         end_difference=_number(end_difference(first_helix)) if first_helix is not None else None,
         contraction_force_median_N=_number(np.median(pulling)) if pulling.size else None,
         contraction_force_peak_N=_number(pulling.max()) if pulling.size else None,
-        segment_force_median_N=_of_each(forces, np.median),
-        segment_force_peak_N=_of_each(forces, np.max),
+        segment_force_median_N=_numbers([np.median(one) if one.size else None for one in forces] or None),
+        segment_force_peak_N=_numbers([one.max() if one.size else None for one in forces] or None),
         positive_work_J=_by_segment(positive_work(data), n_segments),
         muscle_work_J=_by_segment(net_work(data), n_segments),
         travel_m=_number(net_travel(ahead)),
@@ -155,32 +154,16 @@ def summary(run: Run) -> Summary:
     )
 
 
-def _rhythm(data: xr.Dataset, n_segments: int) -> Rhythm:
-    if "activation" not in data or not data.sizes.get("time"):
-        return Rhythm((), (), None, None, None, 0)
-    return rhythm(data["time"].values, segment_activation(data["activation"].values, n_segments))
-
-
-def _elongation(data: xr.Dataset) -> Elongation | None:
-    if "stretch_length" not in data or not data.sizes.get("time"):
-        return None
-    return elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
-
-
-def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[np.ndarray]:
+def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[Array]:
     """Forces while contracted, an array a segment; empty without muscles that have forces."""
     if "muscle_force" not in data or "activation" not in data:
         return []
+    muscles = np.split(np.arange(data.sizes["muscle"]), n_segments)
     force, activation = data["muscle_force"].values, data["activation"].values
-    by_segment = np.split(np.arange(force.shape[1]), n_segments)
-    return [contraction_forces(force[:, muscles], activation[:, muscles]) for muscles in by_segment]
+    return [contraction_forces(force[:, own], activation[:, own]) for own in muscles]
 
 
-def _of_each(forces: list[np.ndarray], number: Callable[[np.ndarray], Any]) -> list[float | None] | None:
-    return [_number(number(of_segment)) if of_segment.size else None for of_segment in forces] or None
-
-
-def _by_segment(of_muscles: np.ndarray | None, n_segments: int) -> list[float | None] | None:
+def _by_segment(of_muscles: Array | None, n_segments: int) -> list[float | None] | None:
     return None if of_muscles is None else _numbers(of_muscles.reshape(n_segments, -1).sum(axis=1))
 
 
@@ -196,10 +179,9 @@ def _largest(data: xr.Dataset, name: str) -> float | None:
     return _number(data[name].values.max()) if name in data and data[name].size else None
 
 
-def _number(value: Any) -> float | None:
-    number = math.nan if value is None else float(value)
-    return number if math.isfinite(number) else None
+def _number(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
 
 
-def _numbers(values: np.ndarray | None) -> list[float | None] | None:
+def _numbers(values: Iterable[float | None] | None) -> list[float | None] | None:
     return None if values is None else [_number(value) for value in values]

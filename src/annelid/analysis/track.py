@@ -1,4 +1,4 @@
-"""Where a worm crawled, seen from above: its track, its outline, and how it turned."""
+"""Where a worm crawled, seen from above: its track, its outline, how it turned, and the circle through it."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from annelid.config import WormBody
 from annelid.errors import RunFileError
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-Array = NDArray[np.float64]
+_CLEARLY = 3.0
+"""An arc is one where it bulges by more than this many times what the points are off it."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +93,10 @@ def track_of(run: Run) -> Track:
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """How a worm turned over whole cycles.
+    """How a worm turned over complete cycles.
 
     Attributes:
-        cycles: Whole cycles between the two ends.
+        cycles: Complete cycles between the two ends.
         angle_rad: Change of the heading, positive to the left.
         path_m: Length of the way of the middle of the body, from cycle to cycle.
         curvature_per_m: Angle over path; positive to the left.
@@ -112,7 +114,7 @@ class Turn:
 
 
 def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
-    """Measures the turn over as many whole cycles as there are.
+    """Measures the turn over as many complete cycles as there are.
 
     Samples a cycle apart are compared, so that the swings within a cycle do not count; angle and path are means over
     every phase of the cycle.
@@ -123,12 +125,11 @@ def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
         after_s: Time from which on it is measured, so that the start is left out.
 
     Raises:
-        RunFileError: Less than one whole cycle behind ``after_s``.
+        RunFileError: Less than two complete cycles behind ``after_s``.
     """
     first, last = max(after_s, float(track.time_s[0])), float(track.time_s[-1])
-    cycles = int((last - first) / period_s + 1e-9) if period_s > 0 else 0
-    # The last whole cycle serves to average over its phases.
-    hops = cycles - 1
+    # The last complete cycle serves to average over its phases.
+    hops = int((last - first) / period_s + 1e-9) - 1 if period_s > 0 else 0
     if hops < 1:
         raise RunFileError(
             f"a turn takes at least two cycles of {period_s:g} s, not the {last - first:.4g} s from {first:.4g} s on"
@@ -139,3 +140,63 @@ def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
     path = float(np.hypot(np.diff(x, axis=1), np.diff(y, axis=1)).sum(axis=1).mean())
     angle = float((heading[:, -1] - heading[:, 0]).mean())
     return Turn(hops, angle, path, angle / path if path > 0 else float("nan"))
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle fitted to a track.
+
+    Attributes:
+        centre_m: Its centre, x and y, m.
+        radius_m: Its radius, m.
+        angle_rad: Angle that the track covers seen from the centre, positive to the left (from x to y), rad.
+        off_m: Root mean square of the points' distances from the circle, m.
+    """
+
+    centre_m: tuple[float, float]
+    radius_m: float
+    angle_rad: float
+    off_m: float
+
+    @property
+    def signed_radius_m(self) -> float:
+        """The radius, positive for a track that turns left, m."""
+        return self.radius_m if self.angle_rad > 0 else -self.radius_m
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the track bends clearly more than it swings: by how far its arc stands off the chord."""
+        bulge_m = self.radius_m * (1.0 - float(np.cos(min(abs(self.angle_rad) / 2, np.pi))))
+        return bulge_m > _CLEARLY * self.off_m and bulge_m > 1e-9 * self.radius_m
+
+
+def fitted_circle(points_m: ArrayLike) -> Circle | None:
+    """Fits a circle to points of a track in the order of time; None for fewer than three or for points on a line.
+
+    The sum of ``(|p|^2 + b . p + c)^2`` over its mean squared slope is smallest (Taubin 1991), which unlike plain
+    least squares does not draw the radius of a short noisy arc in.
+
+    Args:
+        points_m: Positions seen from above, m, ``(n, 2)``.
+    """
+    points = np.asarray(points_m, dtype=float)
+    if len(points) < 3:
+        return None
+    middle = points.mean(axis=0)
+    x, y = (points - middle).T
+    square = x * x + y * y
+    mean = square.mean()
+    if not mean > 0:
+        return None
+    columns = np.stack([(square - mean) / (2.0 * np.sqrt(mean)), x, y], axis=-1)
+    a, b, c = np.linalg.svd(columns, full_matrices=False)[2][-1]
+    curved = a / (2.0 * np.sqrt(mean))
+    if abs(curved) * np.sqrt(mean) < 1e-9:
+        return None
+    centre = -np.array([b, c]) / (2.0 * curved)
+    radius = float(np.sqrt(centre @ centre + mean))
+    away = np.hypot(x - centre[0], y - centre[1])
+    angle = np.unwrap(np.arctan2(y - centre[1], x - centre[0]))
+    off = float(np.sqrt(((away - radius) ** 2).mean()))
+    place = middle + centre
+    return Circle((float(place[0]), float(place[1])), radius, float(angle[-1] - angle[0]), off)

@@ -5,29 +5,30 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.config import WormBody
 from annelid.morphology import heading_turn
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-FORWARDS = np.array([-1.0, 0.0])
-"""Where a worm leads in its own axes, seen from above."""
+# Where a worm leads in its own axes, seen from above.
+_FORWARDS = np.array([-1.0, 0.0])
 
 
-def first_heading(run: Run) -> NDArray[np.float64]:
+def first_heading(run: Run) -> Array:
     """Returns the direction in which a run's worm leads at the start, seen from above, ``(2,)``."""
     body = run.config.body
     heading_deg = body.heading_deg if isinstance(body, WormBody) else 0.0
-    return heading_turn(heading_deg)[:2, :2] @ FORWARDS if heading_deg else FORWARDS
+    return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
 
 
-def way_ahead(run: Run) -> NDArray[np.float64]:
+def way_ahead(run: Run) -> Array:
     """Returns how far the centre of mass is where the worm leads at the start, m from the origin, ``(n_times,)``."""
     ahead, centre = first_heading(run), run.data["center_of_mass"]
-    along: NDArray[np.float64] = ahead[0] * centre.sel(axis="x").values
+    along: Array = ahead[0] * centre.sel(axis="x").values
     # A planar worm moves along x alone.
     return along + ahead[1] * centre.sel(axis="y").values if ahead[1] else along
 

@@ -10,7 +10,7 @@ from annelid.draw.table import Row, quantity
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from annelid.analysis.balance import EnergyBalance
+    from annelid.analysis.gait import EnergyBalance
 
 GAIT_ROWS: dict[str, Row] = {
     "slip_ratio": ("slip ratio", 100.0, 1, "%"),

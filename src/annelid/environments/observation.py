@@ -11,13 +11,13 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.environments.way import Place
-from annelid.morphology import Array, MeshGeometry
+from annelid.morphology import Array
 from annelid.protocols import SIDES, Sensation
 from annelid.simulation.worm import Worm
 
 Observation = NDArray[np.float32]
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
-"""What the worm's weight is reckoned with, whatever acts on it."""
+"""What the worm's weight is computed with, whatever acts on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,27 +93,21 @@ class Layout:
 def layout_of(worm: Worm) -> Layout:
     """Returns how a worm's observations are laid out."""
     n, m, sensors = worm.n_segments, worm.n_muscles, worm.anatomy.rest_stretch_m.shape
-    speed = "body lengths/s"
+    ring = "change of a ring muscle's length since the start, of that length"
+    stretch = "change of a stretch sensor's length from that at rest, of that length"
+    touch = "normal force of the ground on belly, left, back, right"
+    heading = "unit vector from the last ring to the first, along the axes below"
+    upright = "how far the middle ring's back and left side point upwards"
+    velocity = "of the worm's middle over the last step, along the axes below"
     return Layout(
         (
-            Entry(
-                "ring_strain", (m,), "1", -1.0, 1.0, "change of a ring muscle's length since the start, of that length"
-            ),
+            Entry("ring_strain", (m,), "1", -1.0, 1.0, ring),
             Entry("ring_rate", (m,), "1/s", -5.0, 5.0, "how fast the same has changed over the last step"),
-            Entry(
-                "stretch_strain",
-                sensors,
-                "1",
-                -2.0,
-                2.0,
-                "change of a stretch sensor's length from that at rest, of that length",
-            ),
-            Entry(
-                "touch", (n, len(SIDES)), "weights", 0.0, 2.0, "normal force of the ground on belly, left, back, right"
-            ),
-            Entry("heading", (3,), "1", -1.0, 1.0, "unit vector from the last ring to the first, along the axes below"),
-            Entry("upright", (2,), "1", -1.0, 1.0, "how far the middle ring's back and left side point upwards"),
-            Entry("velocity", (3,), speed, -1.0, 1.0, "of the worm's middle over the last step, along the axes below"),
+            Entry("stretch_strain", sensors, "1", -2.0, 2.0, stretch),
+            Entry("touch", (n, len(SIDES)), "weights", 0.0, 2.0, touch),
+            Entry("heading", (3,), "1", -1.0, 1.0, heading),
+            Entry("upright", (2,), "1", -1.0, 1.0, upright),
+            Entry("velocity", (3,), "body lengths/s", -1.0, 1.0, velocity),
             Entry("activation", (m,), "1", 0.0, 1.0, "of the ring muscles at the end of the last step"),
         )
     )
@@ -135,7 +129,10 @@ class Senses:
         self._weight_N = worm.total_mass_kg * STANDARD_GRAVITY_M_PER_S2
         self._rest_m = worm.posture.ring_length.copy()
         self._middle_ring = geometry.rings[geometry.n_segments // 2]
-        self._outwards = _outwards(geometry, self._middle_ring)
+        away = geometry.crossings_m[self._middle_ring]
+        away = away - away.mean(axis=0)
+        # Weights that make of the ring's corners its back and its left side.
+        self._outwards = np.stack([away[:, 2], -away[:, 1]])
 
     def values(
         self, worm: Worm, felt: Sensation, before_m: Array, place: Place, moved_m: Array, activation: Array
@@ -151,26 +148,15 @@ class Senses:
             activation: Of its muscles, ``(n_muscles,)``.
         """
         ring_m = felt.ring_length_m
+        corners = worm.posture.crossing[self._middle_ring]
+        sides = self._outwards @ (corners - corners.mean(axis=0))
         return {
             "ring_strain": ring_m / self._rest_m - 1.0,
             "ring_rate": (ring_m - before_m) / (self._rest_m * self._interval_s),
             "stretch_strain": felt.stretch_m / felt.rest_stretch_m - 1.0,
             "touch": felt.touch_N / self._weight_N,
             "heading": place.axes @ felt.heading,
-            "upright": self._upright(worm.posture.crossing, place.axes[2]),
+            "upright": sides @ place.axes[2] / np.sqrt((sides * sides).sum(axis=1)),
             "velocity": place.axes @ moved_m / (self._length_m * self._interval_s),
             "activation": activation,
         }
-
-    def _upright(self, crossing_m: Array, up: Array) -> Array:
-        """How far the middle ring's back and left side point upwards, ``(2,)``."""
-        corners = crossing_m[self._middle_ring]
-        sides = self._outwards @ (corners - corners.mean(axis=0))
-        return sides @ up / np.sqrt((sides * sides).sum(axis=1))
-
-
-def _outwards(geometry: MeshGeometry, ring: NDArray[np.int64]) -> Array:
-    """Weights that make of a ring's corners its back and its left side, ``(2, n_corners)``."""
-    corners = geometry.crossings_m[ring]
-    away = corners - corners.mean(axis=0)
-    return np.stack([away[:, 2], -away[:, 1]])

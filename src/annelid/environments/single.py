@@ -163,21 +163,13 @@ def action_space(worm: Worm) -> Box[np.float32]:
 
 
 def refuse_options(options: Mapping[str, Any] | None) -> None:
-    """Refuses options of a reset, of which there are none.
-
-    Raises:
-        ConfigError: There is one.
-    """
+    """Raises `ConfigError` for options of a reset, of which there are none."""
     for name in options or {}:
         raise ConfigError(f"reset() has no option {name!r}: fields are changed where the environment is made")
 
 
 def checked_render_mode(mode: str | None) -> str | None:
-    """Returns a render mode that there is.
-
-    Raises:
-        ConfigError: There is no such mode.
-    """
+    """Returns a render mode, or raises `ConfigError` where there is none of that name."""
     if mode is not None and mode not in RENDER_MODES:
         raise ConfigError(f"unknown render_mode {mode!r}: {suggest(mode, RENDER_MODES)}")
     return mode

@@ -111,7 +111,10 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             for own in given
         ]
         self.num_envs = num_envs
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        names = [mode.value for mode in AutoresetMode]
+        if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in names:
+            raise ConfigError(f"unknown autoreset_mode {autoreset_mode!r}: {suggest(autoreset_mode, names)}")
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.render_mode = checked_render_mode(render_mode)
         fps = round(1 / interval_s) or 1
         self.metadata = {**WormEnv.metadata, "render_fps": fps, "autoreset_mode": self.autoreset_mode}
@@ -154,7 +157,11 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             ConfigError: Seeds, mask or options that cannot be.
         """
         options = dict(options or {})
-        mask = _checked_mask(options.pop("reset_mask", None), self.num_envs)
+        n = self.num_envs
+        mask = options.pop("reset_mask", None)
+        mask = np.ones(n, dtype=bool) if mask is None else mask
+        if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (n,) and mask.any()):
+            raise ConfigError(f"reset_mask must be an array of truth values of shape ({n},) with at least one true")
         refuse_options(options)
         self._seed(seed, mask)
         infos: dict[str, Any] = {}
@@ -180,7 +187,10 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
             raise ConfigError(f"the actions have shape {actions.shape}: must be {self.action_space.shape}")
         restarted = self._ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
         ramps = {row: self._episodes[row].activations(actions[row]) for row in map(int, np.flatnonzero(~restarted))}
-        self._move(ramps)
+        if self._pool is None:
+            self._teams[0].move(ramps)
+        else:
+            list(self._pool.map(lambda team: team.move(ramps), self._teams))
         rewards, terminated, truncated = np.zeros(self.num_envs), *np.zeros((2, self.num_envs), dtype=bool)
         infos: dict[str, Any] = {}
         for row, episode in enumerate(self._episodes):
@@ -211,13 +221,6 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._pictures.close()
         if self._pool is not None:
             self._pool.shutdown()
-
-    def _move(self, ramps: Mapping[int, Array]) -> None:
-        """Has every team move those of its worms that have activations."""
-        if self._pool is None:
-            self._teams[0].move(ramps)
-        else:
-            list(self._pool.map(lambda team: team.move(ramps), self._teams))
 
     def _restart(self, row: int) -> dict[str, Any]:
         """Puts one worm at its start and returns its info."""
@@ -258,37 +261,12 @@ class _Team:
         """
         own = {row: ramps[self._first + row] for row in range(len(self.episodes)) if self._first + row in ramps}
         for k in range(len(next(iter(own.values()), ()))):
-            self._move_once({row: ramp[k] for row, ramp in own.items() if not self.episodes[row].stopped})
-
-    def _move_once(self, activation: Mapping[int, Array]) -> None:
-        """Takes one physics step with some of the worms."""
-        rows = list(activation)
-        if not rows:
-            return
-        reasons = self._bodies.move(rows, np.stack(list(activation.values())), 1)
-        for row, reason in reasons.items():
-            self.episodes[row].stop(reason)
-        going = [row for row in rows if row not in reasons]
-        if not going:
-            return
-        for row, moved in zip(going, self._bodies.moved(going), strict=True):
-            self.episodes[row].felt(self._bodies.worms[row].strode(1, moved))
-
-
-def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
-    """Returns the mode of that name, as Gymnasium spells it."""
-    if isinstance(mode, AutoresetMode):
-        return mode
-    names = [one.value for one in AutoresetMode]
-    if mode not in names:
-        raise ConfigError(f"unknown autoreset_mode {mode!r}: {suggest(mode, names)}")
-    return AutoresetMode(mode)
-
-
-def _checked_mask(mask: Any, n: int) -> Flags:
-    """Returns which worms are reset; all without a mask."""
-    if mask is None:
-        return np.ones(n, dtype=bool)
-    if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (n,) and mask.any()):
-        raise ConfigError(f"reset_mask must be an array of truth values of shape ({n},) with at least one true")
-    return mask
+            rows = [row for row in own if not self.episodes[row].stopped]
+            if not rows:
+                return
+            reasons = self._bodies.move(rows, np.stack([own[row][k] for row in rows]), 1)
+            for row, reason in reasons.items():
+                self.episodes[row].stop(reason)
+            going = [row for row in rows if row not in reasons]
+            for row, moved in zip(going, self._bodies.moved(going) if going else (), strict=True):
+                self.episodes[row].felt(self._bodies.worms[row].strode(1, moved))

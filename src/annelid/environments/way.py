@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,39 +26,20 @@ class Place(NamedTuple):
     axes: Array
 
 
-class Way(Protocol):
-    """Tells how far along a worm is."""
+class Way:
+    """Tells how far along a worm is: straight ahead, or on a pipe's centre line from where its front starts."""
 
-    def place(self, ring_centre_m: Array) -> Place:
-        """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
-        ...
-
-
-class Ahead:
-    """Straight ahead, where the worm leads at the start."""
-
-    def __init__(self, heading_deg: float) -> None:
+    def __init__(self, course: Course | None, heading_deg: float) -> None:
+        self._course = course
         self._axes = STRAIGHT @ heading_turn(heading_deg).T
 
     def place(self, ring_centre_m: Array) -> Place:
         """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
-        return Place(float(ring_centre_m.mean(axis=0) @ self._axes[0]), self._axes)
-
-
-class AlongPipe:
-    """Along a pipe's centre line, counted from where the worm's front is at the start.
-
-    Attributes:
-        course: The centre line.
-    """
-
-    def __init__(self, course: Course) -> None:
-        self.course = course
-
-    def place(self, ring_centre_m: Array) -> Place:
-        """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""
-        along = float(self.course.nearest(ring_centre_m).arc_m.mean())
-        tangent = self.course.nearest(ring_centre_m.mean(axis=0)[np.newaxis]).tangent[0]
+        middle = ring_centre_m.mean(axis=0)
+        if self._course is None:
+            return Place(float(middle @ self._axes[0]), self._axes)
+        along = float(self._course.nearest(ring_centre_m).arc_m.mean())
+        tangent = self._course.nearest(middle[np.newaxis]).tangent[0]
         left = np.cross(UP, tangent)
         left /= np.sqrt(left @ left)
         return Place(along, np.stack([tangent, left, np.cross(tangent, left)]))
@@ -66,4 +47,4 @@ class AlongPipe:
 
 def way_of(arena: Arena, heading_deg: float = 0.0) -> Way:
     """Returns the way through an arena of a worm that starts with a heading."""
-    return AlongPipe(course_of(arena)) if isinstance(arena, Pipe) else Ahead(heading_deg)
+    return Way(course_of(arena) if isinstance(arena, Pipe) else None, heading_deg)

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING
 
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError, suggest
-from annelid.export.delimited import write_table
 from annelid.export.matlab import write_matlab
 from annelid.export.mjcf import write_mjcf
 from annelid.export.page import write_page
-from annelid.export.parquet import write_parquet
-from annelid.export.tables import Table, about, tables_of
+from annelid.export.tables import Table, about, tables_of, write_parquet, write_table
 from annelid.output import with_suffix, write_json
 
 if TYPE_CHECKING:
@@ -53,11 +51,7 @@ class Format:
         return not Path(self.default).suffix
 
     def require(self) -> None:
-        """Makes sure that what it needs is installed.
-
-        Raises:
-            MissingDependency: It is not.
-        """
+        """Raises `MissingDependency` where what it needs is not installed."""
         if self.package is not None and find_spec(self.package) is None:
             raise MissingDependency(
                 f"exporting to {self.name} needs {self.package}: install it with  pip install 'annelid[export]'"
@@ -99,7 +93,7 @@ def _parquet(run: Run, path: Path, progress: Progress) -> list[Path]:
 
     def write(table: Table, file: Path, wrote: Callable[[int], None]) -> Path:
         write_parquet(table, file, facts)
-        wrote(table.n_rows)
+        wrote(len(table[0].values))
         return file
 
     return _tables(run, path, ".parquet", write, progress)
@@ -120,12 +114,11 @@ def _tables(
     tables = tables_of(run)
     alone = path.suffix.lower() == suffix
     if alone and len(tables) != 1:
-        names = ", ".join(table.name for table in tables)
         raise RunFileError(
-            f"{path} is one file, but these signals make {len(tables)} tables ({names}): name a folder, or choose "
-            "signals of the same dimensions with --signals"
+            f"{path} is one file, but these signals make {len(tables)} tables ({', '.join(tables)}): name a folder, "
+            "or choose signals of the same dimensions with --signals"
         )
-    total, done = sum(table.n_rows for table in tables), 0
+    total, done = sum(len(table[0].values) for table in tables.values()), 0
 
     def wrote(rows: int) -> None:
         nonlocal done
@@ -133,38 +126,24 @@ def _tables(
         progress(done, total)
 
     (path.parent if alone else path).mkdir(parents=True, exist_ok=True)
-    return [write(table, path if alone else path / f"{table.name}{suffix}", wrote) for table in tables]
-
-
-def _matlab(run: Run, path: Path, progress: Progress) -> list[Path]:
-    return [write_matlab(run, path)]
-
-
-def _mp4(run: Run, path: Path, progress: Progress) -> list[Path]:
-    return [render_video(run, path, progress=progress)]
-
-
-def _gif(run: Run, path: Path, progress: Progress) -> list[Path]:
-    return [render_video(run, path, fps=GIF_FPS, progress=progress)]
-
-
-def _html(run: Run, path: Path, progress: Progress) -> list[Path]:
-    return [write_page(run, path, progress)]
-
-
-def _mjcf(run: Run, path: Path, progress: Progress) -> list[Path]:
-    return [write_mjcf(run, path)]
+    return [write(table, path if alone else path / f"{name}{suffix}", wrote) for name, table in tables.items()]
 
 
 FORMATS = {
     each.name: each
     for each in (
         Format("csv", "csv", ".csv", SELECTION, _csv),
-        Format("mat", "run.mat", ".mat", SELECTION, _matlab, "scipy"),
+        Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)], "scipy"),
         Format("parquet", "parquet", ".parquet", SELECTION, _parquet, "pyarrow"),
-        Format("mp4", "video.mp4", ".mp4", WINDOW, _mp4),
-        Format("gif", "video.gif", ".gif", WINDOW, _gif),
-        Format("html", "report.html", ".html", WINDOW, _html),
-        Format("mjcf", "worm.xml", ".xml", frozenset(), _mjcf),
+        Format("mp4", "video.mp4", ".mp4", WINDOW, lambda run, path, told: [render_video(run, path, progress=told)]),
+        Format(
+            "gif",
+            "video.gif",
+            ".gif",
+            WINDOW,
+            lambda run, path, told: [render_video(run, path, fps=GIF_FPS, progress=told)],
+        ),
+        Format("html", "report.html", ".html", WINDOW, lambda run, path, told: [write_page(run, path, told)]),
+        Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)]),
     )
 }

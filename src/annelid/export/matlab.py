@@ -53,12 +53,7 @@ def write_matlab(run: Run, path: Path) -> Path:
 
 
 def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
-    """Returns a legal and distinct MATLAB name for each name: letters, digits and underscores after a letter.
-
-    Args:
-        names: Any names.
-        taken: Names that none may get.
-    """
+    """Returns a legal and distinct MATLAB name for each name, none of those taken: letters, digits and underscores."""
     legal: dict[str, str] = {}
     used = set(taken)
     for name in names:
@@ -84,12 +79,14 @@ def matlab_value(value: Any) -> Any:
         names = matlab_names(value)
         return {names[key]: matlab_value(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        if value and all(isinstance(item, int | float) and not isinstance(item, bool) for item in value):
+        if value and all(map(_is_number, value)):
             return np.array([value], dtype=float)
         cells = np.empty((1, len(value)), dtype=object)
         for i, item in enumerate(value):
             cells[0, i] = matlab_value(item)
         return cells
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
-    return value
+    return float(value) if _is_number(value) else value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -23,8 +23,6 @@ from annelid.references import bibtex, references_of
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-Picture = tuple[str, Callable[["Run", Path], Path], str]
-
 
 def write_page(run: Run, path: Path, progress: Progress = lambda done, total: None) -> Path:
     """Writes the page of a run; a figure that cannot be drawn leaves the reason in its place.
@@ -39,19 +37,17 @@ def write_page(run: Run, path: Path, progress: Progress = lambda done, total: No
     """
     with TemporaryDirectory() as temporary:
         figures = _figures(run, Path(temporary), progress)
-        blocks = [*_numbers(run), *figures, *_configuration(run.config), *_to_cite(run)]
+        cited = ["## To cite", f"```bibtex\n{bibtex(references_of(run.config))}```"]
+        blocks = [*_numbers(run), *figures, *_configuration(run.config), *cited]
         headings = [block.removeprefix("## ") for block in blocks if block.startswith("## ")]
         links = zip(headings, anchors(headings), strict=True)
         contents = "\n".join(f"- [{heading}](#{anchor})" for heading, anchor in links)
-        html = page(_title(run), _head(run), contents, "\n\n".join(blocks), Path(temporary))
+        times = run.data["time"].values
+        title = f"{run.config.name}: {run.config.body.n_segments} segments, {times[0]:g} to {times[-1]:g} s"
+        html = page(title, f"# {words(title)}\n\n{_head(run)}", contents, "\n\n".join(blocks), Path(temporary))
     with whole_file(path) as draft:
         draft.write_text(html, encoding="utf-8")
     return path
-
-
-def _title(run: Run) -> str:
-    times = run.data["time"].values
-    return f"{run.config.name}: {run.config.body.n_segments} segments, {times[0]:g} to {times[-1]:g} s"
 
 
 def _head(run: Run) -> str:
@@ -63,7 +59,7 @@ def _head(run: Run) -> str:
         f"{attrs['platform']}",
         f"run of {attrs['created']}",
     ]
-    return "\n\n".join([f"# {words(_title(run))}", words(run.config.summary), " · ".join(map(words, facts))])
+    return f"{words(run.config.summary)}\n\n{' · '.join(map(words, facts))}"
 
 
 def _numbers(run: Run) -> list[str]:
@@ -78,8 +74,15 @@ def _numbers(run: Run) -> list[str]:
 
 
 def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:
+    frames = run.data["frame_time"].values
+    middle = float(frames[len(frames) // 2]) if frames.size else 0.0
+    pictures: list[tuple[str, Callable[[Run, Path], object], str]] = [
+        ("frame.png", lambda run, path: render_frame(run, middle, path), f"The worm at {middle:g} s."),
+        ("figure7.png", figure7, "Potentials of the half-centres, contractions, and lengths of the stretch sensors."),
+    ]
+    if not isinstance(run.config.body, PlanarWorm):
+        pictures.append(("track.png", track_figure, "Where it crawled, seen from above."))
     blocks = ["## Figures"]
-    pictures = _pictures(run)
     for done, (name, draw, caption) in enumerate(pictures, start=1):
         try:
             draw(run, folder / name)
@@ -88,18 +91,6 @@ def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:
             blocks.append(emphasis(f"Not drawn: {error}."))
         progress(done, len(pictures))
     return blocks
-
-
-def _pictures(run: Run) -> list[Picture]:
-    """File, how it is drawn, and caption of every figure that this kind of worm can have."""
-    frames = run.data["frame_time"].values
-    middle = float(frames[len(frames) // 2]) if frames.size else 0.0
-    planar = isinstance(run.config.body, PlanarWorm)
-    pictures: list[Picture] = [
-        ("frame.png", lambda run, path: render_frame(run, middle, path), f"The worm at {middle:g} s."),
-        ("figure7.png", figure7, "Potentials of the half-centres, contractions, and lengths of the stretch sensors."),
-    ]
-    return pictures if planar else [*pictures, ("track.png", track_figure, "Where it crawled, seen from above.")]
 
 
 def _configuration(config: RunConfig) -> list[str]:
@@ -112,7 +103,3 @@ def _configuration(config: RunConfig) -> list[str]:
         sections.setdefault(section or "run", []).append([code(name), code(shown), words(meaning)])
     tables = [(f"### {words(name)}", table(["field", "value", "meaning"], rows)) for name, rows in sections.items()]
     return ["## Configuration", *(block for pair in tables for block in pair)]
-
-
-def _to_cite(run: Run) -> list[str]:
-    return ["## To cite", f"```bibtex\n{bibtex(references_of(run.config))}```"]

@@ -64,9 +64,8 @@ def selected(run: Run, selection: Selection) -> Run:
 
 def _kept(times_s: np.ndarray, selection: Selection) -> np.ndarray:
     """Returns the indices of the times that are wanted, to within rounding."""
-    slack = 1e-9
-    start = -np.inf if selection.start_s is None else selection.start_s - slack
-    stop = np.inf if selection.stop_s is None else selection.stop_s + slack
+    start = -np.inf if selection.start_s is None else selection.start_s - 1e-9
+    stop = np.inf if selection.stop_s is None else selection.stop_s + 1e-9
     return np.flatnonzero((times_s >= start) & (times_s <= stop))[:: selection.every]
 
 
@@ -74,10 +73,6 @@ def _nothing(run: Run, selection: Selection) -> str:
     times = run.data["time"].values
     if not times.size:
         return f"{run.path} holds no samples"
-    bounds = [f"{words} {bound:g} s" for words, bound in _bounds(selection)]
-    return f"{run.path} holds no sample {' '.join(bounds)}: it goes from {times[0]:g} to {times[-1]:g} s"
-
-
-def _bounds(selection: Selection) -> list[tuple[str, float]]:
     bounds = (("from", selection.start_s), ("to", selection.stop_s))
-    return [(words, bound) for words, bound in bounds if bound is not None]
+    asked = " ".join(f"{words} {bound:g} s" for words, bound in bounds if bound is not None)
+    return f"{run.path} holds no sample {asked}: it goes from {times[0]:g} to {times[-1]:g} s"

@@ -27,8 +27,7 @@ import numpy as np
 
 from annelid.config import Boxerbaum2012Body, Clock
 from annelid.planar.dynamic import DynamicPlanarPlant
-from annelid.planar.linkage import Linkage, Muscles
-from annelid.protocols import Array
+from annelid.planar.linkage import Linkage
 
 
 class Boxerbaum2012Plant(DynamicPlanarPlant):
@@ -48,7 +47,13 @@ def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
     """Returns the mechanics of the worm: four links a segment, the halves of its upper sides from front to rear."""
     n = body.n_segments
     n_links, n_coordinates = 4 * n, 2 * n + 1
-    rises = _rises(n)
+    rises = np.zeros((n, 4, n_coordinates))
+    segment = np.arange(n)
+    front, rear = n + segment, n + 1 + segment
+    rises[segment, 0, front] = rises[segment, 3, rear] = 1.0
+    rises[segment, 1, segment] = rises[segment, 2, segment] = 0.5
+    rises[segment, 1, front] = rises[segment, 2, rear] = -1.0
+    rises = rises.reshape(n_links, n_coordinates)
     # Lumps in order along the upper half: a joint, a side's middle, a vertex, a middle; and the last joint.
     lump_runs = np.tril(np.ones((n_links + 1, n_links)), -1)
     places = np.arange(n_links + 1) % 4
@@ -59,7 +64,7 @@ def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
     mass = np.array([body.joint_mass_kg, middle, vertex, middle])
     bend = np.kron(np.eye(n), np.array([[-1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]]))
     return Linkage(
-        n_segments=n,
+        body=body,
         rises=rises,
         link_length_m=np.full(n_links, body.side_m / 2.0),
         lump_runs=lump_runs,
@@ -71,21 +76,6 @@ def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
         straight=np.repeat([0.0, 1.0, 0.25], [1, n, n + 1]),
         # Each row stands for the upper and the lower side, hence the root of two.
         hinges=np.sqrt(2.0) * bend,
-        rest_length_m=np.sqrt((2.0 * body.side_m) ** 2 - body.height_relaxed_m**2),
-        spring_stiffness_N_per_m=body.spring_stiffness_N_per_m,
         torsion_stiffness_Nm_per_rad=body.torsion_stiffness_Nm_per_rad,
         torsion_damping_Nms_per_rad=body.torsion_damping_Nms_per_rad,
-        height_damping_Ns_per_m=body.height_damping_Ns_per_m,
-        muscles=Muscles(body.muscle_force_N, body.height_relaxed_m, body.height_shortest_m),
     )
-
-
-def _rises(n: int) -> Array:
-    """Rises of the links by heights and joints, shape ``(4 n, 2 n + 1)``."""
-    rises = np.zeros((n, 4, 2 * n + 1))
-    segment = np.arange(n)
-    front, rear = n + segment, n + 1 + segment
-    rises[segment, 0, front] = rises[segment, 3, rear] = 1.0
-    rises[segment, 1, segment] = rises[segment, 2, segment] = 0.5
-    rises[segment, 1, front] = rises[segment, 2, rear] = -1.0
-    return rises.reshape(4 * n, 2 * n + 1)

@@ -28,7 +28,7 @@ import numpy as np
 
 from annelid.config import Clock, Daltorio2013Body
 from annelid.planar.dynamic import DynamicPlanarPlant
-from annelid.planar.linkage import Linkage, Muscles
+from annelid.planar.linkage import Linkage
 
 
 class Daltorio2013Plant(DynamicPlanarPlant):
@@ -53,7 +53,7 @@ def daltorio_linkage(body: Daltorio2013Body) -> Linkage:
     lump_heights = np.concatenate([np.zeros((n + 1, n)), 0.5 * np.eye(n)])
     vertices = np.arange(n + 1, 2 * n + 1)
     return Linkage(
-        n_segments=n,
+        body=body,
         rises=0.5 * np.eye(n),
         link_length_m=np.full(n, body.side_m),
         lump_runs=lump_runs,
@@ -64,12 +64,8 @@ def daltorio_linkage(body: Daltorio2013Body) -> Linkage:
         segment_runs=2.0 * np.eye(n),
         straight=np.append(0.0, np.ones(n)),
         hinges=np.diff(np.eye(n), axis=0),
-        rest_length_m=np.sqrt((2.0 * body.side_m) ** 2 - body.height_relaxed_m**2),
-        spring_stiffness_N_per_m=body.spring_stiffness_N_per_m,
         torsion_stiffness_Nm_per_rad=body.torsion_stiffness_Nm_per_rad,
         torsion_damping_Nms_per_rad=body.torsion_damping_Nms_per_rad,
-        height_damping_Ns_per_m=body.height_damping_Ns_per_m,
-        muscles=Muscles(body.muscle_force_N, body.height_relaxed_m, body.height_shortest_m),
         wall_radius_m=body.pipe_diameter_m / 2.0,
         wall_stiffness_N_per_m=body.wall_stiffness_N_per_m,
         friction=body.wall_friction,

@@ -1,4 +1,4 @@
-"""The face that the dynamic planar worms show as plants: sensation, recording, saving, and the alarm."""
+"""The dynamic planar worms as plants: sensation, recording, saving, and the alarm."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from annelid.protocols import Array, Recordable, Sensation, Signal, State
 
 _STEEPEST = 0.9999
 _HALVINGS = 80
+# What the state has for every segment: last forces, N, and energies so far, J.
+_OF_SEGMENTS = ("muscle_force", "friction", "muscle_work", "positive_work", "slip_loss")
 
 
 class DynamicPlanarPlant:
@@ -25,8 +27,8 @@ class DynamicPlanarPlant:
     lies unactuated. ``contact_force`` is the force of the walls along x on both vertices, and along z that of the lower
     wall; the upper one presses with the same force the other way. The centre of mass stays on the axis.
 
-    All energies are booked: kinetic + elastic = muscle work - damping loss - slip loss + the start's energy, up to the
-    error of the integrator (`annelid.planar.midpoint`).
+    Energies add up: kinetic + elastic = muscle work - damping loss - slip loss + the start's energy, up to the error of
+    the integrator (`annelid.planar.midpoint`).
     """
 
     def __init__(self, worm: Linkage, clock: Clock, description: str) -> None:
@@ -40,30 +42,22 @@ class DynamicPlanarPlant:
         self.worm = worm
         self._ratio = StepRatio(clock.control_timestep_s, clock.physics_timestep_s)
         self._description = description
+        self.n_segments = self.n_muscles = worm.n_segments
         self._rest = resting_posture(worm)
         self._rest_length_m = worm.lengths(worm.posture(self._rest))[:, np.newaxis]
         self.reset(0)
 
-    @property
-    def n_segments(self) -> int:
-        """Number of actuated segments."""
-        return self.worm.n_segments
-
-    @property
-    def n_muscles(self) -> int:
-        """Number of actuators, one a segment."""
-        return self.worm.n_segments
-
     def reset(self, seed: int) -> Sensation:
         """Returns to rest at time zero, the front tip at x = 0; nothing here is random."""
-        n = self.n_segments
-        self._q, self._p = self._rest.copy(), np.zeros_like(self._rest)
-        self._muscle_force_N, self._friction_N = np.zeros(n), np.zeros(n)
-        self._muscle_work_J, self._positive_work_J, self._slip_loss_J = np.zeros(n), np.zeros(n), np.zeros(n)
-        self._damping_loss_J = 0.0
-        self._converged = True
+        self._state: dict[str, Array] = {
+            "q": self._rest.copy(),
+            "p": np.zeros_like(self._rest),
+            **{name: np.zeros(self.n_segments) for name in _OF_SEGMENTS},
+            "damping_loss": np.zeros(()),
+        }
         self._n_control_steps = 0
-        self._posture = self.worm.posture(self._q)
+        self._converged = True
+        self._posture = self.worm.posture(self._state["q"])
         return self._sense()
 
     def step(self, activation: Array) -> Sensation:
@@ -80,27 +74,29 @@ class DynamicPlanarPlant:
         """
         activation = np.asarray(activation, dtype=np.float64)
         self._n_control_steps += 1
+        now = self._state
         for _ in range(self._ratio.physics_steps_due(self._n_control_steps)):
             try:
-                step = midpoint_step(self.worm, self._q, self._p, activation, self._ratio.physics_timestep_s)
+                step = midpoint_step(self.worm, now["q"], now["p"], activation, self._ratio.physics_timestep_s)
             except np.linalg.LinAlgError:
                 raise SimulationStopped(
                     "the planar worm's equations of motion have no unique solution: its masses, stiffnesses or "
                     "dampings differ by too much"
                 ) from None
-            self._q, self._p = step.q, step.p
-            self._muscle_force_N, self._friction_N = step.muscle_force_N, step.friction_N
-            self._muscle_work_J = self._muscle_work_J + step.muscle_work_J
-            self._positive_work_J = self._positive_work_J + np.maximum(step.muscle_work_J, 0.0)
-            self._slip_loss_J = self._slip_loss_J + step.slip_loss_J
-            self._damping_loss_J += step.damping_loss_J
+            now["q"], now["p"] = step.q, step.p
+            now["muscle_force"], now["friction"] = step.muscle_force_N, step.friction_N
+            now["muscle_work"] = now["muscle_work"] + step.muscle_work_J
+            now["positive_work"] = now["positive_work"] + np.maximum(step.muscle_work_J, 0.0)
+            now["slip_loss"] = now["slip_loss"] + step.slip_loss_J
+            now["damping_loss"] = np.asarray(now["damping_loss"] + step.damping_loss_J)
             self._converged &= step.converged
-        self._posture = self.worm.posture(self._q)
+        self._posture = self.worm.posture(now["q"])
         return self._sense()
 
     def kinetic_energy_J(self) -> float:
         """Returns the present kinetic energy, J."""
-        return 0.5 * float(self._p @ np.linalg.solve(self._posture.mass, self._p))
+        momentum = self._state["p"]
+        return 0.5 * float(momentum @ np.linalg.solve(self._posture.mass, momentum))
 
     def elastic_energy_J(self) -> float:
         """Returns the present energy of springs and walls, J."""
@@ -137,8 +133,8 @@ class DynamicPlanarPlant:
         """Reads the signals that `recordable` names; there are none at frame rate."""
         if frame:
             return {}
-        felt = self._sense()
-        contact = {"contact_force": felt.contact_force_N, "slip_loss": self._slip_loss_J.copy()}
+        felt, now = self._sense(), self._state
+        contact = {"contact_force": felt.contact_force_N, "slip_loss": now["slip_loss"].copy()}
         return {
             **(contact if self.worm.wall_stiffness_N_per_m else {}),
             "stretch_length": felt.stretch_m,
@@ -148,36 +144,21 @@ class DynamicPlanarPlant:
             "outline": self.worm.places(self._posture)[self.worm.outline],
             "kinetic_energy": self.kinetic_energy_J(),
             "elastic_energy": self.elastic_energy_J(),
-            "muscle_work": self._muscle_work_J.copy(),
-            "positive_work": self._positive_work_J.copy(),
-            "damping_loss": self._damping_loss_J,
+            "muscle_work": now["muscle_work"].copy(),
+            "positive_work": now["positive_work"].copy(),
+            "damping_loss": float(now["damping_loss"]),
         }
 
     def get_state(self) -> State:
-        """Returns copies of coordinates (m), momenta (kg m/s), last forces (N), booked energies (J) and the steps."""
-        return {
-            "q": self._q.copy(),
-            "p": self._p.copy(),
-            "muscle_force": self._muscle_force_N.copy(),
-            "friction": self._friction_N.copy(),
-            "muscle_work": self._muscle_work_J.copy(),
-            "positive_work": self._positive_work_J.copy(),
-            "slip_loss": self._slip_loss_J.copy(),
-            "damping_loss": np.array(self._damping_loss_J),
-            "n_control_steps": np.array(self._n_control_steps),
-        }
+        """Returns copies of coordinates (m), momenta (kg m/s), last forces (N), energies so far (J) and the steps."""
+        state: State = {name: array.copy() for name, array in self._state.items()}
+        return state | {"n_control_steps": np.array(self._n_control_steps)}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
-        self._q, self._p = (np.array(state[name], dtype=np.float64) for name in ("q", "p"))
-        self._muscle_force_N = np.array(state["muscle_force"], dtype=np.float64)
-        self._friction_N = np.array(state["friction"], dtype=np.float64)
-        self._muscle_work_J = np.array(state["muscle_work"], dtype=np.float64)
-        self._positive_work_J = np.array(state["positive_work"], dtype=np.float64)
-        self._slip_loss_J = np.array(state["slip_loss"], dtype=np.float64)
-        self._damping_loss_J = float(state["damping_loss"])
+        self._state = {name: np.array(state[name], dtype=np.float64) for name in self._state}
         self._n_control_steps = int(state["n_control_steps"])
-        self._posture = self.worm.posture(self._q)
+        self._posture = self.worm.posture(self._state["q"])
 
     def alarm(self) -> str | None:
         """Returns a sentence if a side stands upright, a segment is squeezed flat, or a step had no solution."""
@@ -185,7 +166,7 @@ class DynamicPlanarPlant:
         # Written so that NaN fails it.
         if not slope.max() <= _STEEPEST:
             return f"a side rises by {slope.max():.4g} of its length, more than {_STEEPEST:g}: the worm has folded up"
-        height = self.worm.heights(self._q)
+        height = self.worm.heights(self._state["q"])
         if not height.min() > 0.0:
             return f"the height of segment {int(np.argmin(height)) + 1} is {height.min():.4g} m, not above 0"
         if not self._converged:
@@ -198,18 +179,17 @@ class DynamicPlanarPlant:
     def _sense(self) -> Sensation:
         worm, posture = self.worm, self._posture
         contact = np.zeros((self.n_segments, 3))
-        contact[:, 0] = self._friction_N
-        contact[:, 2] = worm.wall_force(self._q)
+        contact[:, 0] = self._state["friction"]
+        contact[:, 2] = worm.wall_force(posture.q)
         places_x = posture.q[0] + worm.lump_runs @ posture.run
-        center = np.array([worm.lump_mass_kg @ places_x / worm.lump_mass_kg.sum(), 0.0, 0.0])
         return Sensation(
             time_s=self._n_control_steps * self._ratio.control_timestep_s,
             stretch_m=worm.lengths(posture)[:, np.newaxis],
             rest_stretch_m=self._rest_length_m.copy(),
-            ring_length_m=worm.heights(self._q).copy(),
-            muscle_force_N=self._muscle_force_N.copy(),
+            ring_length_m=worm.heights(posture.q).copy(),
+            muscle_force_N=self._state["muscle_force"].copy(),
             contact_force_N=contact,
-            center_of_mass_m=center,
+            center_of_mass_m=np.array([worm.lump_mass_kg @ places_x / worm.lump_mass_kg.sum(), 0.0, 0.0]),
         )
 
 
@@ -219,7 +199,7 @@ def resting_posture(worm: Linkage) -> Array:
     All segments are equally high and all sides straight, so that hinges carry no load; the height is where return
     springs and walls balance, found by bisection.
     """
-    high = worm.muscles.relaxed_height_m
+    high = worm.body.height_relaxed_m
     low = min(high, 2.0 * worm.wall_radius_m)
     for _ in range(_HALVINGS):
         height = 0.5 * (low + high)

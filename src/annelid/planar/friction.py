@@ -22,9 +22,6 @@ def coulomb(mobility: Array, free_slip: Array, limit: Array) -> Array:
         mobility: Slip per force, symmetric and positive definite, shape ``(n, n)``.
         free_slip: Slip without friction, shape ``(n,)``.
         limit: Largest force of each contact, not negative, shape ``(n,)``.
-
-    Returns:
-        Friction forces, shape ``(n,)``.
     """
     slides = np.where(limit > 0.0, 0.0, -1.0)
     own = np.eye(len(limit))

@@ -23,32 +23,10 @@ from functools import cached_property
 
 import numpy as np
 
+from annelid.config import DynamicPlanarWorm
 from annelid.protocols import Array
 
 _NO_WAY_M = 1e-12
-
-
-@dataclass(frozen=True, slots=True)
-class Muscles:
-    """Contractile actuators between the upper and the lower vertex of every segment.
-
-    Attributes:
-        force_N: Force at full activation and relaxed height, F_0.
-        relaxed_height_m: Height without load, h_0.
-        shortest_height_m: Height at which the force has fallen to nothing, h_s.
-    """
-
-    force_N: float
-    relaxed_height_m: float
-    shortest_height_m: float
-
-    def stiffness(self, activation: Array) -> Array:
-        """Returns force per height above the shortest, N/m, of the activation's shape."""
-        return activation * (self.force_N / (self.relaxed_height_m - self.shortest_height_m))
-
-    def force(self, activation: Array, height_m: Array) -> Array:
-        """Returns the contractile forces, N, of the activation's shape."""
-        return self.stiffness(activation) * np.maximum(height_m - self.shortest_height_m, 0.0)
 
 
 @dataclass(frozen=True)
@@ -69,7 +47,8 @@ class Linkage:
     """A worm of links, springs, dampers, muscles and walls; see the module for the equations.
 
     Attributes:
-        n_segments: Number of segments N; the first N coordinates behind ``x_0`` are their heights.
+        body: Springs k_s, dampers d_h, muscles (F_0, h_0, h_s) and number of segments N; the first N coordinates behind
+            ``x_0`` are their heights.
         rises: G without the column of ``x_0``, shape ``(n_links, n_coordinates)``.
         link_length_m: L, shape ``(n_links,)``.
         lump_runs: H, shape ``(n_lumps, n_links)``.
@@ -80,18 +59,14 @@ class Linkage:
         segment_runs: E, shape ``(n_segments, n_links)``.
         straight: Coordinates per height of the worm with straight sides and equal heights, ``(1 + n_coordinates,)``.
         hinges: B, shape ``(n_hinges, n_links)``.
-        rest_length_m: l_0 of the return springs.
-        spring_stiffness_N_per_m: k_s.
         torsion_stiffness_Nm_per_rad: k_t.
         torsion_damping_Nms_per_rad: d_t.
-        height_damping_Ns_per_m: d_h.
-        muscles: The actuators.
         wall_radius_m: R_w; infinite without walls.
         wall_stiffness_N_per_m: k_w.
         friction: Coefficient of Coulomb friction between vertices and walls.
     """
 
-    n_segments: int
+    body: DynamicPlanarWorm
     rises: Array
     link_length_m: Array
     lump_runs: Array
@@ -102,15 +77,16 @@ class Linkage:
     segment_runs: Array
     straight: Array
     hinges: Array
-    rest_length_m: float
-    spring_stiffness_N_per_m: float
     torsion_stiffness_Nm_per_rad: float
     torsion_damping_Nms_per_rad: float
-    height_damping_Ns_per_m: float
-    muscles: Muscles
     wall_radius_m: float = np.inf
     wall_stiffness_N_per_m: float = 0.0
     friction: float = 0.0
+
+    @property
+    def n_segments(self) -> int:
+        """Number of segments N."""
+        return self.body.n_segments
 
     @cached_property
     def n_coordinates(self) -> int:
@@ -133,7 +109,16 @@ class Linkage:
 
     @cached_property
     def _segment_stiffness(self) -> Array:
-        return self.spring_stiffness_N_per_m * self.segment_runs.T @ self.segment_runs
+        return self.body.spring_stiffness_N_per_m * self.segment_runs.T @ self.segment_runs
+
+    def muscle_stiffness(self, activation: Array) -> Array:
+        """Returns the muscles' force per height above the shortest, N/m, of the activation's shape."""
+        body = self.body
+        return activation * (body.muscle_force_N / (body.height_relaxed_m - body.height_shortest_m))
+
+    def muscle_force(self, activation: Array, q: Array) -> Array:
+        """Returns the contractile forces, N, of the activation's shape."""
+        return self.muscle_stiffness(activation) * np.maximum(self.heights(q) - self.body.height_shortest_m, 0.0)
 
     def heights(self, q: Array) -> Array:
         """Returns the segments' heights, m, a view of shape ``(n_segments,)``."""
@@ -192,11 +177,15 @@ class Linkage:
         slope = np.where(moves, (at_end - mean) / way, 0.5 * (after > 0.0))
         return self.wall_stiffness_N_per_m * mean, 0.5 * self.wall_stiffness_N_per_m * slope
 
+    def _stretch(self, posture: Posture) -> Array:
+        slack_m = np.sqrt((2.0 * self.body.side_m) ** 2 - self.body.height_relaxed_m**2)
+        return self.lengths(posture) - slack_m
+
     def elastic_energy(self, posture: Posture) -> float:
         """Returns the energy of return springs, torsional springs and walls, J."""
-        stretch = self.lengths(posture) - self.rest_length_m
+        stretch, body = self._stretch(posture), self.body
         turn = self.hinges @ self.slopes(posture)
-        energy = self.spring_stiffness_N_per_m * stretch @ stretch + self.torsion_stiffness_Nm_per_rad * turn @ turn
+        energy = body.spring_stiffness_N_per_m * stretch @ stretch + self.torsion_stiffness_Nm_per_rad * turn @ turn
         if self.wall_stiffness_N_per_m:
             wall = self.wall_force(posture.q)
             energy += 2.0 * wall @ wall / self.wall_stiffness_N_per_m
@@ -232,11 +221,10 @@ class Linkage:
         by_rise = self._hinge_damping / (posture.run[:, np.newaxis] * posture.run)
         matrix[1:, 1:] = self.rises.T @ by_rise @ self.rises
         heights = np.arange(1, 1 + self.n_segments)
-        matrix[heights, heights] += self.height_damping_Ns_per_m
+        matrix[heights, heights] += self.body.height_damping_Ns_per_m
         return matrix
 
     def _link_loads(self, posture: Posture) -> tuple[Array, Array]:
         """Derivatives of U by the runs (N) and by the slopes (N m) of the links."""
-        stretch = self.lengths(posture) - self.rest_length_m
-        tension = self.spring_stiffness_N_per_m * (self.segment_runs.T @ stretch)
+        tension = self.body.spring_stiffness_N_per_m * (self.segment_runs.T @ self._stretch(posture))
         return tension, self._hinge_stiffness @ self.slopes(posture)

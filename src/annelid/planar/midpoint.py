@@ -72,7 +72,7 @@ def midpoint_step(worm: Linkage, q: Array, p: Array, activation: Array, timestep
     """
     half = 0.5 * timestep_s
     heights = np.arange(1, 1 + worm.n_segments)
-    pull_stiffness = worm.muscles.stiffness(activation)
+    pull_stiffness = worm.muscle_stiffness(activation)
     velocity: Array = np.linalg.solve(worm.posture(q).mass, p).astype(np.float64, copy=False)
     friction = limit = np.zeros(worm.n_segments)
     converged = False
@@ -81,7 +81,7 @@ def midpoint_step(worm: Linkage, q: Array, p: Array, activation: Array, timestep
         if not np.isfinite(middle.mass).all():
             break
         damping = worm.damping(middle)
-        pull = worm.muscles.force(activation, worm.heights(middle.q))
+        pull = worm.muscle_force(activation, middle.q)
         normal, wall_stiffness = worm.mean_wall_force(q, q + timestep_s * velocity)
         force = worm.kinetic_force(middle, velocity) + worm.spring_force(middle) - damping @ velocity
         force[heights] -= pull + normal
@@ -103,7 +103,7 @@ def midpoint_step(worm: Linkage, q: Array, p: Array, activation: Array, timestep
             converged = True
             break
     middle = worm.posture(q + half * velocity)
-    pull = worm.muscles.force(activation, worm.heights(middle.q))
+    pull = worm.muscle_force(activation, middle.q)
     end = q + timestep_s * velocity
     normal, _ = worm.mean_wall_force(q, end)
     momentum = 2.0 * middle.mass @ velocity - p

@@ -39,6 +39,7 @@ class Riddle2022Plant:
             clock: Section of the time steps.
         """
         self._body = body
+        self.n_segments = self.n_muscles = body.n_segments
         self._ratio = StepRatio(clock.control_timestep_s, clock.physics_timestep_s)
         self._approach = body.gain * _RATE_PER_S * clock.physics_timestep_s
         if self._approach > 1.0:
@@ -49,16 +50,6 @@ class Riddle2022Plant:
             )
         self._rest_length_m = np.full((body.n_segments, 1), self._length(np.array(body.height_max_m)))
         self.reset(0)
-
-    @property
-    def n_segments(self) -> int:
-        """Number of actuated segments."""
-        return self._body.n_segments
-
-    @property
-    def n_muscles(self) -> int:
-        """Number of actuators, one a segment."""
-        return self._body.n_segments
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the initial posture at time zero; nothing here is random."""

@@ -49,9 +49,8 @@ class Signals:
     inhibitory_mV: float = -40.0
 
     def __post_init__(self) -> None:
-        require_positive(
-            range_mV=self.range_mV, leak_conductance_uS=self.leak_conductance_uS, capacitance_nF=self.capacitance_nF
-        )
+        names = ("range_mV", "leak_conductance_uS", "capacitance_nF")
+        require_positive(**{name: getattr(self, name) for name in names})
         if not self.excitatory_mV > self.range_mV:
             raise ConfigError(f"excitatory_mV must be above range_mV = {self.range_mV}, not {self.excitatory_mV}")
         require_negative(inhibitory_mV=self.inhibitory_mV)
@@ -82,7 +81,7 @@ def transmission(gain: float = 1.0, signals: Signals | None = None) -> Synapse:
     Raises:
         ConfigError: A gain that is not positive, or too large for the reversal potential.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     greatest = s.excitatory_mV / s.range_mV
     if not 0 < gain < greatest:
         raise ConfigError(f"gain must be above 0 and below excitatory_mV / range_mV = {greatest:g}, not {gain}")
@@ -107,16 +106,13 @@ def addition(
     Args:
         gains: k_j, one for each term.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: No gains, a gain that `transmission` refuses, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     if not gains:
         raise ConfigError("gains must have one entry for each term, and there is none")
     terms = {f"term_{number}": transmission(gain, s) for number, gain in enumerate(gains, start=1)}
@@ -138,23 +134,20 @@ def subtraction(
     Args:
         gain: k.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A gain that `transmission` refuses, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     plus, minus = subtraction_synapses(gain, s)
     return _converging("subtraction", s, {"plus": plus, "minus": minus}, "difference", network, prefix)
 
 
 def subtraction_synapses(gain: float = 1.0, signals: Signals | None = None) -> tuple[Synapse, Synapse]:
     """Returns the excitatory and the inhibitory synapse of `subtraction`, and raises what it raises."""
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     plus = transmission(gain, s)
     return plus, s.synapse(-plus.conductance_uS * s.excitatory_mV / s.inhibitory_mV, s.inhibitory_mV)
 
@@ -174,16 +167,13 @@ def division(
     Args:
         ratio: c, between 0 and 1.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A ratio outside (0, 1), or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     if not 0 < ratio < 1:
         raise ConfigError(f"ratio must be above 0 and below 1, not {ratio}")
     through = transmission(1.0, s)
@@ -208,16 +198,13 @@ def multiplication(
     Args:
         residue_mV: r, what is left of R times 0.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A residue that is not between 0 and R, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     if not 0 < residue_mV < s.range_mV:
         raise ConfigError(f"residue_mV must be above 0 and below range_mV = {s.range_mV}, not {residue_mV}")
     leak, reach = s.leak_conductance_uS, s.range_mV
@@ -255,27 +242,24 @@ def differentiation(
         fast_ms: tau_fast.
         amplification: k, the gain of the subtraction; a larger one needs less delay for the same gain.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A time that is not positive, a gain that `transmission` refuses, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     require_positive(gain_ms=gain_ms, fast_ms=fast_ms)
-    plus, minus = subtraction_synapses(amplification, s)
-    leak = s.leak_conductance_uS
-    target = Network("differentiation") if network is None else network
-    target.add_neuron(f"{prefix}fast", Neuron(fast_ms * leak, leak))
-    target.add_neuron(f"{prefix}slow", Neuron((fast_ms + gain_ms / amplification) * leak, leak))
-    target.add_neuron(f"{prefix}rate", s.neuron)
-    target.add_synapse(f"{prefix}fast", f"{prefix}rate", plus)
-    target.add_synapse(f"{prefix}slow", f"{prefix}rate", minus)
-    target.add_input(f"{prefix}signal", (f"{prefix}fast", f"{prefix}slow"))
-    target.add_output(f"{prefix}rate", f"{prefix}rate")
+    leak, (plus, minus) = s.leak_conductance_uS, subtraction_synapses(amplification, s)
+    target = network or Network("differentiation")
+    fast, slow, rate = f"{prefix}fast", f"{prefix}slow", f"{prefix}rate"
+    target.add_neuron(fast, Neuron(fast_ms * leak, leak))
+    target.add_neuron(slow, Neuron((fast_ms + gain_ms / amplification) * leak, leak))
+    target.add_neuron(rate, s.neuron)
+    target.add_synapse(fast, rate, plus)
+    target.add_synapse(slow, rate, minus)
+    target.add_input(f"{prefix}signal", (fast, slow))
+    target.add_output(rate, rate)
     return target
 
 
@@ -300,7 +284,7 @@ def integration(
     Args:
         rate_mV_per_nA_ms: k_i.
         signals: How signals are carried; its capacitance is not used.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
 
     Returns:
@@ -309,18 +293,19 @@ def integration(
     Raises:
         ConfigError: A rate that is not positive, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     require_positive(rate_mV_per_nA_ms=rate_mV_per_nA_ms)
     leak, reach = s.leak_conductance_uS, s.range_mV
     neuron = Neuron(0.5 / rate_mV_per_nA_ms, leak, bias_nA=leak * reach)
     mutual = s.synapse(-leak * reach / s.inhibitory_mV, s.inhibitory_mV)
-    target = Network("integration") if network is None else network
-    target.add_neuron(f"{prefix}integral", neuron, 0.0)
-    target.add_neuron(f"{prefix}opposite", neuron, reach)
-    target.add_synapse(f"{prefix}integral", f"{prefix}opposite", mutual)
-    target.add_synapse(f"{prefix}opposite", f"{prefix}integral", mutual)
-    target.add_input(f"{prefix}signal", f"{prefix}integral")
-    target.add_output(f"{prefix}integral", f"{prefix}integral")
+    target = network or Network("integration")
+    integral, opposite = f"{prefix}integral", f"{prefix}opposite"
+    target.add_neuron(integral, neuron, 0.0)
+    target.add_neuron(opposite, neuron, reach)
+    target.add_synapse(integral, opposite, mutual)
+    target.add_synapse(opposite, integral, mutual)
+    target.add_input(f"{prefix}signal", integral)
+    target.add_output(integral, integral)
     return target
 
 
@@ -333,7 +318,7 @@ def _converging(
     prefix: str,
 ) -> Network:
     """Adds neurons with an input each, an output neuron, and the synapses that lead from those to this one."""
-    target = Network(title) if network is None else network
+    target = network or Network(title)
     for name in (*inputs, output):
         target.add_neuron(prefix + name, signals.neuron)
     for name, synapse in inputs.items():

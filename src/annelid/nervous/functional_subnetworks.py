@@ -12,8 +12,8 @@ often left out (for example by the modulation synapse of SNS-Toolbox): it makes 
 
 Shunts make membranes fast: ask `Network.stable_timestep_ms` before choosing a step (0.4 ms for the default product).
 
-Every function adds to a given network under a prefix, or makes a network of its own, and returns it. Inputs and outputs
-are named as the neurons that they belong to.
+Every function adds neurons to a given network, or makes a network of its own, and returns it. Inputs and outputs are
+named as the neurons that they belong to.
 """
 
 from __future__ import annotations
@@ -116,7 +116,9 @@ def addition(
     if not gains:
         raise ConfigError("gains must have one entry for each term, and there is none")
     terms = {f"term_{number}": transmission(gain, s) for number, gain in enumerate(gains, start=1)}
-    return _converging("addition", s, terms, "sum", network, prefix)
+    neurons = dict.fromkeys([*terms, "sum"], s.neuron)
+    synapses = [(term, "sum", synapse) for term, synapse in terms.items()]
+    return _add("addition", network, prefix, neurons, synapses, list(terms))
 
 
 def subtraction(
@@ -141,15 +143,9 @@ def subtraction(
         ConfigError: A gain that `transmission` refuses, or a name that is taken.
     """
     s = signals or Signals()
-    plus, minus = subtraction_synapses(gain, s)
-    return _converging("subtraction", s, {"plus": plus, "minus": minus}, "difference", network, prefix)
-
-
-def subtraction_synapses(gain: float = 1.0, signals: Signals | None = None) -> tuple[Synapse, Synapse]:
-    """Returns the excitatory and the inhibitory synapse of `subtraction`, and raises what it raises."""
-    s = signals or Signals()
-    plus = transmission(gain, s)
-    return plus, s.synapse(-plus.conductance_uS * s.excitatory_mV / s.inhibitory_mV, s.inhibitory_mV)
+    neurons = dict.fromkeys(["plus", "minus", "difference"], s.neuron)
+    synapses = _difference(gain, s, "plus", "minus", "difference")
+    return _add("subtraction", network, prefix, neurons, synapses, ["plus", "minus"])
 
 
 def division(
@@ -178,7 +174,9 @@ def division(
         raise ConfigError(f"ratio must be above 0 and below 1, not {ratio}")
     through = transmission(1.0, s)
     shunt = s.synapse((1.0 / ratio - 1.0) * (s.leak_conductance_uS + through.conductance_uS), 0.0)
-    return _converging("division", s, {"dividend": through, "divisor": shunt}, "quotient", network, prefix)
+    neurons = dict.fromkeys(["dividend", "divisor", "quotient"], s.neuron)
+    synapses = [("dividend", "quotient", through), ("divisor", "quotient", shunt)]
+    return _add("division", network, prefix, neurons, synapses, ["dividend", "divisor"])
 
 
 def multiplication(
@@ -193,7 +191,7 @@ def multiplication(
     ``U* = U_1 (1 + gamma a_2) / (1 + gamma)`` for factor 1 at R. Its error is ``r a_1 (1 - a_2)``, beside that of the
     transmission of factor 1, at most the share ``g_1 / Gm``.
 
-    Neurons: ``factor_1``, ``factor_2``, ``interneuron``, ``product``.
+    Neurons: ``factor_1``, ``factor_2``, ``product``, ``interneuron``.
 
     Args:
         residue_mV: r, what is left of R times 0.
@@ -210,13 +208,14 @@ def multiplication(
     leak, reach = s.leak_conductance_uS, s.range_mV
     gamma = reach / residue_mV - 1.0
     through = transmission(1.0, s)
-    factors = {"factor_1": through, "factor_2": None}
-    target = _converging("multiplication", s, factors, "product", network, prefix)
-    target.add_neuron(f"{prefix}interneuron", Neuron(s.capacitance_nF, leak, bias_nA=leak * reach), reach)
-    target.add_synapse(f"{prefix}factor_2", f"{prefix}interneuron", s.synapse(gamma * leak, -reach / gamma))
-    shunt = s.synapse(gamma * (leak + through.conductance_uS), 0.0)
-    target.add_synapse(f"{prefix}interneuron", f"{prefix}product", shunt)
-    return target
+    neurons = dict.fromkeys(["factor_1", "factor_2", "product"], s.neuron)
+    neurons["interneuron"] = Neuron(s.capacitance_nF, leak, bias_nA=leak * reach)
+    synapses = [
+        ("factor_1", "product", through),
+        ("factor_2", "interneuron", s.synapse(gamma * leak, -reach / gamma)),
+        ("interneuron", "product", s.synapse(gamma * (leak + through.conductance_uS), 0.0)),
+    ]
+    return _add("multiplication", network, prefix, neurons, synapses, ["factor_1", "factor_2"], interneuron=reach)
 
 
 def differentiation(
@@ -250,17 +249,13 @@ def differentiation(
     """
     s = signals or Signals()
     require_positive(gain_ms=gain_ms, fast_ms=fast_ms)
-    leak, (plus, minus) = s.leak_conductance_uS, subtraction_synapses(amplification, s)
-    target = network or Network("differentiation")
-    fast, slow, rate = f"{prefix}fast", f"{prefix}slow", f"{prefix}rate"
-    target.add_neuron(fast, Neuron(fast_ms * leak, leak))
-    target.add_neuron(slow, Neuron((fast_ms + gain_ms / amplification) * leak, leak))
-    target.add_neuron(rate, s.neuron)
-    target.add_synapse(fast, rate, plus)
-    target.add_synapse(slow, rate, minus)
-    target.add_input(f"{prefix}signal", (fast, slow))
-    target.add_output(rate, rate)
-    return target
+    synapses, leak = _difference(amplification, s, "fast", "slow", "rate"), s.leak_conductance_uS
+    neurons = {
+        "fast": Neuron(fast_ms * leak, leak),
+        "slow": Neuron((fast_ms + gain_ms / amplification) * leak, leak),
+        "rate": s.neuron,
+    }
+    return _add("differentiation", network, prefix, neurons, synapses, {"signal": ("fast", "slow")})
 
 
 def integration(
@@ -279,16 +274,14 @@ def integration(
     at a point, ``eta = g / Gm``. At the ends of the range the integral stays. A current shifts both potentials by up to
     ``I / (2 Gm)`` from the curve, so it must be small beside ``Gm R``.
 
-    Neurons: ``integral``, ``opposite``. The input ``signal`` (nA, of either sign) drives the first.
+    Neurons: ``integral``, which is 0 at first, and ``opposite``. The input ``signal`` (nA, of either sign) drives the
+    first.
 
     Args:
         rate_mV_per_nA_ms: k_i.
         signals: How signals are carried; its capacitance is not used.
         network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network, with an integral of 0.
 
     Raises:
         ConfigError: A rate that is not positive, or a name that is taken.
@@ -297,33 +290,36 @@ def integration(
     require_positive(rate_mV_per_nA_ms=rate_mV_per_nA_ms)
     leak, reach = s.leak_conductance_uS, s.range_mV
     neuron = Neuron(0.5 / rate_mV_per_nA_ms, leak, bias_nA=leak * reach)
+    neurons = {"integral": neuron, "opposite": neuron}
     mutual = s.synapse(-leak * reach / s.inhibitory_mV, s.inhibitory_mV)
-    target = network or Network("integration")
-    integral, opposite = f"{prefix}integral", f"{prefix}opposite"
-    target.add_neuron(integral, neuron, 0.0)
-    target.add_neuron(opposite, neuron, reach)
-    target.add_synapse(integral, opposite, mutual)
-    target.add_synapse(opposite, integral, mutual)
-    target.add_input(f"{prefix}signal", integral)
-    target.add_output(integral, integral)
-    return target
+    synapses = [("integral", "opposite", mutual), ("opposite", "integral", mutual)]
+    return _add("integration", network, prefix, neurons, synapses, {"signal": ("integral",)}, opposite=reach)
 
 
-def _converging(
+def _difference(gain: float, signals: Signals, plus: str, minus: str, target: str) -> list[tuple[str, str, Synapse]]:
+    """The synapses of a subtraction of two neurons at a third."""
+    excitation = transmission(gain, signals)
+    inhibition_uS = -excitation.conductance_uS * signals.excitatory_mV / signals.inhibitory_mV
+    return [(plus, target, excitation), (minus, target, signals.synapse(inhibition_uS, signals.inhibitory_mV))]
+
+
+def _add(
     title: str,
-    signals: Signals,
-    inputs: Mapping[str, Synapse | None],
-    output: str,
     network: Network | None,
     prefix: str,
+    neurons: Mapping[str, Neuron],
+    synapses: Sequence[tuple[str, str, Synapse]],
+    inputs: Sequence[str] | Mapping[str, Sequence[str]],
+    **initial_mV: float,
 ) -> Network:
-    """Adds neurons with an input each, an output neuron, and the synapses that lead from those to this one."""
+    """Adds a subnetwork to a network; its output is the target of the last synapse."""
     target = network or Network(title)
-    for name in (*inputs, output):
-        target.add_neuron(prefix + name, signals.neuron)
-    for name, synapse in inputs.items():
-        target.add_input(prefix + name, prefix + name)
-        if synapse is not None:
-            target.add_synapse(prefix + name, prefix + output, synapse)
-    target.add_output(prefix + output, prefix + output)
+    for name, neuron in neurons.items():
+        target.add_neuron(prefix + name, neuron, initial_mV.get(name))
+    for pre, post, synapse in synapses:
+        target.add_synapse(prefix + pre, prefix + post, synapse)
+    for name, driven in (inputs if isinstance(inputs, Mapping) else {name: (name,) for name in inputs}).items():
+        target.add_input(prefix + name, [prefix + neuron for neuron in driven])
+    output = prefix + synapses[-1][1]
+    target.add_output(output, output)
     return target

@@ -16,10 +16,10 @@ the sodium current (Riddle et al. 2022).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.errors import ConfigError, require_negative, require_positive, suggest
 from annelid.nervous.functional_subnetworks import Signals
@@ -299,25 +299,20 @@ def half_centre_of_period(
     names = [field.name for field in fields(HalfCentre)]
     if parameter not in names:
         raise ConfigError(f"unknown parameter {parameter!r} of a half-centre: {suggest(parameter, names)}")
-    if bounds is None:
-        present = getattr(base, parameter)
-        bounds = (min(0.1 * present, 10.0 * present), max(0.1 * present, 10.0 * present))
+    low, high = sorted((0.1 * getattr(base, parameter), 10.0 * getattr(base, parameter)))
 
     def periods_of(values: Array, duration_ms: float | None) -> Array:
-        periods = np.full(values.size, np.inf)
-        found: list[tuple[int, HalfCentre]] = []
+        periods, possible = np.full(values.size, np.inf), {}
         for i, value in enumerate(values):
-            try:
+            with suppress(ConfigError):
                 candidate = replace(base, **{parameter: float(value)})
                 half_centre_network(candidate)
-            except ConfigError:
-                continue
-            found.append((i, candidate))
-        if found:
-            periods[[i for i, _ in found]] = oscillation_periods([design for _, design in found], duration_ms)
+                possible[i] = candidate
+        if possible:
+            periods[list(possible)] = oscillation_periods(list(possible.values()), duration_ms)
         return periods
 
-    value = find_period(periods_of, period_ms, bounds, tolerance, parameter)
+    value = find_period(periods_of, period_ms, bounds or (low, high), tolerance, parameter)
     return replace(base, **{parameter: value})
 
 
@@ -357,7 +352,7 @@ def find_period(
     patience: float | None = 5.0 * period_ms
     values = np.geomspace(low, high, _CANDIDATES)
     periods = periods_of(values, patience)
-    if not _brackets_surely(periods, period_ms):
+    if _bracket(periods, period_ms)[1]:
         patience = None
         periods = periods_of(values, patience)
     seen = periods[np.isfinite(periods)]
@@ -366,10 +361,9 @@ def find_period(
         best = int(np.argmin(errors))
         if errors[best] <= tolerance:
             return float(values[best])
-        brackets = _straddling(periods, period_ms)
-        if not brackets.size:
+        left, _ = _bracket(periods, period_ms)
+        if left is None:
             break
-        left = brackets[0]
         values = np.geomspace(values[left], values[left + 1], _CANDIDATES)
         periods = periods_of(values, patience)
         seen = np.concatenate([seen, periods[np.isfinite(periods)]])
@@ -381,15 +375,15 @@ def find_period(
     )
 
 
-def _straddling(periods: Array, wanted: float) -> NDArray[np.intp]:
-    """Places i where the wanted period lies between periods i and i + 1: those between two finite ones first."""
-    above = periods > wanted
+def _bracket(periods: Array, wanted: float) -> tuple[int | None, bool]:
+    """Place i of the best pair i, i + 1 with the wanted period between them, and whether one of the pair is silent.
+
+    Pairs of two finite periods come first, then those of lower i; None, and True, where there is no pair.
+    """
+    above, silent = periods > wanted, ~np.isfinite(periods)
     places = np.flatnonzero(above[:-1] != above[1:])
-    silent = ~np.isfinite(periods)
-    return places[np.argsort(silent[places] | silent[places + 1], kind="stable")]
-
-
-def _brackets_surely(periods: Array, wanted: float) -> bool:
-    finite = np.isfinite(periods)
-    places = _straddling(periods, wanted)
-    return bool((finite[places] & finite[places + 1]).any())
+    doubtful = silent[places] | silent[places + 1]
+    if not places.size:
+        return None, True
+    first = int(np.argmin(doubtful))
+    return int(places[first]), bool(doubtful[first])

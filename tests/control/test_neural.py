@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from annelid.control.neural import design_of
 from annelid.control.robust import RobustController
 from annelid.nervous import PeristalsisParameters
 from annelid.nervous.robust import RobustParameters
+from annelid.protocols import Sensation
 
 Neural = SnsController | AdaptiveController | RobustController
 
@@ -72,3 +74,18 @@ def test_a_design_has_every_parameter_of_its_section(kind: Any, section: Any) ->
     changed = {name for name in vars(default) if getattr(design, name) != getattr(default, name)}
     assert changed == set(section.model_fields_set)
     assert all(getattr(design, name) == getattr(section, name) for name in changed)
+
+
+@pytest.mark.parametrize("slope_per_s", [0.0, 3.0])
+def test_a_stride_under_a_drive_is_its_steps_bit_for_bit(slope_per_s: float) -> None:
+    section = settings.AdaptiveSns(drive=0.3, drive_slope_per_s=slope_per_s, stretch_gain_per_m=5.0)
+    sensor = settings.StretchSensor(startup_hold_s=0.013)
+    walked, strode = (AdaptiveController(section, sensor, N, N, 0.001) for _ in range(2))
+    rest, zeros = np.full((N, 2), 0.1), np.zeros(N)
+    for first in range(0, 60, 10):
+        longer = rest + 0.002 * np.arange(first, first + N)[:, np.newaxis] % 0.03
+        felt = Sensation(first * 0.001, longer, rest, zeros, zeros, np.zeros((N, 3)), np.zeros(3))
+        stepped = [walked.step(replace(felt, time_s=(first + k) * 0.001)) for k in range(10)]
+        assert np.array_equal(strode.stride(felt, 10), stepped[-1])
+    assert all(np.array_equal(walked.get_state()[name], value) for name, value in strode.get_state().items())
+    assert walked.read(frame=False)["drive"] > 0.0

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from annelid.errors import ConfigError
 from annelid.nervous import (
+    HalfCentre,
     Network,
     Neuron,
     PeristalsisParameters,
     Synapse,
-    design,
     neuron_names,
     peristalsis_network,
     persistent_sodium,
@@ -117,8 +117,8 @@ def test_contraction_hold_is_as_firm_as_the_partner(p):
 
 @pytest.mark.parametrize(("delta", "oscillates"), [(0.01, True), (1.0, True), (-0.5, False)])
 def test_half_centre_oscillates_only_with_positive_delta(delta, oscillates):
-    p = PeristalsisParameters()
-    conductance = design.half_centre_conductance(1.0, delta, -40.0, p.sodium_channel)
+    p = HalfCentre(bifurcation_mV=delta)
+    conductance = p.inhibition_uS
     network = Network()
     network.add_neuron("a", Neuron(channels=(p.sodium_channel,)), 20.0)
     network.add_neuron("b", Neuron(channels=(p.sodium_channel,)), 0.0)

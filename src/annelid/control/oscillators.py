@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
 from annelid import config as settings
-from annelid.control.muscles import muscles_a_segment
+from annelid.control.base import SegmentController
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import (
@@ -20,10 +18,10 @@ from annelid.nervous import (
     phase_chain,
 )
 from annelid.nervous.phase_chain import BODY
-from annelid.protocols import Array, Recordable, Sensation, Signal, State, Values
+from annelid.protocols import Array, Sensation, State, Values
 
 
-class HeteroclinicController:
+class HeteroclinicController(SegmentController):
     """Drives a worm by a stable heteroclinic channel, with feedback that ends the dwell at a node.
 
     Node i is segment i: its activity, cut off at 1, is the segment's activation, so one segment after another
@@ -37,6 +35,12 @@ class HeteroclinicController:
             for the growth rate, or a feedback gain at which the channel can come to rest.
     """
 
+    name = "stable heteroclinic channel"
+    recorded = (
+        ("node_activity", ("segment",), "1", "activity of the heteroclinic ring's nodes"),
+        ("cue_on", ("segment",), "1", "during the last control step: 1 while feedback lets go"),
+    )
+
     def __init__(
         self, config: settings.HeteroclinicChannel, n_segments: int, n_muscles: int, control_timestep_s: float
     ) -> None:
@@ -48,8 +52,8 @@ class HeteroclinicController:
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
             control_timestep_s: Step of the oscillator, s.
         """
+        super().__init__(n_segments, n_muscles)
         self._config = config
-        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
         ring = HeteroclinicRing(n_segments, config.growth_rate_per_s, config.saddle_value)
         self._stepper = HeteroclinicStepper(ring, control_timestep_s)
         largest = largest_gain_per_s(ring)
@@ -63,24 +67,17 @@ class HeteroclinicController:
     def reset(self, seed: int) -> None:
         """Returns to node 1: segment 1 contracted, all others at rest."""
         self._activity = self._stepper.initial_state()
-        self._cue = np.zeros(self._stepper.ring.n_nodes)
+        self._cue = np.zeros(self._n_segments)
         self._seed, self._n_steps = seed, 0
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step.
-
-        Args:
-            sensation: What the body feels at the beginning of the step; lengths or contact forces are used.
-
-        Returns:
-            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
-        """
+        """Advances by one control step, as `SegmentController.step`; lengths or contact forces are felt."""
         config = self._config
         self._cue = self._cues(sensation)
         pushed = config.bias_per_s + handover_input(self._activity, self._cue, config.feedback_gain_per_s)
         self._activity = self._stepper.advance(self._activity, pushed, self._kick())
         self._n_steps += 1
-        return np.minimum(self._activity[0], 1.0).repeat(self._muscles_a_segment)
+        return np.minimum(self._activity[0], 1.0).repeat(self._muscles_per_segment)
 
     def _cues(self, sensation: Sensation) -> Array:
         if self._config.feedback == "stretch":
@@ -89,7 +86,7 @@ class HeteroclinicController:
         if self._config.feedback == "contact":
             load = np.linalg.norm(sensation.contact_force_N, axis=1)
             return np.roll(load >= self._config.contact_cue_N, 1).astype(float)
-        return np.zeros(self._stepper.ring.n_nodes)
+        return np.zeros(self._n_segments)
 
     def _kick(self) -> Array | float:
         if not self._config.noise:
@@ -97,24 +94,14 @@ class HeteroclinicController:
         random = np.random.Generator(np.random.Philox(key=self._seed, counter=[0, 0, 0, self._n_steps]))
         return self._config.noise * random.standard_normal(self._activity.shape)
 
-    def recordable(self) -> Recordable:
-        """Names the nodes' activities and cues."""
-        n = self._stepper.ring.n_nodes
-        return Recordable(
-            signals=(
-                Signal("node_activity", ("segment",), (n,), "1", "activity of the heteroclinic ring's nodes"),
-                Signal("cue_on", ("segment",), (n,), "1", "during the last control step: 1 while feedback lets go"),
-            ),
-            coords={"segment": list(range(1, n + 1))},
-            attrs={
-                "controller": "stable heteroclinic channel",
-                "leaving_rate_per_s": self._stepper.ring.leaving_rate_per_s,
-            },
-        )
+    def _values(self) -> Values:
+        return {"node_activity": self._activity[0].copy(), "cue_on": self._cue.copy()}
 
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        return {} if frame else {"node_activity": self._activity[0].copy(), "cue_on": self._cue.copy()}
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        return {"segment": list(range(1, self._n_segments + 1))}
+
+    def _attrs(self) -> dict[str, float]:
+        return {"leaving_rate_per_s": self._stepper.ring.leaving_rate_per_s}
 
     def get_state(self) -> State:
         """Returns copies of activities and cues, the seed and the number of steps taken."""
@@ -132,7 +119,7 @@ class HeteroclinicController:
         self._seed, self._n_steps = int(state["seed"]), int(state["n_steps"])
 
 
-class PhaseChainController:
+class PhaseChainController(SegmentController):
     """Drives a worm by a chain of phase oscillators under a descending drive, open loop.
 
     The chain starts as a wave with the phase lags of its couplings, the first oscillator at its largest output.
@@ -140,6 +127,13 @@ class PhaseChainController:
     Raises:
         ConfigError: Muscles that are neither one nor two a segment, or a control step too long for the oscillators.
     """
+
+    name = "chain of phase oscillators"
+    recorded = (
+        ("oscillator_phase", ("oscillator",), "rad", "phase of the oscillators, not wrapped"),
+        ("oscillator_amplitude", ("oscillator",), "1", "amplitude of the oscillators"),
+        ("drive", (), "1", "descending drive during the last control step"),
+    )
 
     def __init__(self, config: settings.PhaseChain, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
         """Builds the controller in its initial state.
@@ -150,9 +144,8 @@ class PhaseChainController:
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
             control_timestep_s: Step of the oscillators, s.
         """
+        super().__init__(n_segments, n_muscles)
         self._config = config
-        self._n_segments = n_segments
-        self._muscles_a_segment = muscles_a_segment(n_segments, n_muscles)
         self._timestep_s = control_timestep_s
         self._lag = 2.0 * np.pi * config.waves / n_segments
         network = phase_chain(n_segments, self._lag, config.coupling_per_s, config.limbs)
@@ -168,56 +161,33 @@ class PhaseChainController:
         self._n_steps = 0
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step.
-
-        Args:
-            sensation: Not used.
-
-        Returns:
-            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
-        """
+        """Advances by one control step, as `SegmentController.step`; nothing is felt."""
         self._state = self._stepper.advance(self._state, self._drive(self._n_steps))
         self._n_steps += 1
         output = self._stepper.output(self._state)[0, : self._n_segments]
         most = 2.0 * float(BODY.amplitude(BODY.highest_drive))
-        return np.clip(output / most, 0.0, 1.0).repeat(self._muscles_a_segment)
+        return np.clip(output / most, 0.0, 1.0).repeat(self._muscles_per_segment)
 
     def _drive(self, n_steps: int) -> float:
         drive = self._config.drive + self._config.drive_slope_per_s * n_steps * self._timestep_s
         return min(max(drive, 0.0), 10.0)
 
-    def recordable(self) -> Recordable:
-        """Names phases and amplitudes of all oscillators and the drive."""
-        names = [f"body_{segment}" for segment in range(1, self._n_segments + 1)]
-        names += ["fore_limb", "hind_limb"] if self._config.limbs else []
-        n = (len(names),)
-        return Recordable(
-            signals=(
-                Signal("oscillator_phase", ("oscillator",), n, "rad", "phase of the oscillators, not wrapped"),
-                Signal("oscillator_amplitude", ("oscillator",), n, "1", "amplitude of the oscillators"),
-                Signal("drive", (), (), "1", "descending drive during the last control step"),
-            ),
-            coords={"oscillator": names},
-            attrs={"controller": "chain of phase oscillators"},
-        )
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
+    def _values(self) -> Values:
         return {
             "oscillator_phase": self._state.phase_rad[0].copy(),
             "oscillator_amplitude": self._state.amplitude[0].copy(),
             "drive": self._drive(max(self._n_steps - 1, 0)),
         }
 
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        limbs = ["fore_limb", "hind_limb"] if self._config.limbs else []
+        return {"oscillator": [f"body_{segment}" for segment in range(1, self._n_segments + 1)] + limbs}
+
     def get_state(self) -> State:
         """Returns copies of phases, amplitudes and their rates, and the number of steps taken."""
-        state = {field.name: getattr(self._state, field.name).copy() for field in fields(PhaseState)}
-        return state | {"n_steps": np.array(self._n_steps)}
+        return {name: array.copy() for name, array in vars(self._state).items()} | {"n_steps": np.array(self._n_steps)}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
-        arrays = {field.name: np.array(state[field.name], dtype=float) for field in fields(PhaseState)}
-        self._state = PhaseState(**arrays)
+        self._state = PhaseState(**{name: np.array(state[name], dtype=float) for name in vars(self._state)})
         self._n_steps = int(state["n_steps"])

@@ -11,7 +11,7 @@ from annelid.errors import ConfigError
 from annelid.nervous.adaptive import DRIVE_NEURON
 from annelid.nervous.driven import MOTOR, MOTOR_SHARE, DriveParameters, add_motor_neurons, driven_robust_network
 from annelid.nervous.robust import ROLES, RobustParameters, robust_network
-from annelid.protocols import SIDES, Array, Recordable, Sensation, Signal, Values
+from annelid.protocols import SIDES, Array, Sensation, Values
 
 BACK = SIDES.index("back")
 
@@ -29,6 +29,14 @@ class RobustController(NeuralController):
             which a design rule has no solution, or a control step at which the network would not be stable.
     """
 
+    name = "robust synthetic nervous system"
+    recorded = (
+        *NeuralController.recorded,
+        ("stretch_activity", ("segment",), "1", "activity of the stretch neuron"),
+        ("drive", (), "1", "activity of the descending neuron"),
+    )
+    _parameters: RobustParameters
+
     def __init__(self, config: settings.RobustSns, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
         """Builds the controller in its initial state.
 
@@ -38,16 +46,16 @@ class RobustController(NeuralController):
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
             control_timestep_s: Step of the network, s.
         """
-        self._config = config
-        self._parameters = design_of(RobustParameters, config)
-        drive = config.descending
-        network = (
-            driven_robust_network(n_segments, self._parameters, _pathway(drive))
-            if drive.lift
-            else robust_network(n_segments, self._parameters)
-        )
+        self._config, drive = config, config.descending
+        self._parameters = parameters = design_of(RobustParameters, config)
+        if drive.lift:
+            times_ms = 1e3 * drive.time_constant_s, 1e3 * drive.pressure_time_constant_s
+            pathway = DriveParameters(drive.lift, drive.per_segment, *times_ms)
+            network = driven_robust_network(n_segments, parameters, pathway)
+        else:
+            network = robust_network(n_segments, parameters)
         if config.let_go_s:
-            add_motor_neurons(network, n_segments, self._parameters, 1e3 * config.let_go_s)
+            add_motor_neurons(network, n_segments, parameters, 1e3 * config.let_go_s)
         longest_s = network.stable_timestep_ms() / 1e3
         if control_timestep_s > longest_s:
             raise ConfigError(
@@ -66,7 +74,7 @@ class RobustController(NeuralController):
         neurons = self._stepper.arrays.neurons
         first = neurons.index(f"{MOTOR}_1") if config.let_go_s else len(neurons)
         self._motor = slice(first, first + n_segments)
-        self._full_nA = config.leak_conductance_uS * config.range_mV
+        self._range_mV, self._full_nA = config.range_mV, config.leak_conductance_uS * config.range_mV
         self.reset(0)
 
     def reset(self, seed: int) -> None:
@@ -80,40 +88,20 @@ class RobustController(NeuralController):
             seed: Of what is drawn.
         """
         self._state = self._stepper.initial_state()
-        potential, gate = self._state.potential, self._state.gate
-        if self._config.start == "silent":
+        config, potential, gate = self._config, self._state.potential, self._state.gate
+        if config.start == "silent":
             potential[...] = 0.0
             [inactivation] = self._parameters.sodium_channel.slow_gates
             gate[...] = inactivation.steady(0.0)
-        elif self._config.start == "random":
+        elif config.start == "random":
             rng = np.random.default_rng(seed)
-            potential[...] = rng.uniform(
-                self._config.inhibitory_reversal_mV, 3.0 * self._config.range_mV, potential.shape
-            )
+            potential[...] = rng.uniform(config.inhibitory_reversal_mV, 3.0 * config.range_mV, potential.shape)
             gate[...] = rng.random(gate.shape)
 
-    def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step.
-
-        Args:
-            sensation: What the body feels at the beginning of the step; lengths are used.
-
-        Returns:
-            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
-        """
-        return self.stride(sensation, 1)
-
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps that feel the same lengths; bit for bit the same as so many calls of `step`.
-
-        Args:
-            sensation: What the body feels at the beginning of the first step.
-            n_steps: Control steps, at least 1.
-
-        Returns:
-            Activation after the last step, as `step` returns it.
-        """
-        inputs = self._stretch(sensation)
+        """Advances by control steps, as `NeuralController.stride`."""
+        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        inputs = np.clip(longer_m / self._config.full_stretch_m, 0.0, 1.0)
         if self._config.descending.lift:
             inputs = np.concatenate([inputs, [self._config.descending.drive], self._pressure(sensation)])
         self._stepper.advance(self._state, self._full_nA * inputs, n_steps)
@@ -130,44 +118,17 @@ class RobustController(NeuralController):
         if not self._config.let_go_s:
             return super()._activation(potential)
         full = MOTOR_SHARE * self._parameters.range_mV
-        return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_a_segment, axis=-1)
+        return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_per_segment, axis=-1)
 
-    def _stretch(self, sensation: Sensation) -> Array:
-        """Mean lengthening of every segment over its full scale, in [0, 1], ``(n_segments,)``."""
-        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
-        return np.clip(longer_m / self._config.full_stretch_m, 0.0, 1.0)
-
-    def recordable(self) -> Recordable:
-        """Names potentials, sodium gates and the stretch neurons' activity."""
-        stretch = Signal("stretch_activity", ("segment",), (self._n_segments,), "1", "activity of the stretch neuron")
-        drive = Signal("drive", (), (), "1", "activity of the descending neuron")
-        return self._named(
-            self._potential_signal(),
-            self._sodium_gate_signal(),
-            stretch,
-            *([drive] if self._config.descending.lift else []),
-            controller="robust synthetic nervous system",
-            turn_ms=self._parameters.turn_ms,
-        )
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
-        potential = self._potential()
-        stretch = potential[self._of_role["stretch"]]
-        values: dict[str, Array | float] = {
-            "potential": potential,
-            "sodium_gate": self._sodium_gate(),
+    def _values(self) -> Values:
+        stretch = self._state.potential[0, self._of_role["stretch"]]
+        values = {
+            **super()._values(),
             "stretch_activity": np.clip(stretch / self._parameters.range_mV, 0.0, 1.0),
         }
         if self._config.descending.lift:
-            descending = float(potential[self._stepper.arrays.neurons.index(DRIVE_NEURON)])
-            values["drive"] = min(max(descending / self._parameters.range_mV, 0.0), 1.0)
+            values["drive"] = self._activity(self._stepper.arrays.neurons.index(DRIVE_NEURON))
         return values
 
-
-def _pathway(drive: settings.DescendingDrive) -> DriveParameters:
-    return DriveParameters(
-        drive.lift, drive.per_segment, 1e3 * drive.time_constant_s, 1e3 * drive.pressure_time_constant_s
-    )
+    def _attrs(self) -> dict[str, float]:
+        return {"turn_ms": self._parameters.turn_ms}

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import config as settings
-from annelid.control.neural import PeristalsisController, design_of
-from annelid.nervous import NetworkState, PeristalsisParameters, Stepper, peristalsis_network
-from annelid.protocols import Array, Recordable, Sensation, State
+from annelid.control.neural import PeristalsisController
+from annelid.nervous import Network, NetworkState, Stepper, peristalsis_network
+from annelid.protocols import Array, Sensation, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +34,11 @@ class CopySettings:
     @classmethod
     def of(cls, sections: Sequence[tuple[settings.SnsController, settings.StretchSensor]]) -> Self:
         """Returns those of the configurations of all copies, given as sections of the controller and its sensors."""
-        return cls(
-            tolerance_m=np.array([sensor.tolerance_m for _, sensor in sections]),
-            hysteresis_m=np.array([sensor.hysteresis_m for _, sensor in sections]),
-            sensor_current_nA=np.array([controller.sensor_current_nA for controller, _ in sections]),
-            kick_nA=np.array([controller.kick_nA for controller, _ in sections]),
-        )
+        each = [(s.tolerance_m, s.hysteresis_m, c.sensor_current_nA, c.kick_nA) for c, s in sections]
+        return cls(*np.array(each).reshape(-1, 4).T)
 
 
-class SnsController(PeristalsisController):
+class SnsController(PeristalsisController[settings.SnsController]):
     """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023.
 
     One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
@@ -57,6 +53,8 @@ class SnsController(PeristalsisController):
             parameters for which a design rule has no solution.
     """
 
+    name = "synthetic nervous system"
+
     def __init__(
         self,
         config: settings.SnsController,
@@ -65,54 +63,16 @@ class SnsController(PeristalsisController):
         n_muscles: int,
         control_timestep_s: float,
     ) -> None:
-        """Builds the controller in its initial state.
-
-        Args:
-            config: Section of the network, its scheme and its activation.
-            sensor: Section of the stretch sensors; their noise is the simulation's business, not used here.
-            n_segments: Segments, at least 3.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-            control_timestep_s: Step of the network, s.
-        """
-        self._parameters = design_of(PeristalsisParameters, config)
-        network = peristalsis_network(n_segments, self._parameters)
-        super().__init__(network, config, sensor, n_segments, n_muscles, control_timestep_s)
+        """Builds the controller in its initial state, as `PeristalsisController`."""
+        super().__init__(config, sensor, n_segments, n_muscles, control_timestep_s)
         self._own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, config.sensor_current_nA, config.kick_nA)
         drive = (config.sensor_current_nA + config.kick_nA) / config.leak_conductance_uS
         reversals = config.excitatory_reversal_mV, config.sodium_reversal_mV
         self._explicable_mV = config.inhibitory_reversal_mV - drive, max(reversals) + drive
         self._batches: dict[int, tuple[Stepper, NetworkState]] = {}
-        self._inputs_nA = np.zeros(n_segments + 1)
 
-    def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step.
-
-        Args:
-            sensation: What the body feels at the beginning of the step; lengths and time are used.
-
-        Returns:
-            Activation of every muscle in [0, 1], shape ``(n_muscles,)``; both halves of a ring alike.
-        """
-        return self.stride(sensation, 1)
-
-    def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps that feel the same lengths; bit for bit the same as so many calls of `step`.
-
-        Args:
-            sensation: What the body feels at the beginning of the first step; its time is a multiple of the
-                control step, and goes on.
-            n_steps: Control steps, at least 1.
-
-        Returns:
-            Activation after the last step, as `step` returns it.
-        """
-        for n, time_s in self._pieces(self._n_steps, sensation.time_s, n_steps):
-            on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, time_s)
-            np.multiply(on, self._sns.sensor_current_nA, out=self._inputs_nA[:-1])
-            self._inputs_nA[-1] = self._sns.kick_nA if self._n_steps == 0 else 0.0
-            self._stepper.advance(self._state, self._inputs_nA, n)
-            self._n_steps += n
-        return self._activation(self._state.potential[0])
+    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
+        return peristalsis_network(n_segments, self._parameters)
 
     def step_copies(
         self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
@@ -134,7 +94,6 @@ class SnsController(PeristalsisController):
             np.asarray(value)[..., np.newaxis]
             for value in (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
         )
-        lengths = sensation.stretch_m, sensation.rest_stretch_m
         on = states["sensor_on"].astype(bool)
         n_copies, n_taken = len(on), int(states["n_steps"])
         stepper, batch = self._batch(n_copies)
@@ -142,6 +101,7 @@ class SnsController(PeristalsisController):
         batch.gate[:n_copies] = states["gate"][:, 0]
         inputs = np.zeros((stepper.n_worms, self._n_segments + 1))
         for n, time_s in self._pieces(n_taken, sensation.time_s, n_steps):
+            lengths = sensation.stretch_m, sensation.rest_stretch_m
             on = self._sensor.reading(on, *lengths, time_s, tolerance, hysteresis)
             inputs[:n_copies, :-1] = current * on
             inputs[:n_copies, -1] = each.kick_nA if n_taken == 0 else 0.0
@@ -156,27 +116,15 @@ class SnsController(PeristalsisController):
         }
         return after, self._activation(potential)
 
-    def recordable(self) -> Recordable:
-        """Names potentials, sodium gates and sensors, and gives the derived conductances as attributes."""
-        return self._named(
-            *self._signals(),
-            controller="synthetic nervous system",
-            **{f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()},
-        )
-
-    def alarm(self) -> str | None:
-        """Returns a sentence if a potential has left the range that currents and reversals can explain."""
-        low, high = self._explicable_mV
-        potential = self._state.potential[0]
-        # Written so that NaN fails it.
-        if np.minimum.reduce(potential) >= low and np.maximum.reduce(potential) <= high:
-            return None
-        within = (potential >= low) & (potential <= high)
-        worst = int(np.argmin(within))
-        return (
-            f"potential of {self._stepper.arrays.neurons[worst]} is {potential[worst]:.4g} mV, outside "
-            f"{low:g} .. {high:g} mV: the control timestep of {self._stepper.timestep_ms:g} ms is too long"
-        )
+    def _batch(self, n_copies: int) -> tuple[Stepper, NetworkState]:
+        """A stepper for at least this many copies, and room for their state."""
+        # Few widths of buffers serve any number of copies.
+        width = 1 << (n_copies - 1).bit_length()
+        if width not in self._batches:
+            own = self._stepper
+            stepper = Stepper(own.arrays, own.timestep_ms, own.scheme, width)
+            self._batches[width] = stepper, stepper.initial_state(self._sns.gate_start)
+        return self._batches[width]
 
     def pieces_copies(self, states: State) -> NDArray[np.bool_]:
         """Tells in which piece of its piecewise smooth equations each of many copies is.
@@ -198,12 +146,18 @@ class SnsController(PeristalsisController):
             pieces += [activation > 0.0, activation < 1.0]
         return np.concatenate(pieces, axis=1)
 
-    def _batch(self, n_copies: int) -> tuple[Stepper, NetworkState]:
-        """A stepper for at least this many copies, and room for their state."""
-        # Few widths of buffers serve any number of copies.
-        width = 1 << (n_copies - 1).bit_length()
-        if width not in self._batches:
-            own = self._stepper
-            stepper = Stepper(own.arrays, own.timestep_ms, own.scheme, width)
-            self._batches[width] = stepper, stepper.initial_state(self._sns.gate_start)
-        return self._batches[width]
+    def alarm(self) -> str | None:
+        """Returns a sentence if a potential has left the range that currents and reversals can explain."""
+        low, high = self._explicable_mV
+        potential = self._state.potential[0]
+        # Written so that NaN fails it.
+        if np.minimum.reduce(potential) >= low and np.maximum.reduce(potential) <= high:
+            return None
+        worst = int(np.argmin((potential >= low) & (potential <= high)))
+        return (
+            f"potential of {self._stepper.arrays.neurons[worst]} is {potential[worst]:.4g} mV, outside "
+            f"{low:g} .. {high:g} mV: the control timestep of {self._stepper.timestep_ms:g} ms is too long"
+        )
+
+    def _attrs(self) -> dict[str, float]:
+        return {f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()}

@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.clock import SLACK_S
-from annelid.config import ConstantTurning, CourseTurning, HeadingTurning, Steered, TouchTurning
-from annelid.config.sections import Section
-from annelid.config.turning import Descending
+from annelid.config import ConstantTurning, CourseTurning, HeadingTurning, TouchTurning
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Array, Sensation, State
 
-Settings = TypeVar("Settings", bound=Section)
-Commanded = TypeVar("Commanded", bound=Descending)
-Aimed = TypeVar("Aimed", bound=Steered)
+Settings = TypeVar("Settings", ConstantTurning, HeadingTurning, CourseTurning, TouchTurning)
+Commanded = TypeVar("Commanded", ConstantTurning, HeadingTurning, CourseTurning)
+Aimed = TypeVar("Aimed", HeadingTurning, CourseTurning)
 LEFT, RIGHT = SIDES.index("left"), SIDES.index("right")
 
 
@@ -63,13 +61,22 @@ class Steering(ABC, Generic[Settings]):
     def reset(self) -> None:
         """Returns to the initial state: all halves whole."""
 
-    @abstractmethod
     def advance(self, sensation: Sensation, n_steps: int) -> Array:
         """Takes control steps that feel the same but for their times.
 
         Returns:
             Scales after the last of them, each in [0, 1], ``(n_segments, 2)``: left and right half of every ring.
+
+        Raises:
+            ConfigError: A body that cannot tell what the steering needs.
         """
+        for _ in range(n_steps):
+            self._step(sensation)
+        return self.scales()
+
+    @abstractmethod
+    def _step(self, sensation: Sensation) -> None:
+        """Takes one control step."""
 
     @abstractmethod
     def scales(self) -> Array:
@@ -92,26 +99,22 @@ class DescendingSteering(Steering[Commanded]):
     """
 
     def __init__(self, settings: Commanded, n_segments: int, control_timestep_s: float) -> None:
-        """Makes it from its section of the configuration, silent."""
         self._keeps = math.exp(-control_timestep_s / settings.descending_time_constant_s)
         shares = settings.shares
         self._shares = np.ones(n_segments) if shares is None else np.array(shares, dtype=float)
         super().__init__(settings, n_segments, control_timestep_s)
 
     @abstractmethod
-    def wanted(self, sensation: Sensation) -> float:
-        """Takes a control step, and returns the modulation that is asked for during it, in [-1, 1]."""
+    def _wanted(self, sensation: Sensation) -> float:
+        """The modulation that is asked for during a control step, in [-1, 1]."""
 
     def reset(self) -> None:
         """Silences the descending neurons."""
         self._modulation = 0.0
 
-    def advance(self, sensation: Sensation, n_steps: int) -> Array:
-        """Takes control steps, as `Steering.advance`."""
-        for _ in range(n_steps):
-            wanted = self.wanted(sensation)
-            self._modulation = wanted + (self._modulation - wanted) * self._keeps
-        return self.scales()
+    def _step(self, sensation: Sensation) -> None:
+        wanted = self._wanted(sensation)
+        self._modulation = wanted + (self._modulation - wanted) * self._keeps
 
     def scales(self) -> Array:
         """Returns what the present activity leaves of every half: of its own side's in proportion to its share."""
@@ -129,8 +132,7 @@ class DescendingSteering(Steering[Commanded]):
 class ConstantSteering(DescendingSteering[ConstantTurning]):
     """A constant modulation."""
 
-    def wanted(self, sensation: Sensation) -> float:
-        """Returns the modulation of the configuration."""
+    def _wanted(self, sensation: Sensation) -> float:
         return self._settings.modulation
 
 
@@ -141,26 +143,16 @@ class AimedSteering(DescendingSteering[Aimed]):
     order lags behind it, over the filter's time constant: it averages over the swings of a cycle.
     """
 
-    def __init__(self, settings: Aimed, n_segments: int, control_timestep_s: float) -> None:
-        """Makes it from its section of the configuration, silent."""
-        self._follows = -math.expm1(-control_timestep_s / settings.rate_time_constant_s)
-        super().__init__(settings, n_segments, control_timestep_s)
-
     @abstractmethod
-    def target(self, sensation: Sensation) -> float | None:
-        """Returns the wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
+    def _target(self, sensation: Sensation) -> float | None:
+        """The wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
 
     def reset(self) -> None:
         """Forgets all headings."""
         super().reset()
         self._first = self._angle = self._smooth = math.nan
 
-    def wanted(self, sensation: Sensation) -> float:
-        """Takes a control step, and returns the modulation that proportional and derivative control ask for.
-
-        Raises:
-            ConfigError: A body that cannot tell its heading.
-        """
+    def _wanted(self, sensation: Sensation) -> float:
         settings, angle = self._settings, heading_angle(sensation.heading)
         if math.isnan(angle):
             raise ConfigError("steering needs a body that tells its heading, and this one does not")
@@ -169,8 +161,9 @@ class AimedSteering(DescendingSteering[Aimed]):
         # Unwrapped, so that the filter does not jump.
         self._angle += wrapped(angle - self._angle)
         rate = (self._angle - self._smooth) / settings.rate_time_constant_s
-        self._smooth += self._follows * (self._angle - self._smooth)
-        target = self.target(sensation)
+        follows = -math.expm1(-self._timestep_s / settings.rate_time_constant_s)
+        self._smooth += follows * (self._angle - self._smooth)
+        target = self._target(sensation)
         if target is None:
             return 0.0
         modulation = settings.gain_per_rad * wrapped(target - self._angle) - settings.rate_gain_s * rate
@@ -189,8 +182,7 @@ class AimedSteering(DescendingSteering[Aimed]):
 class HeadingSteering(AimedSteering[HeadingTurning]):
     """Steers to a heading relative to that of the first sensation."""
 
-    def target(self, sensation: Sensation) -> float:
-        """Returns the wanted direction on the floor, rad."""
+    def _target(self, sensation: Sensation) -> float:
         return self._first + math.radians(self._settings.heading_deg)
 
 
@@ -202,8 +194,7 @@ class CourseSteering(AimedSteering[CourseTurning]):
         super().reset()
         self._n_reached = 0
 
-    def target(self, sensation: Sensation) -> float | None:
-        """Returns the direction from the foremost ring to the next waypoint, rad; None behind the last."""
+    def _target(self, sensation: Sensation) -> float | None:
         settings, front = self._settings, sensation.front_m
         while self._n_reached < len(settings.waypoints):
             x, y = settings.waypoints[self._n_reached]
@@ -231,24 +222,12 @@ class TouchSteering(Steering[TouchTurning]):
     def reset(self) -> None:
         """Stops the timer, with both sides whole."""
         self._left_s = 0.0
-        self._latched = [1.0, 1.0]
-        self._scales = [1.0, 1.0]
+        self._latched, self._scales = [1.0, 1.0], [1.0, 1.0]
 
-    def advance(self, sensation: Sensation, n_steps: int) -> Array:
-        """Takes control steps under the same touch.
-
-        Raises:
-            ConfigError: A body that feels no touch.
-        """
+    def _step(self, sensation: Sensation) -> None:
         if not len(sensation.touch_N):
             raise ConfigError("turning.kind = 'touch' needs a body that feels touch on the sides of its segments")
-        front = sensation.touch_N[0]
-        difference = float(front[RIGHT] - front[LEFT])
-        for _ in range(n_steps):
-            self._step(difference)
-        return self.scales()
-
-    def _step(self, difference_N: float) -> None:
+        difference_N = float(sensation.touch_N[0, RIGHT] - sensation.touch_N[0, LEFT])
         rule, size = self._settings, abs(difference_N)
         if self._left_s <= SLACK_S:
             self._latched = [1.0, 1.0]
@@ -270,11 +249,8 @@ class TouchSteering(Steering[TouchTurning]):
 
     def get_state(self) -> State:
         """Returns what is left of the timer, s, and the latched and the present scales."""
-        return {
-            "timer": np.array(self._left_s),
-            "latched": np.array(self._latched),
-            "scales": np.array(self._scales),
-        }
+        parts = {"timer": self._left_s, "latched": self._latched, "scales": self._scales}
+        return {name: np.array(value) for name, value in parts.items()}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""

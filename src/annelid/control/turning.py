@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from annelid.config import ConstantTurning, CourseTurning, HeadingTurning, TurningSection
-from annelid.control.muscles import muscles_a_segment
+from annelid.config import TurningSection
+from annelid.control.base import SegmentController
 from annelid.control.steering import ConstantSteering, CourseSteering, HeadingSteering, Steering, TouchSteering
 from annelid.errors import ConfigError
 from annelid.protocols import (
@@ -26,18 +26,20 @@ HALVES = ("left", "right")
 _PATTERN, _STEERING = "pattern_", "turning_"
 
 
+_STEERINGS: dict[str, type[Steering]] = {
+    "constant": ConstantSteering,
+    "heading": HeadingSteering,
+    "course": CourseSteering,
+    "touch": TouchSteering,
+}
+
+
 def build_steering(section: TurningSection, n_segments: int, control_timestep_s: float) -> Steering:
     """Builds what a section of the configuration describes."""
-    if isinstance(section, ConstantTurning):
-        return ConstantSteering(section, n_segments, control_timestep_s)
-    if isinstance(section, HeadingTurning):
-        return HeadingSteering(section, n_segments, control_timestep_s)
-    if isinstance(section, CourseTurning):
-        return CourseSteering(section, n_segments, control_timestep_s)
-    return TouchSteering(section, n_segments, control_timestep_s)
+    return _STEERINGS[section.kind](section, n_segments, control_timestep_s)
 
 
-class TurningController:
+class TurningController(SegmentController):
     """A controller whose pattern another one makes, and whose sides a steering scales.
 
     The pattern neither knows nor feels that it is scaled, but through the body: its rhythm is its own.
@@ -63,7 +65,8 @@ class TurningController:
             n_muscles: Twice that: left, right, segment by segment.
             control_timestep_s: Control step, s.
         """
-        if muscles_a_segment(n_segments, n_muscles) != len(HALVES):
+        super().__init__(n_segments, n_muscles)
+        if self._muscles_per_segment != len(HALVES):
             raise ConfigError(f"turning needs half-rings: {2 * n_segments} muscles, not {n_muscles}")
         if not isinstance(pattern, Stateful):
             raise ConfigError(f"turning needs a pattern whose state can be saved, not {type(pattern).__name__}")
@@ -79,15 +82,8 @@ class TurningController:
         self._steering.reset()
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step.
-
-        Args:
-            sensation: What the body feels at its beginning.
-
-        Returns:
-            Activation of every muscle in [0, 1], ``(n_muscles,)``.
-        """
-        return self._scaled(self._pattern.step(sensation), self._steering.advance(sensation, 1))
+        """Advances by one control step, as `stride`."""
+        return self.stride(sensation, 1)
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps that feel the same but for their times; the same bits as so many of `step`.
@@ -97,19 +93,16 @@ class TurningController:
             n_steps: Control steps, at least 1.
 
         Returns:
-            Activation after the last step.
+            Activation of every muscle in [0, 1] after the last step, ``(n_muscles,)``.
         """
         scales = self._steering.advance(sensation, n_steps)
         if isinstance(self._pattern, StridingController):
-            return self._scaled(self._pattern.stride(sensation, n_steps), scales)
-        first = round(sensation.time_s / self._timestep_s)
-        activation = self._pattern.step(sensation)
-        for later in range(1, n_steps):
-            activation = self._pattern.step(replace(sensation, time_s=(first + later) * self._timestep_s))
-        return self._scaled(activation, scales)
-
-    @staticmethod
-    def _scaled(activation: Array, scales: Array) -> Array:
+            activation = self._pattern.stride(sensation, n_steps)
+        else:
+            first = round(sensation.time_s / self._timestep_s)
+            activation = self._pattern.step(sensation)
+            for later in range(1, n_steps):
+                activation = self._pattern.step(replace(sensation, time_s=(first + later) * self._timestep_s))
         return (activation.reshape(scales.shape) * scales).reshape(-1)
 
     def recordable(self) -> Recordable:

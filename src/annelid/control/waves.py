@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from annelid.clock import SLACK_S
 from annelid.config import SineWave, TimedWave
-from annelid.control.open_loop import OpenLoopController
+from annelid.control.base import OpenLoopController
 from annelid.errors import ConfigError
 from annelid.protocols import Array
 

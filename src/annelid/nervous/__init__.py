@@ -4,7 +4,6 @@ from annelid.nervous.adaptive import (
     adaptive_half_centre,
     adaptive_peristalsis_network,
     drive_conductance_uS,
-    half_period_ms,
 )
 from annelid.nervous.arrays import NetworkArrays
 from annelid.nervous.diagram import Diagram
@@ -96,7 +95,6 @@ __all__ = [
     "find_period",
     "half_centre_network",
     "half_centre_of_period",
-    "half_period_ms",
     "handover_input",
     "import_network",
     "integration",

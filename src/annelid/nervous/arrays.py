@@ -101,10 +101,11 @@ class NetworkArrays:
             "one": 1,
             "inputs": len(self.inputs),
         }
-        ends = np.cumsum(list(lengths.values()))
-        return {
-            kind: slice(int(end) - length, int(end)) for (kind, length), end in zip(lengths.items(), ends, strict=True)
-        }
+        slices, start = {}, 0
+        for kind, length in lengths.items():
+            slices[kind] = slice(start, start + length)
+            start += length
+        return slices
 
 
 def build_arrays(network: Network) -> NetworkArrays:
@@ -120,18 +121,12 @@ def build_arrays(network: Network) -> NetworkArrays:
     index = {name: i for i, name in enumerate(names)}
     n = len(names)
 
-    synapses = [(index[c.source], index[c.target], c.kind) for c in network.connections if isinstance(c.kind, Synapse)]
-    junctions = [
-        (index[c.source], index[c.target], c.kind) for c in network.connections if isinstance(c.kind, GapJunction)
-    ]
-    rectified = [junction for junction in junctions if junction[2].rectified]
-    plain = [junction for junction in junctions if not junction[2].rectified]
-    spiking = [
-        (index[c.source], index[c.target], c.kind) for c in network.connections if isinstance(c.kind, SpikingSynapse)
-    ]
-    modulatory = [
-        (index[c.source], index[c.target], c.kind) for c in network.connections if isinstance(c.kind, ModulatorySynapse)
-    ]
+    ends = [(index[c.source], index[c.target], c.kind) for c in network.connections]
+    synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, Synapse)]
+    spiking = [(pre, post, s) for pre, post, s in ends if isinstance(s, SpikingSynapse)]
+    modulatory = [(pre, post, s) for pre, post, s in ends if isinstance(s, ModulatorySynapse)]
+    rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, GapJunction) and s.rectified]
+    plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, GapJunction) and not s.rectified]
     terminals = sorted({(pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory]})
     releases = sorted({(pre, s.time_constant_ms, s.increment) for pre, _, s in spiking})
     firing = {index[name]: neuron.firing for name, neuron in network.neurons.items() if neuron.firing is not None}
@@ -148,12 +143,11 @@ def build_arrays(network: Network) -> NetworkArrays:
     conductance = np.zeros((starts[-1], n))
     current = np.zeros((starts[-1], n))
 
-    for pre, post, synapse in synapses:
-        row = terminals.index((pre, synapse.threshold_mV, synapse.saturation_mV))
-        conductance[row, post] += synapse.conductance_uS
-        current[row, post] += synapse.conductance_uS * synapse.reversal_mV
-    for pre, post, synapse in spiking:
-        row = starts[1] + releases.index((pre, synapse.time_constant_ms, synapse.increment))
+    opened = [(terminals.index((pre, s.threshold_mV, s.saturation_mV)), post, s) for pre, post, s in synapses]
+    opened += [
+        (starts[1] + releases.index((pre, s.time_constant_ms, s.increment)), post, s) for pre, post, s in spiking
+    ]
+    for row, post, synapse in opened:
         conductance[row, post] += synapse.conductance_uS
         current[row, post] += synapse.conductance_uS * synapse.reversal_mV
     for row, (neuron, channel) in enumerate(channels, start=starts[2]):
@@ -174,12 +168,13 @@ def build_arrays(network: Network) -> NetworkArrays:
         for target in targets:
             current[row, index[target]] += 1.0
 
+    neurons = list(network.neurons.values())
     return NetworkArrays(
         neurons=names,
         inputs=tuple(network.inputs),
         outputs=tuple(network.outputs),
         output_neuron=_indices([index[source] for source in network.outputs.values()]),
-        capacitance_nF=_frozen([neuron.capacitance_nF for neuron in network.neurons.values()]),
+        capacitance_nF=_frozen([neuron.capacitance_nF for neuron in neurons]),
         initial_mV=_frozen(list(network.initial_mV.values())),
         terminal_neuron=_indices([pre for pre, _, _ in terminals]),
         terminal_threshold_mV=_frozen([low for _, low, _ in terminals]),
@@ -192,8 +187,8 @@ def build_arrays(network: Network) -> NetworkArrays:
         reset_mV=_frozen([f.reset_mV for f in firing.values()]),
         adaptation=_frozen([f.adaptation for f in firing.values()]),
         adaptation_time_constant_ms=_frozen([f.adaptation_time_constant_ms for f in firing.values()]),
-        rest_mV=_frozen([neuron.rest_mV for neuron in network.neurons.values()]),
-        leak_conductance_uS=_frozen([neuron.leak_conductance_uS for neuron in network.neurons.values()]),
+        rest_mV=_frozen([neuron.rest_mV for neuron in neurons]),
+        leak_conductance_uS=_frozen([neuron.leak_conductance_uS for neuron in neurons]),
         release_source=_indices([list(firing).index(pre) for pre, _, _ in releases]),
         release_time_constant_ms=_frozen([tau for _, tau, _ in releases]),
         release_increment=_frozen([increment for _, _, increment in releases]),
@@ -210,13 +205,10 @@ def _slots(channels: Sequence[Channel]) -> tuple[tuple[tuple[Gate, ...], ...], i
     """Arranges gates as (slot, channel), slow slots first, and returns the number of slow slots."""
     n_slow = max((len(channel.slow_gates) for channel in channels), default=0)
     n_instant = max((len(channel.instant_gates) for channel in channels), default=0)
-    columns = [
-        channel.slow_gates
-        + (_NO_GATE,) * (n_slow - len(channel.slow_gates))
-        + channel.instant_gates
-        + (_NO_GATE,) * (n_instant - len(channel.instant_gates))
-        for channel in channels
-    ]
+    columns = []
+    for channel in channels:
+        slow, instant = channel.slow_gates, channel.instant_gates
+        columns.append((*slow, *[_NO_GATE] * (n_slow - len(slow)), *instant, *[_NO_GATE] * (n_instant - len(instant))))
     return tuple(zip(*columns, strict=True)), n_slow
 
 

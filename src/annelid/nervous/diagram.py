@@ -5,10 +5,12 @@ The SVG is a working drawing. `annelid.draw.figures` draws networks in the style
 
 from __future__ import annotations
 
+import cmath
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -22,26 +24,19 @@ if TYPE_CHECKING:
     from annelid.nervous.network import Connection, Network
     from annelid.nervous.neurons import Neuron
 
-Point = tuple[float, float]
-
 _RADIUS = 26.0
 _PITCH_X, _PITCH_Y = 190.0, 120.0
 _STUB = 34.0
 _BULGES = (0.12, 0.25, -0.12, -0.25, 0.4, -0.4, 0.6, -0.6)
-_COLORS = {
-    "excitatory": "#1b7837",
-    "inhibitory": "#b2182b",
-    "gap junction": "#2166ac",
-    "rectified gap junction": "#2166ac",
-    "modulatory": "#7b3294",
+_STYLES = {
+    # Colour, Graphviz's arrowhead, the mark at the target's rim as a path of SVG, and the dashes.
+    "excitatory": ("#1b7837", "empty", "M-9 -4.5 L0 0 L-9 4.5 Z", ""),
+    "inhibitory": ("#b2182b", "dot", "M0 0 a4 4 0 1 0 -8 0 a4 4 0 1 0 8 0", ""),
+    "gap junction": ("#2166ac", "none", "M0 0 a2 2 0 1 0 -4 0 a2 2 0 1 0 4 0", "5 3"),
+    "rectified gap junction": ("#2166ac", "diamond", "M0 0 L-5.5 4.5 L-11 0 L-5.5 -4.5 Z", "5 3"),
+    "modulatory": ("#7b3294", "box", "M0 -4.5 V4.5 H-9 V-4.5 Z", "2 3"),
 }
-_ARROWHEADS = {
-    "excitatory": "empty",
-    "inhibitory": "dot",
-    "gap junction": "none",
-    "rectified gap junction": "diamond",
-    "modulatory": "box",
-}
+_LEAD = "M-7 -3 L0 0 L-7 3 Z"
 _NUMBERED = re.compile(r"(.*?)_?(\d+)")
 
 
@@ -86,7 +81,7 @@ def draw_diagram(network: Network) -> Diagram:
     Returns:
         Its Graphviz source and its SVG.
     """
-    return Diagram("\n".join(_graphviz(network)) + "\n", "\n".join(_svg(network)) + "\n")
+    return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network))
 
 
 def effect_of(network: Network, connection: Connection) -> str:
@@ -112,18 +107,10 @@ def markdown_tables(network: Network) -> str:
 
     Units stand in the headings; the properties that differ from the default are named in the last column.
     """
-    neurons = [
-        (
-            name,
-            f"{n.capacitance_nF:g}",
-            f"{n.leak_conductance_uS:g}",
-            f"{n.rest_mV:g}",
-            f"{n.bias_nA:g}",
-            f"{network.initial_mV[name]:g}",
-            _specials(n),
-        )
-        for name, n in network.neurons.items()
-    ]
+    neurons = []
+    for name, n in network.neurons.items():
+        numbers = n.capacitance_nF, n.leak_conductance_uS, n.rest_mV, n.bias_nA, network.initial_mV[name]
+        neurons.append((name, *(f"{number:g}" for number in numbers), _specials(n)))
     connections = [(c.source, c.target, effect_of(network, c), *_connection_cells(c.kind)) for c in network.connections]
     parts = [f"# {_cell(network.name)}", "", f"## Neurons ({len(neurons)})", ""]
     parts += _table(("neuron", "C (nF)", "Gm (uS)", "rest (mV)", "bias (nA)", "start (mV)", "also"), neurons)
@@ -189,10 +176,11 @@ def _graphviz(network: Network) -> Iterator[str]:
         yield f"  {keys[name]} [label={_quoted(name)}, shape={shape}, peripheries={rims}];"
     for connection in network.connections:
         effect = effect_of(network, connection)
+        color, head, *_ = _STYLES[effect]
         style = ", style=dashed" if "gap" in effect else ", style=dotted" if effect == "modulatory" else ""
         yield (
             f"  {keys[connection.source]} -> {keys[connection.target]} "
-            f'[label="{strength_of(connection)}", color="{_COLORS[effect]}", arrowhead={_ARROWHEADS[effect]}{style}];'
+            f'[label="{strength_of(connection)}", color="{color}", arrowhead={head}{style}];'
         )
     for number, (name, targets) in enumerate(network.inputs.items()):
         yield f"  i{number} [label={_quoted(name)}, shape=plaintext];"
@@ -203,8 +191,8 @@ def _graphviz(network: Network) -> Iterator[str]:
     yield "}"
 
 
-def _places(names: Sequence[str]) -> dict[str, Point]:
-    """Columns where all names end in a number that several share, else a circle."""
+def _places(names: Sequence[str]) -> dict[str, complex]:
+    """Columns where all names end in a number that several share, else a circle; x + i y, y downwards."""
     matches = {name: _NUMBERED.fullmatch(name) for name in names}
     columns: dict[int, list[str]] = {}
     for name, match in matches.items():
@@ -213,166 +201,121 @@ def _places(names: Sequence[str]) -> dict[str, Point]:
     if all(matches.values()) and 1 < len(columns) < len(names):
         # Every other one is set aside, so that a line to the next but one does not run through it.
         return {
-            name: (1.4 * _PITCH_X * column + 0.45 * _PITCH_X * (row % 2), 0.8 * _PITCH_Y * row)
+            name: complex(_PITCH_X * (1.4 * column + 0.45 * (row % 2)), 0.8 * _PITCH_Y * row)
             for column, number in enumerate(sorted(columns))
             for row, name in enumerate(columns[number])
         }
     n = len(names)
-    if n == 1:
-        return {names[0]: (0.0, 0.0)}
-    radius = max(120.0, 1.1 * _PITCH_Y * n / (2.0 * math.pi))
-    angles = [math.pi - 2.0 * math.pi * i / n for i in range(n)]
-    return {name: (radius * math.cos(a), -radius * math.sin(a)) for name, a in zip(names, angles, strict=True)}
+    radius = max(120.0, 1.1 * _PITCH_Y * n / (2.0 * math.pi)) if n > 1 else 0.0
+    return {name: cmath.rect(radius, math.pi + 2.0 * math.pi * i / n) for i, name in enumerate(names)}
 
 
-def _svg(network: Network) -> Iterator[str]:
+def _svg(network: Network) -> str:
+    """A document whose frame holds all shapes, drawn from back to front."""
     places = _places(list(network.neurons))
-    shapes = list(_shapes(network, places))
-    inside = [point for _, points in shapes for point in points]
-    xs, ys = [x for x, _ in inside] or [0.0], [y for _, y in inside] or [0.0]
-    left, top, pad = min(xs), min(ys), 14.0
-    width, height = max(xs) - left + 2 * pad, max(ys) - top + 2 * pad
-    yield (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
-        f'viewBox="{left - pad:.1f} {top - pad:.1f} {width:.1f} {height:.1f}" '
-        'font-family="sans-serif" text-anchor="middle">'
-    )
-    yield f"<title>{_text(network.name)}</title>"
-    yield f'<rect x="{left - pad:.1f}" y="{top - pad:.1f}" width="{width:.1f}" height="{height:.1f}" fill="white"/>'
-    yield from (shape for shape, _ in shapes)
-    yield "</svg>"
+    shapes, inside = [], [0j]
 
+    def write(words: str, at: complex, size: float, anchor: str = "middle", more: str = "") -> None:
+        shapes.append(
+            f'<text {_xy(at)} font-size="{size:.1f}" text-anchor="{anchor}"{more}>{escape(_line(words))}</text>'
+        )
+        left = at - 0.6 * size * len(words) * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
+        inside.extend((left - 1j * size, left + 0.6 * size * len(words)))
 
-def _shapes(network: Network, places: Mapping[str, Point]) -> Iterator[tuple[str, list[Point]]]:
-    """All elements from back to front, each with the points that it must have room for."""
-    many = len(network.connections) > 40
-    pairs: dict[frozenset[str], int] = {}
+    pairs = Counter[frozenset[str]]()
     for connection in network.connections:
-        pair = frozenset((connection.source, connection.target))
-        number = pairs[pair] = pairs.get(pair, 0) + 1
-        yield from _edge(network, connection, places, number, with_label=not many)
-    down = dict.fromkeys(places, 0)
-    up = dict(down)
-    for name, targets in network.inputs.items():
-        for target in targets:
-            yield from _lead(name, places[target], -1.0, down[target])
-            down[target] += 1
-    for name, source in network.outputs.items():
-        yield from _lead(name, places[source], 1.0, up[source])
-        up[source] += 1
+        ends = connection.source, connection.target
+        pairs[frozenset(ends)] += 1
+        others = [place for name, place in places.items() if name not in ends]
+        path = _parabola(places[ends[0]], places[ends[1]], others, pairs[frozenset(ends)])
+        effect = effect_of(network, connection)
+        color, _, _, dashes = _STYLES[effect]
+        start, bend, end = (f"{point.real:.1f} {point.imag:.1f}" for point in path)
+        shapes.append(
+            f'<path d="M{start} Q{bend} {end}" fill="none" stroke="{color}" stroke-width="1.3" '
+            f'stroke-dasharray="{dashes or "none"}" marker-end="url(#{effect.replace(" ", "-")})"/>'
+        )
+        middle = _along(path, 0.42)
+        inside.extend((path[0], middle, path[2]))
+        if len(network.connections) <= 40:
+            outline = f' fill="{color}" stroke="white" stroke-width="2.5" paint-order="stroke"'
+            write(strength_of(connection), middle, 8.0, more=outline)
+    leads = [(name, target, -1.0) for name, targets in network.inputs.items() for target in targets]
+    leads += [(name, source, 1.0) for name, source in network.outputs.items()]
+    taken = Counter[tuple[str, float]]()
+    for name, neuron, side in leads:
+        # Inputs come from the left, outputs leave to the right, several of a neuron one below the other.
+        rim = places[neuron] + complex(side * _RADIUS, 9.0 * taken[neuron, side])
+        taken[neuron, side] += 1
+        tail, tip = (rim, rim + _STUB) if side > 0 else (rim - _STUB, rim)
+        shapes.append(
+            f'<line x1="{tail.real:.1f}" y1="{tail.imag:.1f}" x2="{tip.real:.1f}" y2="{tip.imag:.1f}" stroke="#555" '
+            'marker-end="url(#lead)"/>'
+        )
+        write(name, rim + complex(side * (_STUB + 4.0), 3.0), 9.0, "start" if side > 0 else "end")
     size = min(11.0, max(6.5, 80.0 / max((len(name) for name in places if name), default=1)))
+    octagon = [cmath.rect(1.0, math.pi / 8 + math.pi / 4 * i) for i in range(8)]
     for name, neuron in network.neurons.items():
-        yield from _node(name, neuron, places[name], size)
+        place = places[name]
+        for radius in (_RADIUS, _RADIUS - 4.0) if neuron.channels else (_RADIUS,):
+            corners = (place + radius * corner for corner in octagon)
+            points = " ".join(f"{corner.real:.1f},{corner.imag:.1f}" for corner in corners)
+            rim = f'polygon points="{points}"' if neuron.firing else f'circle {_xy(place, "c")} r="{radius:.1f}"'
+            shapes.append(f'<{rim} fill="white" stroke="black"/>')
+        write(name, place + 0.35j * size, size)
+        inside.extend((place - (1 + 1j) * _RADIUS, place + (1 + 1j) * _RADIUS))
+
+    left, top = (min(getattr(point, axis) for point in inside) - 14.0 for axis in ("real", "imag"))
+    right, bottom = (max(getattr(point, axis) for point in inside) + 14.0 for axis in ("real", "imag"))
+    frame = f'width="{right - left:.1f}" height="{bottom - top:.1f}"'
+    marks = {name: (mark, color) for name, (color, _, mark, _) in _STYLES.items()} | {"lead": (_LEAD, "#555")}
+    return "\n".join(
+        [
+            f'<svg xmlns="http://www.w3.org/2000/svg" {frame} font-family="sans-serif" '
+            f'viewBox="{left:.1f} {top:.1f} {right - left:.1f} {bottom - top:.1f}">',
+            f"<title>{escape(_line(network.name))}</title>",
+            f'<rect x="{left:.1f}" y="{top:.1f}" {frame} fill="white"/>',
+            "<defs>",
+            *(
+                f'<marker id="{name.replace(" ", "-")}" markerUnits="userSpaceOnUse" orient="auto" overflow="visible">'
+                f'<path d="{mark}" stroke="{color}" fill="{"white" if name == "excitatory" else color}"/></marker>'
+                for name, (mark, color) in marks.items()
+            ),
+            "</defs>",
+            *shapes,
+            "</svg>\n",
+        ]
+    )
 
 
-def _node(name: str, neuron: Neuron, place: Point, size: float) -> Iterator[tuple[str, list[Point]]]:
-    x, y = place
-    room = [(x - _RADIUS - 20, y - _RADIUS), (x + _RADIUS + 20, y + _RADIUS)]
-    for radius in (_RADIUS, _RADIUS - 4.0) if neuron.channels else (_RADIUS,):
-        if neuron.firing is not None:
-            corners = [math.pi / 8 + math.pi / 4 * i for i in range(8)]
-            points = " ".join(f"{x + radius * math.cos(a):.1f},{y + radius * math.sin(a):.1f}" for a in corners)
-            yield f'<polygon points="{points}" fill="white" stroke="black"/>', room
-        else:
-            yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="white" stroke="black"/>', room
-    width = 0.6 * size * len(name) / 2
-    label = f'<text x="{x:.1f}" y="{y + 0.35 * size:.1f}" font-size="{size:.1f}">{_text(name)}</text>'
-    yield label, [(x - width, y), (x + width, y)]
+def _parabola(start: complex, end: complex, others: Sequence[complex], number: int) -> tuple[complex, complex, complex]:
+    """Rim, control point and rim of the ``number``-th connection of two neurons.
 
-
-def _lead(name: str, place: Point, side: float, number: int) -> Iterator[tuple[str, list[Point]]]:
-    """An input from the left or an output to the right."""
-    x, y = place[0] + side * _RADIUS, place[1] + 9.0 * number
-    outer = x + side * _STUB
-    tip, tail = (x, outer) if side < 0 else (outer, x)
-    anchor = "end" if side < 0 else "start"
-    yield f'<line x1="{tail:.1f}" y1="{y:.1f}" x2="{tip:.1f}" y2="{y:.1f}" stroke="#555"/>', [(outer, y)]
-    head = f"{tip:.1f},{y:.1f} {tip - 7:.1f},{y - 3:.1f} {tip - 7:.1f},{y + 3:.1f}"
-    yield f'<polygon points="{head}" fill="#555"/>', []
-    end = outer + side * 4
-    label = f'<text x="{end:.1f}" y="{y + 3:.1f}" font-size="9" text-anchor="{anchor}">{_text(name)}</text>'
-    yield label, [(end + side * 5.4 * len(name), y)]
-
-
-def _edge(
-    network: Network, connection: Connection, places: Mapping[str, Point], number: int, *, with_label: bool
-) -> Iterator[tuple[str, list[Point]]]:
-    """A parabola to the right-hand side of its direction, so that both directions of a pair stay apart.
-
-    Where that would run through another neuron it bends further, or to the other side.
+    It bends to the right-hand side of its direction, so that both directions of a pair stay apart; where it would run
+    through another neuron it bends further, or to the other side.
     """
-    effect = effect_of(network, connection)
-    color = _COLORS[effect]
-    (x0, y0), (x1, y1) = places[connection.source], places[connection.target]
-    if connection.source == connection.target:
-        start, end = (x0 - 0.6 * _RADIUS, y0 - 0.8 * _RADIUS), (x0 + 0.6 * _RADIUS, y0 - 0.8 * _RADIUS)
-        bend = (x0, y0 - 3.2 * _RADIUS - 8.0 * number)
-    else:
-        others = [place for name, place in places.items() if name not in (connection.source, connection.target)]
-        bends = [_bend((x0, y0), (x1, y1), bulge, 14.0 * (number - 1)) for bulge in _BULGES]
-        bend = next((b for b in bends if not _runs_into((x0, y0), b, (x1, y1), others)), bends[0])
-        start, end = _towards((x0, y0), bend, _RADIUS), _towards((x1, y1), bend, _RADIUS)
-    dash = ' stroke-dasharray="5 3"' if "gap" in effect else ' stroke-dasharray="2 3"' if effect == "modulatory" else ""
-    path = f"M{start[0]:.1f} {start[1]:.1f} Q{bend[0]:.1f} {bend[1]:.1f} {end[0]:.1f} {end[1]:.1f}"
-    middle = _on_parabola(start, bend, end, 0.42)
-    yield f'<path d="{path}" fill="none" stroke="{color}" stroke-width="1.3"{dash}/>', [start, middle]
-    yield _tip(effect, end, bend, color), [end]
-    if with_label:
-        words = strength_of(connection)
-        label = f'<text x="{middle[0]:.1f}" y="{middle[1]:.1f}" font-size="8" fill="{color}" stroke="white" '
-        label += f'stroke-width="2.5" paint-order="stroke">{_text(words)}</text>'
-        yield label, [(middle[0] - 2.3 * len(words), middle[1] - 8), (middle[0] + 2.3 * len(words), middle[1])]
+    if start == end:
+        aside = 0.6 * _RADIUS - 0.8j * _RADIUS
+        return start - aside.conjugate(), start - 1j * (3.2 * _RADIUS + 8.0 * number), start + aside
+    more = 14.0 * (number - 1) / abs(end - start)
+    bends = [(start + end) / 2 + (bulge + math.copysign(more, bulge)) * 1j * (end - start) for bulge in _BULGES]
+
+    def is_free(bend: complex) -> bool:
+        path = [_along((start, bend, end), i / 24) for i in range(25)]
+        return all(abs(point - other) >= 1.25 * _RADIUS for point in path for other in others)
+
+    bend = next(filter(is_free, bends), bends[0])
+    first, last = (end_ + _RADIUS * (bend - end_) / abs(bend - end_) for end_ in (start, end))
+    return first, bend, last
 
 
-def _bend(start: Point, end: Point, bulge: float, more: float) -> Point:
-    """The control point of a parabola whose middle is off the straight line by half of bulge times its length."""
-    (x0, y0), (x1, y1) = start, end
-    length = math.hypot(x1 - x0, y1 - y0)
-    aside = bulge + math.copysign(more / length, bulge)
-    return (x0 + x1) / 2 - aside * (y1 - y0), (y0 + y1) / 2 + aside * (x1 - x0)
+def _along(path: tuple[complex, complex, complex], share: float) -> complex:
+    start, bend, end = path
+    return (1 - share) ** 2 * start + 2 * share * (1 - share) * bend + share**2 * end
 
 
-def _on_parabola(start: Point, bend: Point, end: Point, share: float) -> Point:
-    weights = (1 - share) ** 2, 2 * share * (1 - share), share**2
-    x, y = (sum(w * p[axis] for w, p in zip(weights, (start, bend, end), strict=True)) for axis in (0, 1))
-    return x, y
-
-
-def _runs_into(start: Point, bend: Point, end: Point, others: Sequence[Point]) -> bool:
-    path = [_on_parabola(start, bend, end, i / 24) for i in range(25)]
-    return any(math.hypot(x - a, y - b) < 1.25 * _RADIUS for x, y in path for a, b in others)
-
-
-def _tip(effect: str, end: Point, bend: Point, color: str) -> str:
-    """The mark at the target's rim, drawn from the rim outwards."""
-    if effect == "gap junction":
-        return f'<circle cx="{end[0]:.1f}" cy="{end[1]:.1f}" r="2" fill="{color}"/>'
-    if effect == "inhibitory":
-        x, y = _towards(end, bend, 4.0)
-        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{color}"/>'
-    base = _towards(end, bend, 9.0)
-    across = (-(base[1] - end[1]) / 9.0, (base[0] - end[0]) / 9.0)
-    wings = [(base[0] + w * across[0], base[1] + w * across[1]) for w in (4.5, -4.5)]
-    corners = [end, wings[0], wings[1]]
-    if effect == "rectified gap junction":
-        far, half = _towards(end, bend, 11.0), _towards(end, bend, 5.5)
-        sides = [(half[0] + w * across[0], half[1] + w * across[1]) for w in (4.5, -4.5)]
-        corners = [end, sides[0], far, sides[1]]
-    elif effect == "modulatory":
-        corners = [(end[0] + w * across[0], end[1] + w * across[1]) for w in (4.5, -4.5)] + wings[::-1]
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
-    fill = "white" if effect == "excitatory" else color
-    return f'<polygon points="{points}" fill="{fill}" stroke="{color}"/>'
-
-
-def _towards(start: Point, end: Point, distance: float) -> Point:
-    length = math.hypot(end[0] - start[0], end[1] - start[1])
-    share = distance / length if length else 0.0
-    return start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
-
-
-def _text(words: str) -> str:
-    return escape(_line(words))
+def _xy(point: complex, prefix: str = "") -> str:
+    return f'{prefix}x="{point.real:.1f}" {prefix}y="{point.imag:.1f}"'
 
 
 def _line(text: str) -> str:

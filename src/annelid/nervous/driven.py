@@ -7,29 +7,20 @@ This is our own derivation.
 
 **Lift.** A resting relay is lifted to ``a g_d E_ex / (Gm + a g_d)``; g_d is chosen so that drive 1 lifts it to the
 share ``lift`` of R. Relays act from R / 2 on, so with ``lift`` < 1/2 the drive alone never makes a segment contract:
-who is next, and that one is next at a time, stays the business of contraction neurons and charged relays.
-
-**Turn.** A relay that is charged (conductance g) tends to ``U_end = (g + a g_d) E_ex / (Gm + g + a g_d)`` from where it
-starts, U_0, and has counted a turn at the U* of `annelid.nervous.robust`:
-
-    T = C / (Gm + g + a g_d) ln((U_end - U_0) / (U_end - U*)).
-
-Where it starts is where the next contraction's discharge, which lasts a turn, has left it, and what it has recovered
-towards its lifted rest in the N - 2 turns since. So T is a fixed point; `driven_turn_ms` finds it. What the half-centre
-takes to flip comes on top.
+who is next, and that one is next at a time, stays the business of contraction neurons and charged relays, which count
+their turns faster (closed form: `tests/nervous/test_driven.py`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, log
 
-from annelid.errors import ConfigError, require_at_least, require_positive
+from annelid.errors import ConfigError, require_positive
 from annelid.nervous.adaptive import DRIVE_NEURON
 from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
-from annelid.nervous.robust import DISCHARGE, THRESHOLD, RobustParameters, robust_network, yield_mV
+from annelid.nervous.robust import THRESHOLD, RobustParameters, robust_network
 from annelid.nervous.synapses import Synapse
 
 MOTOR = "motor"
@@ -92,43 +83,6 @@ class DriveParameters:
     def relay_uS(self, parameters: RobustParameters) -> float:
         """g_d: conductance from the descending neuron to every relay."""
         return transmission(self.lift, parameters.signals).conductance_uS
-
-
-def driven_turn_ms(
-    drive: float, n_segments: int, parameters: RobustParameters | None = None, pathway: DriveParameters | None = None
-) -> float:
-    """Time from one segment's contraction to the next one's under a constant drive, by the relays alone.
-
-    Args:
-        drive: Activity of the descending neuron, in [0, 1].
-        n_segments: Number of segments, at least 3.
-        parameters: Of the network.
-        pathway: Of the descending neuron.
-
-    Returns:
-        T, ms, the fixed point of the module's docstring.
-
-    Raises:
-        ConfigError: A drive outside [0, 1], or fewer than 3 segments.
-    """
-    require_at_least(3, n_segments=n_segments)
-    if not 0.0 <= drive <= 1.0:
-        raise ConfigError(f"drive must be in 0 .. 1, not {drive:g}")
-    p = RobustParameters() if parameters is None else parameters
-    extra = drive * (DriveParameters() if pathway is None else pathway).relay_uS(p)
-    leak, charge, excitatory, threshold = p.leak_conductance_uS, p.charge_uS, p.excitatory_reversal_mV, yield_mV(p)
-    undriven_ms = log(p.range_mV / (p.range_mV - threshold))
-    capacitance = p.turn_ms / undriven_ms * (leak + charge)
-    rest = extra * excitatory / (leak + extra)
-    emptying = leak + extra + DISCHARGE * (leak + charge)
-    empty = extra * excitatory / emptying
-    end = (charge + extra) * excitatory / (leak + charge + extra)
-    turn = p.turn_ms
-    for _ in range(100):
-        emptied = empty + (threshold - empty) * exp(-turn * emptying / capacitance)
-        start = rest - (rest - emptied) * exp(-(n_segments - 2) * turn * (leak + extra) / capacitance)
-        turn = capacitance / (leak + charge + extra) * log((end - start) / (end - threshold))
-    return turn
 
 
 def driven_robust_network(

@@ -12,8 +12,8 @@ often left out (for example by the modulation synapse of SNS-Toolbox): it makes 
 
 Shunts make membranes fast: ask `Network.stable_timestep_ms` before choosing a step (0.4 ms for the default product).
 
-Every function adds to a given network under a prefix, or makes a network of its own, and returns it. Inputs and outputs
-are named as the neurons that they belong to.
+Every function adds neurons to a given network, or makes a network of its own, and returns it. Inputs and outputs are
+named as the neurons that they belong to.
 """
 
 from __future__ import annotations
@@ -49,9 +49,8 @@ class Signals:
     inhibitory_mV: float = -40.0
 
     def __post_init__(self) -> None:
-        require_positive(
-            range_mV=self.range_mV, leak_conductance_uS=self.leak_conductance_uS, capacitance_nF=self.capacitance_nF
-        )
+        names = ("range_mV", "leak_conductance_uS", "capacitance_nF")
+        require_positive(**{name: getattr(self, name) for name in names})
         if not self.excitatory_mV > self.range_mV:
             raise ConfigError(f"excitatory_mV must be above range_mV = {self.range_mV}, not {self.excitatory_mV}")
         require_negative(inhibitory_mV=self.inhibitory_mV)
@@ -82,7 +81,7 @@ def transmission(gain: float = 1.0, signals: Signals | None = None) -> Synapse:
     Raises:
         ConfigError: A gain that is not positive, or too large for the reversal potential.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     greatest = s.excitatory_mV / s.range_mV
     if not 0 < gain < greatest:
         raise ConfigError(f"gain must be above 0 and below excitatory_mV / range_mV = {greatest:g}, not {gain}")
@@ -107,20 +106,19 @@ def addition(
     Args:
         gains: k_j, one for each term.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: No gains, a gain that `transmission` refuses, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     if not gains:
         raise ConfigError("gains must have one entry for each term, and there is none")
     terms = {f"term_{number}": transmission(gain, s) for number, gain in enumerate(gains, start=1)}
-    return _converging("addition", s, terms, "sum", network, prefix)
+    neurons = dict.fromkeys([*terms, "sum"], s.neuron)
+    synapses = [(term, "sum", synapse) for term, synapse in terms.items()]
+    return _add("addition", network, prefix, neurons, synapses, list(terms))
 
 
 def subtraction(
@@ -138,25 +136,16 @@ def subtraction(
     Args:
         gain: k.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A gain that `transmission` refuses, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
-    plus, minus = subtraction_synapses(gain, s)
-    return _converging("subtraction", s, {"plus": plus, "minus": minus}, "difference", network, prefix)
-
-
-def subtraction_synapses(gain: float = 1.0, signals: Signals | None = None) -> tuple[Synapse, Synapse]:
-    """Returns the excitatory and the inhibitory synapse of `subtraction`, and raises what it raises."""
-    s = Signals() if signals is None else signals
-    plus = transmission(gain, s)
-    return plus, s.synapse(-plus.conductance_uS * s.excitatory_mV / s.inhibitory_mV, s.inhibitory_mV)
+    s = signals or Signals()
+    neurons = dict.fromkeys(["plus", "minus", "difference"], s.neuron)
+    synapses = _difference(gain, s, "plus", "minus", "difference")
+    return _add("subtraction", network, prefix, neurons, synapses, ["plus", "minus"])
 
 
 def division(
@@ -174,21 +163,20 @@ def division(
     Args:
         ratio: c, between 0 and 1.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A ratio outside (0, 1), or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     if not 0 < ratio < 1:
         raise ConfigError(f"ratio must be above 0 and below 1, not {ratio}")
     through = transmission(1.0, s)
     shunt = s.synapse((1.0 / ratio - 1.0) * (s.leak_conductance_uS + through.conductance_uS), 0.0)
-    return _converging("division", s, {"dividend": through, "divisor": shunt}, "quotient", network, prefix)
+    neurons = dict.fromkeys(["dividend", "divisor", "quotient"], s.neuron)
+    synapses = [("dividend", "quotient", through), ("divisor", "quotient", shunt)]
+    return _add("division", network, prefix, neurons, synapses, ["dividend", "divisor"])
 
 
 def multiplication(
@@ -203,33 +191,31 @@ def multiplication(
     ``U* = U_1 (1 + gamma a_2) / (1 + gamma)`` for factor 1 at R. Its error is ``r a_1 (1 - a_2)``, beside that of the
     transmission of factor 1, at most the share ``g_1 / Gm``.
 
-    Neurons: ``factor_1``, ``factor_2``, ``interneuron``, ``product``.
+    Neurons: ``factor_1``, ``factor_2``, ``product``, ``interneuron``.
 
     Args:
         residue_mV: r, what is left of R times 0.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A residue that is not between 0 and R, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     if not 0 < residue_mV < s.range_mV:
         raise ConfigError(f"residue_mV must be above 0 and below range_mV = {s.range_mV}, not {residue_mV}")
     leak, reach = s.leak_conductance_uS, s.range_mV
     gamma = reach / residue_mV - 1.0
     through = transmission(1.0, s)
-    factors = {"factor_1": through, "factor_2": None}
-    target = _converging("multiplication", s, factors, "product", network, prefix)
-    target.add_neuron(f"{prefix}interneuron", Neuron(s.capacitance_nF, leak, bias_nA=leak * reach), reach)
-    target.add_synapse(f"{prefix}factor_2", f"{prefix}interneuron", s.synapse(gamma * leak, -reach / gamma))
-    shunt = s.synapse(gamma * (leak + through.conductance_uS), 0.0)
-    target.add_synapse(f"{prefix}interneuron", f"{prefix}product", shunt)
-    return target
+    neurons = dict.fromkeys(["factor_1", "factor_2", "product"], s.neuron)
+    neurons["interneuron"] = Neuron(s.capacitance_nF, leak, bias_nA=leak * reach)
+    synapses = [
+        ("factor_1", "product", through),
+        ("factor_2", "interneuron", s.synapse(gamma * leak, -reach / gamma)),
+        ("interneuron", "product", s.synapse(gamma * (leak + through.conductance_uS), 0.0)),
+    ]
+    return _add("multiplication", network, prefix, neurons, synapses, ["factor_1", "factor_2"], interneuron=reach)
 
 
 def differentiation(
@@ -255,28 +241,21 @@ def differentiation(
         fast_ms: tau_fast.
         amplification: k, the gain of the subtraction; a larger one needs less delay for the same gain.
         signals: How signals are carried.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network.
 
     Raises:
         ConfigError: A time that is not positive, a gain that `transmission` refuses, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     require_positive(gain_ms=gain_ms, fast_ms=fast_ms)
-    plus, minus = subtraction_synapses(amplification, s)
-    leak = s.leak_conductance_uS
-    target = Network("differentiation") if network is None else network
-    target.add_neuron(f"{prefix}fast", Neuron(fast_ms * leak, leak))
-    target.add_neuron(f"{prefix}slow", Neuron((fast_ms + gain_ms / amplification) * leak, leak))
-    target.add_neuron(f"{prefix}rate", s.neuron)
-    target.add_synapse(f"{prefix}fast", f"{prefix}rate", plus)
-    target.add_synapse(f"{prefix}slow", f"{prefix}rate", minus)
-    target.add_input(f"{prefix}signal", (f"{prefix}fast", f"{prefix}slow"))
-    target.add_output(f"{prefix}rate", f"{prefix}rate")
-    return target
+    synapses, leak = _difference(amplification, s, "fast", "slow", "rate"), s.leak_conductance_uS
+    neurons = {
+        "fast": Neuron(fast_ms * leak, leak),
+        "slow": Neuron((fast_ms + gain_ms / amplification) * leak, leak),
+        "rate": s.neuron,
+    }
+    return _add("differentiation", network, prefix, neurons, synapses, {"signal": ("fast", "slow")})
 
 
 def integration(
@@ -295,50 +274,52 @@ def integration(
     at a point, ``eta = g / Gm``. At the ends of the range the integral stays. A current shifts both potentials by up to
     ``I / (2 Gm)`` from the curve, so it must be small beside ``Gm R``.
 
-    Neurons: ``integral``, ``opposite``. The input ``signal`` (nA, of either sign) drives the first.
+    Neurons: ``integral``, which is 0 at first, and ``opposite``. The input ``signal`` (nA, of either sign) drives the
+    first.
 
     Args:
         rate_mV_per_nA_ms: k_i.
         signals: How signals are carried; its capacitance is not used.
-        network: Where to add the subnetwork; default: a new network.
+        network: Where to add it; default: a new network.
         prefix: Put before every name.
-
-    Returns:
-        The network, with an integral of 0.
 
     Raises:
         ConfigError: A rate that is not positive, or a name that is taken.
     """
-    s = Signals() if signals is None else signals
+    s = signals or Signals()
     require_positive(rate_mV_per_nA_ms=rate_mV_per_nA_ms)
     leak, reach = s.leak_conductance_uS, s.range_mV
     neuron = Neuron(0.5 / rate_mV_per_nA_ms, leak, bias_nA=leak * reach)
+    neurons = {"integral": neuron, "opposite": neuron}
     mutual = s.synapse(-leak * reach / s.inhibitory_mV, s.inhibitory_mV)
-    target = Network("integration") if network is None else network
-    target.add_neuron(f"{prefix}integral", neuron, 0.0)
-    target.add_neuron(f"{prefix}opposite", neuron, reach)
-    target.add_synapse(f"{prefix}integral", f"{prefix}opposite", mutual)
-    target.add_synapse(f"{prefix}opposite", f"{prefix}integral", mutual)
-    target.add_input(f"{prefix}signal", f"{prefix}integral")
-    target.add_output(f"{prefix}integral", f"{prefix}integral")
-    return target
+    synapses = [("integral", "opposite", mutual), ("opposite", "integral", mutual)]
+    return _add("integration", network, prefix, neurons, synapses, {"signal": ("integral",)}, opposite=reach)
 
 
-def _converging(
+def _difference(gain: float, signals: Signals, plus: str, minus: str, target: str) -> list[tuple[str, str, Synapse]]:
+    """The synapses of a subtraction of two neurons at a third."""
+    excitation = transmission(gain, signals)
+    inhibition_uS = -excitation.conductance_uS * signals.excitatory_mV / signals.inhibitory_mV
+    return [(plus, target, excitation), (minus, target, signals.synapse(inhibition_uS, signals.inhibitory_mV))]
+
+
+def _add(
     title: str,
-    signals: Signals,
-    inputs: Mapping[str, Synapse | None],
-    output: str,
     network: Network | None,
     prefix: str,
+    neurons: Mapping[str, Neuron],
+    synapses: Sequence[tuple[str, str, Synapse]],
+    inputs: Sequence[str] | Mapping[str, Sequence[str]],
+    **initial_mV: float,
 ) -> Network:
-    """Adds neurons with an input each, an output neuron, and the synapses that lead from those to this one."""
-    target = Network(title) if network is None else network
-    for name in (*inputs, output):
-        target.add_neuron(prefix + name, signals.neuron)
-    for name, synapse in inputs.items():
-        target.add_input(prefix + name, prefix + name)
-        if synapse is not None:
-            target.add_synapse(prefix + name, prefix + output, synapse)
-    target.add_output(prefix + output, prefix + output)
+    """Adds a subnetwork to a network; its output is the target of the last synapse."""
+    target = network or Network(title)
+    for name, neuron in neurons.items():
+        target.add_neuron(prefix + name, neuron, initial_mV.get(name))
+    for pre, post, synapse in synapses:
+        target.add_synapse(prefix + pre, prefix + post, synapse)
+    for name, driven in (inputs if isinstance(inputs, Mapping) else {name: (name,) for name in inputs}).items():
+        target.add_input(prefix + name, [prefix + neuron for neuron in driven])
+    output = prefix + synapses[-1][1]
+    target.add_output(output, output)
     return target

@@ -3,18 +3,26 @@
 Each neuron bears a persistent sodium channel that keeps it at the operating range R once it is up, until the partner
 escapes from its inhibition. Whether it does is set by the bifurcation parameter delta (Szczecinski et al. 2017; Riddle
 et al. 2022), and how long it takes by the slow gate's time constant above all.
+
+Conductances follow from the design rules of functional subnetworks (Szczecinski, Hunt and Quinn 2017): say where a
+neuron shall rest while its partners are in a given state, and solve the current balance there for the one unknown,
+
+    -Gm U + sum_j g_j a_j (E_j - U) + G_Na m(U) h(U) (E_Na - U) + I = 0.
+
+Those at or near the offset treat transmission as linear, ``g U_pre / R``, without the clip at 0 and R, and leave out
+the sodium current (Riddle et al. 2022).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.errors import ConfigError, require_negative, require_positive, suggest
-from annelid.nervous import design
+from annelid.nervous.functional_subnetworks import Signals
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Array, Channel, Neuron, persistent_sodium
 from annelid.nervous.synapses import Synapse
@@ -76,33 +84,69 @@ class HalfCentre:
 
     @property
     def sodium_uS(self) -> float:
-        """G_Na, by `annelid.nervous.design.sodium_conductance`."""
-        return design.sodium_conductance(self.leak_conductance_uS, self.range_mV, self._channel(1.0))
+        """G_Na that lets an isolated neuron with steady gates hold R: ``Gm R = G_Na m(R) h(R) (E_Na - R)``."""
+        return self.leak_conductance_uS * self.range_mV / self._channel(1.0).unit_current_mV(self.range_mV)
 
     @property
     def inhibition_uS(self) -> float:
-        """g_CPG, by `annelid.nervous.design.half_centre_conductance`."""
-        return design.half_centre_conductance(
-            self.leak_conductance_uS, self.bifurcation_mV, self.inhibitory_reversal_mV, self.sodium_channel
-        )
+        """g_CPG that lets a fully inhibited neuron rest at delta, just above the synaptic threshold.
+
+        ``-Gm delta + g_CPG (E_inh - delta) + G_Na m(delta) h(delta) (E_Na - delta) = 0``, the partner at R or above.
+        With delta > 0 the inhibited neuron always escapes in the end, so the half-centre oscillates by itself; with
+        delta < 0 both of its states would be stable.
+        """
+        delta, channel = self.bifurcation_mV, self.sodium_channel
+        sodium = channel.conductance_uS * channel.unit_current_mV(delta)
+        return (sodium - self.leak_conductance_uS * delta) / (delta - self.inhibitory_reversal_mV)
 
     @property
     def hold_up_uS(self) -> float:
-        """Conductance that holds a neuron at R + offset, by `annelid.nervous.design.expansion_drive_conductance`."""
-        return design.expansion_drive_conductance(
-            self.leak_conductance_uS,
-            self.range_mV,
-            self.offset_mV,
-            self.inhibition_uS,
-            self.inhibitory_reversal_mV,
-            self.excitatory_reversal_mV,
-        )
+        """g32 with which another neuron at R alone holds a neuron at ``U = R + offset``.
+
+        ``-Gm U + g_CPG (-offset / R) (E_inh - U) + g32 (E_ex - U) = 0``, with the sodium inactivated, and the partner
+        at -offset acting through unclipped, hence slightly negative, transmission.
+        """
+        held = self.range_mV + self.offset_mV
+        share = -self.offset_mV / self.range_mV
+        inhibition = self.inhibition_uS * share * (self.inhibitory_reversal_mV - held)
+        return (self.leak_conductance_uS * held - inhibition) / (self.excitatory_reversal_mV - held)
 
     @property
     def hold_down_uS(self) -> float:
-        """Conductance that holds its partner down, by `annelid.nervous.design.contraction_hold_conductance`."""
-        return design.contraction_hold_conductance(
-            self.leak_conductance_uS, self.range_mV, self.offset_mV, self.inhibition_uS, self.inhibitory_reversal_mV
+        """g31 with which another neuron at R inhibits a neuron as firmly as its partner at R + offset does.
+
+        A neuron at -offset receives ``g_CPG (R + offset) / R (E_inh + offset) + Gm offset`` from it; g31 gives the same
+        current to one that has risen to +offset, ``g31 (E_inh - offset)``.
+
+        This is the rule that Riddle et al. 2022 applied, read back from their number. The plain balance at -offset has
+        the driving force ``E_inh + offset`` with the opposite sign: there the partner alone already inhibits too much,
+        and the balance would ask for a negative conductance (about -g_CPG).
+        """
+        reach, offset, inhibitory = self.range_mV, self.offset_mV, self.inhibitory_reversal_mV
+        partner = self.inhibition_uS * (reach + offset) / reach * (inhibitory + offset)
+        return (partner + self.leak_conductance_uS * offset) / (inhibitory - offset)
+
+    def cancelling_uS(self, drive_uS: float, driver_mV: float) -> float:
+        """Conductance g with which a neuron at R cancels an excitation: ``a g_drive E_ex + g E_inh = 0``.
+
+        Args:
+            drive_uS: g_drive, the conductance that excites.
+            driver_mV: Potential of the neuron that excites; its transmission ``a = U / R`` is not clipped.
+
+        Returns:
+            g, uS.
+        """
+        return -drive_uS * driver_mV / self.range_mV * self.excitatory_reversal_mV / self.inhibitory_reversal_mV
+
+    @property
+    def signals(self) -> Signals:
+        """How neurons outside the half-centres carry signals."""
+        return Signals(
+            self.range_mV,
+            self.leak_conductance_uS,
+            self.capacitance_nF,
+            self.excitatory_reversal_mV,
+            self.inhibitory_reversal_mV,
         )
 
     @property
@@ -117,20 +161,15 @@ class HalfCentre:
 
     def inhibitory(self, conductance_uS: float) -> Synapse:
         """Returns an inhibitory synapse that transmits between 0 and R."""
-        return Synapse(conductance_uS, self.inhibitory_reversal_mV, 0.0, self.range_mV)
+        return self.signals.synapse(conductance_uS, self.inhibitory_reversal_mV)
 
     def excitatory(self, conductance_uS: float) -> Synapse:
         """Returns an excitatory synapse that transmits between 0 and R."""
-        return Synapse(conductance_uS, self.excitatory_reversal_mV, 0.0, self.range_mV)
+        return self.signals.synapse(conductance_uS, self.excitatory_reversal_mV)
 
     def _channel(self, conductance_uS: float) -> Channel:
-        return persistent_sodium(
-            conductance_uS,
-            self.sodium_reversal_mV,
-            self.range_mV,
-            self.gate_slope_per_mV,
-            self.gate_time_constant_ms,
-        )
+        gate = self.gate_slope_per_mV, self.gate_time_constant_ms
+        return persistent_sodium(conductance_uS, self.sodium_reversal_mV, self.range_mV, *gate)
 
 
 def add_half_centre(
@@ -260,25 +299,20 @@ def half_centre_of_period(
     names = [field.name for field in fields(HalfCentre)]
     if parameter not in names:
         raise ConfigError(f"unknown parameter {parameter!r} of a half-centre: {suggest(parameter, names)}")
-    if bounds is None:
-        present = getattr(base, parameter)
-        bounds = (min(0.1 * present, 10.0 * present), max(0.1 * present, 10.0 * present))
+    low, high = sorted((0.1 * getattr(base, parameter), 10.0 * getattr(base, parameter)))
 
     def periods_of(values: Array, duration_ms: float | None) -> Array:
-        periods = np.full(values.size, np.inf)
-        found: list[tuple[int, HalfCentre]] = []
+        periods, possible = np.full(values.size, np.inf), {}
         for i, value in enumerate(values):
-            try:
+            with suppress(ConfigError):
                 candidate = replace(base, **{parameter: float(value)})
                 half_centre_network(candidate)
-            except ConfigError:
-                continue
-            found.append((i, candidate))
-        if found:
-            periods[[i for i, _ in found]] = oscillation_periods([design for _, design in found], duration_ms)
+                possible[i] = candidate
+        if possible:
+            periods[list(possible)] = oscillation_periods(list(possible.values()), duration_ms)
         return periods
 
-    value = find_period(periods_of, period_ms, bounds, tolerance, parameter)
+    value = find_period(periods_of, period_ms, bounds or (low, high), tolerance, parameter)
     return replace(base, **{parameter: value})
 
 
@@ -318,7 +352,7 @@ def find_period(
     patience: float | None = 5.0 * period_ms
     values = np.geomspace(low, high, _CANDIDATES)
     periods = periods_of(values, patience)
-    if not _brackets_surely(periods, period_ms):
+    if _bracket(periods, period_ms)[1]:
         patience = None
         periods = periods_of(values, patience)
     seen = periods[np.isfinite(periods)]
@@ -327,10 +361,9 @@ def find_period(
         best = int(np.argmin(errors))
         if errors[best] <= tolerance:
             return float(values[best])
-        brackets = _straddling(periods, period_ms)
-        if not brackets.size:
+        left, _ = _bracket(periods, period_ms)
+        if left is None:
             break
-        left = brackets[0]
         values = np.geomspace(values[left], values[left + 1], _CANDIDATES)
         periods = periods_of(values, patience)
         seen = np.concatenate([seen, periods[np.isfinite(periods)]])
@@ -342,15 +375,15 @@ def find_period(
     )
 
 
-def _straddling(periods: Array, wanted: float) -> NDArray[np.intp]:
-    """Places i where the wanted period lies between periods i and i + 1: those between two finite ones first."""
-    above = periods > wanted
+def _bracket(periods: Array, wanted: float) -> tuple[int | None, bool]:
+    """Place i of the best pair i, i + 1 with the wanted period between them, and whether one of the pair is silent.
+
+    Pairs of two finite periods come first, then those of lower i; None, and True, where there is no pair.
+    """
+    above, silent = periods > wanted, ~np.isfinite(periods)
     places = np.flatnonzero(above[:-1] != above[1:])
-    silent = ~np.isfinite(periods)
-    return places[np.argsort(silent[places] | silent[places + 1], kind="stable")]
-
-
-def _brackets_surely(periods: Array, wanted: float) -> bool:
-    finite = np.isfinite(periods)
-    places = _straddling(periods, wanted)
-    return bool((finite[places] & finite[places + 1]).any())
+    doubtful = silent[places] | silent[places + 1]
+    if not places.size:
+        return None, True
+    first = int(np.argmin(doubtful))
+    return int(places[first]), bool(doubtful[first])

@@ -12,22 +12,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import ConfigError, require_finite
+from annelid.errors import ConfigError, require_finite, require_positive
 
 Array = NDArray[np.float64]
 
 
-def refuse_not_finite(owner: str, item: Any) -> None:
-    """Refuses a part of a network one of whose numbers is infinite or not a number.
+def check_numbers(
+    owner: str, item: Any, *, positive: tuple[str, ...] = (), not_negative: tuple[str, ...] = ("conductance_uS",)
+) -> None:
+    """Refuses a part of a network for the first number that is infinite, not a number, or of the wrong sign.
 
     Args:
         owner: What it is, for the sentence: "a neuron's".
         item: A dataclass.
+        positive: Fields that must be positive, unless they are None.
+        not_negative: Fields that must not be negative, of those that it has.
 
     Raises:
         ConfigError: Of the first such number.
     """
-    require_finite(**{f"{owner} {field.name}": getattr(item, field.name) for field in fields(item)})
+    numbers = {field.name: getattr(item, field.name) for field in fields(item)}
+    require_finite(**{f"{owner} {name}": value for name, value in numbers.items()})
+    for name in not_negative:
+        if numbers.get(name, 0.0) < 0:
+            raise ConfigError(f"{owner} {name} must not be negative, not {numbers[name]}")
+    require_positive(**{f"{owner} {name}": numbers[name] for name in positive if numbers[name] is not None})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +67,9 @@ class Gate:
     time_constant_ms: float | None = None
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a gate's", self)
-        if not self.factor >= 0 or (self.time_constant_ms is not None and self.factor == 0):
+        check_numbers("a gate's", self, positive=("time_constant_ms",))
+        if self.factor < 0 or (self.time_constant_ms is not None and self.factor == 0):
             raise ConfigError(f"a gate's factor must be positive (0 only without time constant), not {self.factor}")
-        if self.time_constant_ms is not None and not self.time_constant_ms > 0:
-            raise ConfigError(f"a gate's time_constant_ms must be positive, not {self.time_constant_ms}")
 
     def steady(self, potential_mV: Array | float) -> Array:
         """Returns the steady state at a potential, in [0, 1], same shape."""
@@ -91,9 +98,14 @@ class Channel:
     gates: tuple[Gate, ...] = ()
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a channel's", self)
-        if not self.conductance_uS >= 0:
-            raise ConfigError(f"a channel's conductance_uS must not be negative, not {self.conductance_uS}")
+        check_numbers("a channel's", self)
+
+    def unit_current_mV(self, potential_mV: float) -> float:
+        """Current (nA) per uS of conductance at a potential, with every gate at its steady state."""
+        open_fraction = 1.0
+        for gate in self.gates:
+            open_fraction *= float(gate.steady(potential_mV)) ** gate.power
+        return open_fraction * (self.reversal_mV - potential_mV)
 
     @property
     def slow_gates(self) -> tuple[Gate, ...]:
@@ -135,15 +147,10 @@ class Firing:
     adaptation_time_constant_ms: float = 5.0
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a firing neuron's", self)
+        check_numbers("a firing neuron's", self, positive=("adaptation_time_constant_ms",))
         if not self.reset_mV < self.threshold_mV:
             raise ConfigError(
                 f"a firing neuron's reset_mV must be below its threshold_mV = {self.threshold_mV}, not {self.reset_mV}"
-            )
-        if not self.adaptation_time_constant_ms > 0:
-            raise ConfigError(
-                "a firing neuron's adaptation_time_constant_ms must be positive, not "
-                f"{self.adaptation_time_constant_ms}"
             )
 
 
@@ -171,11 +178,7 @@ class Neuron:
     firing: Firing | None = None
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a neuron's", self)
-        if not self.capacitance_nF > 0:
-            raise ConfigError(f"a neuron's capacitance_nF must be positive, not {self.capacitance_nF}")
-        if not self.leak_conductance_uS >= 0:
-            raise ConfigError(f"a neuron's leak_conductance_uS must not be negative, not {self.leak_conductance_uS}")
+        check_numbers("a neuron's", self, positive=("capacitance_nF",), not_negative=("leak_conductance_uS",))
 
 
 def persistent_sodium(
@@ -191,7 +194,7 @@ def persistent_sodium(
     ``tau_h = tau_max h_inf sqrt(0.5 exp(S U))``. Riddle et al. 2022; Szczecinski et al. 2017, eq. 3-6.
 
     Args:
-        conductance_uS: G_Na; `annelid.nervous.design.sodium_conductance` derives it.
+        conductance_uS: G_Na; `annelid.nervous.HalfCentre.sodium_uS` derives it.
         reversal_mV: Reversal potential.
         range_mV: Operating range R, the midpoint of m.
         slope_per_mV: Slope S of both gates.

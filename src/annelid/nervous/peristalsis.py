@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 from annelid.errors import ConfigError, require_at_least, require_positive
-from annelid.nervous import design
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
@@ -72,22 +71,25 @@ class PeristalsisParameters(HalfCentre):
 
     @cached_property
     def conductances(self) -> Conductances:
-        """All conductances by the rules of `annelid.nervous.design`.
+        """All conductances: those of `HalfCentre`, and of the relays, with unclipped transmission.
+
+        With the expansion neuron at U2 = R + offset: g24 drives the relay to R while the sensory neuron is silent,
+        ``-Gm R + g24 U2 / R (E_ex - R) = 0``; g34 cancels that drive while the sensory neuron is at R; g43 cancels the
+        design current of a stretch sensor, ``Gm R + g43 E_inh = 0``.
 
         Raises:
             ConfigError: A rule gives a negative conductance for these parameters.
         """
         leak, reach, offset = self.leak_conductance_uS, self.range_mV, self.offset_mV
-        inhibitory, excitatory = self.inhibitory_reversal_mV, self.excitatory_reversal_mV
-        relay_drive = design.relay_drive_conductance(leak, reach, offset, excitatory)
+        relay_drive = leak * reach * reach / ((reach + offset) * (self.excitatory_reversal_mV - reach))
         return Conductances(
             sodium=self.sodium_uS,
             half_centre=self.inhibition_uS,
             sensory_to_expansion=self.hold_up_uS,
             sensory_to_contraction=self.hold_down_uS,
             expansion_to_relay=relay_drive,
-            sensory_to_relay=design.relay_silencing_conductance(reach, offset, relay_drive, excitatory, inhibitory),
-            relay_to_next_sensory=design.sensory_silencing_conductance(leak * reach, inhibitory),
+            sensory_to_relay=self.cancelling_uS(relay_drive, reach + offset),
+            relay_to_next_sensory=-(leak * reach) / self.inhibitory_reversal_mV,
         )
 
 

@@ -26,7 +26,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from annelid.errors import require_at_least, require_positive
-from annelid.nervous.functional_subnetworks import Signals, transmission
+from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
 from annelid.nervous.peristalsis import PeristalsisParameters, peristalsis_network
@@ -85,12 +85,12 @@ def pressure_network(n_segments: int, parameters: PressureParameters | None = No
     design = PressureParameters() if parameters is None else parameters
     p = design.peristalsis
     network = peristalsis_network(n_segments, p)
-    leak, reach = p.leak_conductance_uS, p.range_mV
+    leak = p.leak_conductance_uS
     extension = Neuron(p.capacitance_nF, leak)
     for segment in range(1, n_segments + 1):
         network.add_neuron(f"pressure_{segment}", Neuron(design.pressure_ms * leak, leak))
         network.add_neuron(f"extension_{segment}", extension)
-    signals = Signals(reach, leak, p.capacitance_nF, p.excitatory_reversal_mV, p.inhibitory_reversal_mV)
+    signals = p.signals
     release = p.inhibitory(design.release * p.conductances.relay_to_next_sensory)
     for segment in range(1, n_segments + 1):
         before, two_before = ((segment - 1 - steps) % n_segments + 1 for steps in (1, 2))

@@ -32,8 +32,7 @@ from dataclasses import dataclass
 from math import log, sqrt
 
 from annelid.errors import ConfigError, require_at_least, require_negative, require_positive
-from annelid.nervous import design
-from annelid.nervous.functional_subnetworks import Signals, transmission
+from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
@@ -88,17 +87,6 @@ class RobustParameters(HalfCentre):
             )
 
     @property
-    def signals(self) -> Signals:
-        """How the neurons outside the half-centres carry signals."""
-        return Signals(
-            self.range_mV,
-            self.leak_conductance_uS,
-            self.capacitance_nF,
-            self.excitatory_reversal_mV,
-            self.inhibitory_reversal_mV,
-        )
-
-    @property
     def charge_uS(self) -> float:
         """Conductance with which a contraction neuron at R brings its relay, or another's hold, to R."""
         return transmission(1.0, self.signals).conductance_uS
@@ -106,9 +94,7 @@ class RobustParameters(HalfCentre):
     @property
     def release_uS(self) -> float:
         """Conductance with which a full relay cancels the excitation of a hold by one contraction neuron."""
-        return design.relay_silencing_conductance(
-            self.range_mV, 0.0, self.charge_uS, self.excitatory_reversal_mV, self.inhibitory_reversal_mV
-        )
+        return self.cancelling_uS(self.charge_uS, self.range_mV)
 
 
 def yielding_hold(p: RobustParameters, excitation_nA: float) -> float:
@@ -124,7 +110,7 @@ def yielding_hold(p: RobustParameters, excitation_nA: float) -> float:
     Returns:
         a; the segment contracts without a hold if it is positive, and can be held if it is below 1.
     """
-    drive = excitation_nA + p.sodium_uS * design.unit_channel_current(p.sodium_channel, 0.0)
+    drive = excitation_nA + p.sodium_uS * p.sodium_channel.unit_current_mV(0.0)
     return (drive + p.inhibition_uS * p.inhibitory_reversal_mV) / (-p.hold_down_uS * p.inhibitory_reversal_mV)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from math import prod
 from typing import Literal, Self, get_args
@@ -45,9 +45,7 @@ class NetworkState:
 
     def copy(self) -> NetworkState:
         """Returns an independent copy."""
-        return NetworkState(
-            self.potential.copy(), self.gate.copy(), self.threshold.copy(), self.release.copy(), self.fired.copy()
-        )
+        return NetworkState(*(getattr(self, field.name).copy() for field in fields(self)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,21 +144,18 @@ class Stepper:
     def _prepare_modulation(self) -> None:
         """Finds, for each modulated quantity, which factor scales which column."""
         a = self.arrays
-        factors = [dict[int, int]() for _ in get_args(Modulated)]
-        kinds = dict(zip(get_args(Modulated), factors, strict=True))
-        for column, (quantity, neuron) in enumerate(a.modulated):
-            kinds[quantity][neuron] = column
 
-        def pairs(table: dict[int, int], neurons: Iterable[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-            found = [(place, table[neuron]) for place, neuron in enumerate(neurons) if neuron in table]
+        def pairs(quantity: Modulated, neurons: Iterable[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+            factors = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
+            found = [(place, factors[neuron]) for place, neuron in enumerate(neurons) if neuron in factors]
             places, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
             return places, columns
 
         everyone, bearers = range(len(a.neurons)), a.channel_neuron.tolist()
-        self._leak_factor = pairs(kinds["leak"], everyone)
-        self._membrane_factor = pairs(kinds["membrane"], everyone)
-        self._channel_factor = pairs(kinds["channels"], bearers)
-        self._gate_factor = pairs(kinds["gates"], bearers)
+        self._leak_factor = pairs("leak", everyone)
+        self._membrane_factor = pairs("membrane", everyone)
+        self._channel_factor = pairs("channels", bearers)
+        self._gate_factor = pairs("gates", bearers)
 
     def _prepare_buffers(self) -> None:
         a, w, n = self.arrays, self.n_worms, len(self.arrays.neurons)
@@ -216,9 +211,8 @@ class Stepper:
         a = self.arrays
         gate = np.empty((a.n_slow, a.channel_neuron.size))
         for slot, row in enumerate(a.gates[: a.n_slow]):
-            for column, (one, neuron) in enumerate(zip(row, a.channel_neuron, strict=True)):
-                potential = a.initial_mV[neuron]
-                gate[slot, column] = one.steady(potential) if gate_start == "steady" else one.toolbox_start(potential)
+            starts = [one.steady if gate_start == "steady" else one.toolbox_start for one in row]
+            gate[slot] = [start(a.initial_mV[neuron]) for start, neuron in zip(starts, a.channel_neuron, strict=True)]
         w = self.n_worms
         return NetworkState(
             potential=np.tile(a.initial_mV, (w, 1)),

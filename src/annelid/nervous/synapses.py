@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from annelid.errors import ConfigError, suggest
-from annelid.nervous.neurons import refuse_not_finite
+from annelid.nervous.neurons import check_numbers
 
 Modulated = Literal["leak", "channels", "membrane", "gates"]
 
@@ -34,13 +34,8 @@ class Synapse:
     saturation_mV: float = 20.0
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a synapse's", self)
-        if not self.conductance_uS >= 0:
-            raise ConfigError(f"a synapse's conductance_uS must not be negative, not {self.conductance_uS}")
-        if self.saturation_mV == self.threshold_mV:
-            raise ConfigError(
-                f"a synapse's saturation_mV must differ from its threshold_mV, both are {self.threshold_mV}"
-            )
+        check_numbers("a synapse's", self)
+        _check_opening("a synapse's", self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +54,7 @@ class GapJunction:
     rectified: bool = False
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a gap junction's", self)
-        if not self.conductance_uS >= 0:
-            raise ConfigError(f"a gap junction's conductance_uS must not be negative, not {self.conductance_uS}")
+        check_numbers("a gap junction's", self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,11 +82,7 @@ class SpikingSynapse:
     increment: float = 1.0
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a spiking synapse's", self)
-        if not self.conductance_uS >= 0:
-            raise ConfigError(f"a spiking synapse's conductance_uS must not be negative, not {self.conductance_uS}")
-        if not self.time_constant_ms > 0:
-            raise ConfigError(f"a spiking synapse's time_constant_ms must be positive, not {self.time_constant_ms}")
+        check_numbers("a spiking synapse's", self, positive=("time_constant_ms",))
         if not 0 < self.increment <= 1:
             raise ConfigError(f"a spiking synapse's increment must be above 0 and at most 1, not {self.increment}")
 
@@ -126,18 +115,18 @@ class ModulatorySynapse:
     saturation_mV: float = 20.0
 
     def __post_init__(self) -> None:
-        refuse_not_finite("a modulatory synapse's", self)
+        check_numbers("a modulatory synapse's", self, positive=("factor",))
         if self.quantity not in get_args(Modulated):
             raise ConfigError(
                 f"unknown modulated quantity {self.quantity!r}: {suggest(self.quantity, get_args(Modulated))}"
             )
-        if not self.factor > 0:
-            raise ConfigError(f"a modulatory synapse's factor must be positive, not {self.factor}")
-        if self.saturation_mV == self.threshold_mV:
-            raise ConfigError(
-                f"a modulatory synapse's saturation_mV must differ from its threshold_mV, both are {self.threshold_mV}"
-            )
+        _check_opening("a modulatory synapse's", self)
 
 
 ConnectionKind = Synapse | GapJunction | SpikingSynapse | ModulatorySynapse
 """Everything that can join two neurons."""
+
+
+def _check_opening(owner: str, synapse: Synapse | ModulatorySynapse) -> None:
+    if synapse.saturation_mV == synapse.threshold_mV:
+        raise ConfigError(f"{owner} saturation_mV must differ from its threshold_mV, both are {synapse.threshold_mV}")

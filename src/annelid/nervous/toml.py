@@ -6,12 +6,11 @@ the names. The order of the tables is the order in the network.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
-from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
-from annelid.errors import ConfigError, shown, suggest
+from annelid.errors import ConfigError, require_finite, shown, suggest
 from annelid.nervous.neurons import Channel, Firing, Gate, Neuron
 from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.textfiles import parse_toml, toml_text
@@ -26,15 +25,6 @@ KINDS: dict[str, type[ConnectionKind]] = {
     "modulatory_synapse": ModulatorySynapse,
 }
 """What a connection's ``kind`` is called in the text."""
-
-_NESTED: dict[str, type] = {"channels": Channel, "gates": Gate, "firing": Firing}
-_KEYS = {
-    "network": {"name", "neuron", "connection", "input", "output"},
-    "neuron": {"name", "initial_mV"},
-    "connection": {"source", "target", "kind"},
-    "input": {"name", "targets"},
-    "output": {"name", "source"},
-}
 
 
 def write_network(network: Network) -> str:
@@ -71,65 +61,46 @@ def read_network(text: str, make: type[Network]) -> Network:
         ConfigError: No valid TOML, an unknown or missing field, a value of the wrong type, or one that is refused.
     """
     document = parse_toml(text, "the network")
-    _refuse_unknown(document, _KEYS["network"], "the network")
+    _refuse_unknown(document, {"name", "neuron", "connection", "input", "output"}, "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))
     for place, entry in _tables(document, "neuron"):
-        name = _string(_required(entry, "name", place), f"{place}: name")
-        neuron = _build(Neuron, entry, place, _KEYS["neuron"])
+        name = _strings(entry, place, "name")[0]
+        neuron = _build(Neuron, entry, place, {"name", "initial_mV"})
         initial = entry.get("initial_mV")
         network.add_neuron(name, neuron, None if initial is None else _number(initial, f"{place}: initial_mV"))
     for place, entry in _tables(document, "connection"):
-        source, target, kind = (
-            _string(_required(entry, key, place), f"{place}: {key}") for key in ("source", "target", "kind")
-        )
+        source, target, kind = _strings(entry, place, "source", "target", "kind")
         if kind not in KINDS:
             raise ConfigError(f"{place}: unknown kind {shown(kind)}: {suggest(kind, KINDS)}")
-        built = _build(KINDS[kind], entry, place, _KEYS["connection"])
+        built = _build(KINDS[kind], entry, place, {"source", "target", "kind"})
         if isinstance(built, GapJunction):
             network.add_gap_junction(source, target, built)
         else:
             network.add_synapse(source, target, built)
     for place, entry in _tables(document, "input"):
-        _refuse_unknown(entry, _KEYS["input"], place)
+        _refuse_unknown(entry, {"name", "targets"}, place)
         targets = _required(entry, "targets", place)
         if not isinstance(targets, list):
             raise ConfigError(f"{place}: targets must be a list of names, not {shown(targets)}")
         names = [_string(target, f"{place}: targets") for target in targets]
-        network.add_input(_string(_required(entry, "name", place), f"{place}: name"), names)
+        network.add_input(_strings(entry, place, "name")[0], names)
     for place, entry in _tables(document, "output"):
-        _refuse_unknown(entry, _KEYS["output"], place)
-        name, source = (_string(_required(entry, key, place), f"{place}: {key}") for key in ("name", "source"))
+        _refuse_unknown(entry, {"name", "source"}, place)
+        name, source = _strings(entry, place, "name", "source")
         network.add_output(name, source)
     return network
 
 
-def _build(kind: type, entry: Mapping[str, Any], place: str, others: set[str] | None = None) -> Any:
+def _build(kind: type, entry: Mapping[str, Any], place: str, others: Collection[str] = ()) -> Any:
     """Makes one of the frozen classes from a table, after naming whatever does not fit."""
     known = {field.name: field for field in fields(kind)}
-    _refuse_unknown(entry, set(known) | (others or set()), place)
+    _refuse_unknown(entry, {*known, *others}, place)
     values: dict[str, Any] = {}
     for name, field in known.items():
-        if name not in entry:
-            if field.default is MISSING:
-                raise ConfigError(f"{place}: {name} is missing")
-            continue
-        value, where = entry[name], f"{place}: {name}"
-        if name in _NESTED:
-            many = isinstance(field.default, tuple)
-            if not isinstance(value, list if many else dict):
-                raise ConfigError(f"{where} must be {'an array of tables' if many else 'a table'}, not {shown(value)}")
-            if many:
-                values[name] = tuple(_build(_NESTED[name], _table(part, where), where) for part in value)
-            else:
-                values[name] = _build(_NESTED[name], _table(value, where), where)
-        elif name == "quantity":
-            values[name] = _string(value, where)
-        elif name == "rectified":
-            if not isinstance(value, bool):
-                raise ConfigError(f"{where} must be true or false, not {shown(value)}")
-            values[name] = value
-        else:
-            values[name] = _number(value, where)
+        if name in entry:
+            values[name] = _READERS.get(name, _number)(entry[name], f"{place}: {name}")
+        elif field.default is MISSING:
+            raise ConfigError(f"{place}: {name} is missing")
     try:
         return kind(**values)
     except ConfigError as error:
@@ -146,10 +117,10 @@ def _tables(document: Mapping[str, Any], key: str) -> Iterator[tuple[str, Mappin
         yield f"{key} {number}" + (f" ({shown(name)})" if name is not None else ""), entry
 
 
-def _table(value: Any, place: str) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise ConfigError(f"{place} must be a table, not {shown(value)}")
-    return value
+def _refuse_unknown(entry: Mapping[str, Any], known: Collection[str], place: str) -> None:
+    for key in entry:
+        if key not in known:
+            raise ConfigError(f"{place}: unknown field {shown(key)}: {suggest(key, known)}")
 
 
 def _required(entry: Mapping[str, Any], key: str, place: str) -> Any:
@@ -158,16 +129,23 @@ def _required(entry: Mapping[str, Any], key: str, place: str) -> Any:
     return entry[key]
 
 
-def _refuse_unknown(entry: Mapping[str, Any], known: set[str], place: str) -> None:
-    for key in entry:
-        if key not in known:
-            raise ConfigError(f"{place}: unknown field {shown(key)}: {suggest(key, known)}")
+def _strings(entry: Mapping[str, Any], place: str, *keys: str) -> list[str]:
+    return [_string(_required(entry, key, place), f"{place}: {key}") for key in keys]
 
 
-def _string(value: Any, place: str) -> str:
-    if not isinstance(value, str):
-        raise ConfigError(f"{place} must be a string, not {shown(value)}")
-    return value
+def _of_type(kind: type, words: str) -> Callable[[Any, str], Any]:
+    """A reader that lets values of one type pass."""
+
+    def read(value: Any, place: str) -> Any:
+        if not isinstance(value, kind):
+            raise ConfigError(f"{place} must be {words}, not {shown(value)}")
+        return value
+
+    return read
+
+
+_string, _table = _of_type(str, "a string"), _of_type(dict, "a table")
+_truth, _array = _of_type(bool, "true or false"), _of_type(list, "an array of tables")
 
 
 def _number(value: Any, place: str) -> float:
@@ -176,7 +154,20 @@ def _number(value: Any, place: str) -> float:
     try:
         number = float(value)
     except OverflowError:
-        number = inf
-    if not isfinite(number):
-        raise ConfigError(f"{place} must be a finite number, not {shown(value)}")
+        raise ConfigError(f"{place} must be a finite number, not {shown(value)}") from None
+    require_finite(**{place: number})
     return number
+
+
+def _several(kind: type) -> Callable[[Any, str], Any]:
+    return lambda value, place: tuple(_build(kind, _table(part, place), place) for part in _array(value, place))
+
+
+_READERS: dict[str, Callable[[Any, str], Any]] = {
+    "channels": _several(Channel),
+    "gates": _several(Gate),
+    "firing": lambda value, place: _build(Firing, _table(value, place), place),
+    "quantity": _string,
+    "rectified": _truth,
+}
+"""How fields are read that are no numbers."""

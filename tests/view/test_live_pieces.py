@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
-from annelid.draw.drawn_worm import upright
+from annelid.draw.scene import upright
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.knobs import knobs_of
 from annelid.live.living import LivingWorm
@@ -19,7 +20,6 @@ from annelid.live.moments import Moment, Reel, reel_of
 from annelid.live.picture import Painter, ring_colors, spring_colors
 from annelid.live.player import Player, player_of
 from annelid.live.poke import REACH_M, struck
-from annelid.live.skeleton import Skeleton
 from annelid.live.traces import plots_of
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm

@@ -6,7 +6,7 @@ import sys
 from time import perf_counter, sleep
 
 from annelid.config import RunConfig
-from annelid.draw.drawn_worm import DrawnWorm
+from annelid.draw.scene import DrawnWorm
 from annelid.errors import RenderingUnavailable, SimulationStopped
 from annelid.live.player import Player, config_of, player_of
 from annelid.simulation.runfile import Run
@@ -51,8 +51,7 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
             player.tick(begun - last, deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             with window.lock():
-                worm.pose(player.moment.qpos)
-                worm.color_rings(player.moment.activation)
+                worm.pose(player.moment.qpos, player.moment.activation)
             window.sync()
             if player.stopped:
                 break

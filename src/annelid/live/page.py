@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import RunFileError
 from annelid.live.guard import content_policy
 from annelid.live.legend import legend_html
 from annelid.live.picture import Lines, Painter, Picture
 from annelid.live.player import Player, config_of, player_of
 from annelid.live.server import Server
-from annelid.live.skeleton import Skeleton
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.anatomy import Anatomy

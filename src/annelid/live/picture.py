@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.config import RunConfig
+from annelid.draw.skeleton import Skeleton
 from annelid.draw.style import CONTRACTED, RELAXED
 from annelid.live.moments import Moment
-from annelid.live.skeleton import Skeleton
 from annelid.morphology import Array
 
 Lines = NDArray[np.float32]

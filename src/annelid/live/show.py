@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import AnnelidError
 from annelid.live.knobs import knobs_of
 from annelid.live.legend import legend_html, status_html
@@ -20,7 +21,6 @@ from annelid.live.picture import Painter
 from annelid.live.player import config_of, player_of
 from annelid.live.poke import struck
 from annelid.live.server import LOOPBACK, Server
-from annelid.live.skeleton import Skeleton
 from annelid.live.stage import Stage
 from annelid.live.traces import SECONDS, plots_of
 from annelid.morphology import Array

@@ -20,7 +20,7 @@ from annelid.arena.scenery import (
 from annelid.arena.shapes import shape_of
 from annelid.config import Floor, Pipe, RunConfig, WormBody
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
-from annelid.draw.drawn_worm import upright
+from annelid.draw.scene import upright
 from annelid.live.picture import CONTACT_COLOR, Colors, Picture
 from annelid.morphology import Array, heading_turn
 

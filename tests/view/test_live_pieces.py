@@ -17,9 +17,8 @@ from annelid.errors import ConfigError, RunFileError
 from annelid.live.knobs import knobs_of
 from annelid.live.living import LivingWorm
 from annelid.live.moments import Moment, Reel, reel_of
-from annelid.live.picture import Painter, ring_colors, spring_colors
+from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
-from annelid.live.poke import REACH_M, struck
 from annelid.live.traces import plots_of
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm

@@ -207,7 +207,9 @@ def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:
             color=POST_RGBA[:3],
             position=(x, y, POST_HALF_HEIGHT_M - arena.floor_gap_m),
         )
-    for side in (-1.0, 1.0) if arena.rail_gap_m is not None else ():
+    if arena.rail_gap_m is None:
+        return
+    for side in (-1.0, 1.0):
         scene.add_box(
             f"{_ROOT}/ground/rail_{'left' if side < 0 else 'right'}",
             dimensions=(FLOOR_HALF_SIZE_M, 0.004, 2 * RAIL_HALF_HEIGHT_M),

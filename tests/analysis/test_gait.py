@@ -19,7 +19,7 @@ import annelid
 from annelid.analysis import Gait, gait
 from annelid.analysis.track import fitted_circle
 from annelid.config import check_config
-from annelid.draw.gait_table import gait_rows
+from annelid.draw.table import gait_rows
 from annelid.simulation.runfile import Run
 
 MASS_KG, LENGTH_M = 2.0, 0.5

@@ -274,6 +274,6 @@ def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> No
 
 def test_the_panel_of_a_view_shows_names_as_text() -> None:
     pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-    from annelid.live.legend import status_html
+    from annelid.live.panel import status_html
 
     assert {tag for tag, _ in Tags(status_html(NAME, [NAME], NAME)).found} == {"div", "b"}

@@ -11,15 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
-from annelid.draw.drawn_worm import upright
+from annelid.draw.scene import upright
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.knobs import knobs_of
 from annelid.live.living import LivingWorm
 from annelid.live.moments import Moment, Reel, reel_of
-from annelid.live.picture import Painter, ring_colors, spring_colors
+from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
-from annelid.live.poke import REACH_M, struck
-from annelid.live.skeleton import Skeleton
 from annelid.live.traces import plots_of
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from annelid.analysis.rhombi import actuated, rhombus_plane
-from annelid.body import build_spec, mesh_of
+from annelid.body import mesh_of
 from annelid.config import WormBody, load_config
 from annelid.draw.camera import fitting_distance, picture_axes, picture_points
-from annelid.draw.still import render_still
+from annelid.draw.scene import render_still
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
+from annelid.simulation.worm import compile_worm
 from annelid_studies.riddle2023.figures import renderings
 from annelid_studies.riddle2023.figures.propagation import (
     figure_2_caption,
@@ -32,7 +34,6 @@ from annelid_studies.riddle2023.figures.renderings import (
     rendering_works,
     rest_posture,
     rhombus_outline,
-    strand_points,
 )
 
 LATE_S = 0.2
@@ -65,15 +66,9 @@ def check_files(png: Path, *, rendered: bool) -> None:
 @pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])
 def test_strand_points_at_rest_are_the_mesh(preset: str) -> None:
     config = load_config(preset)
-    posture = rest_posture(config)
-    qpos = build_spec(config).compile().qpos0
-    np.testing.assert_allclose(strand_points(config, qpos, posture.geometry), posture.strands_m, atol=1e-6)
-
-
-def test_coordinates_of_another_body_are_refused() -> None:
-    config = load_config("riddle2023-rods")
-    with pytest.raises(RunFileError, match="postures of 7 coordinates"):
-        strand_points(config, np.zeros(7), rest_posture(config).geometry)
+    anatomy = compile_worm(config)
+    strands, _ = Skeleton(anatomy).locate(anatomy.model.qpos0)
+    np.testing.assert_allclose(strands, rest_posture(config).strands_m, atol=1e-6)
 
 
 def test_strands_of_a_recorded_posture_pass_through_the_pins(rods_run: Run) -> None:

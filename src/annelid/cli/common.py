@@ -152,8 +152,7 @@ def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
 def print_table(run: Run) -> None:
     """Prints the numbers of a run, those to compare with beside them, and what follows."""
     from annelid.analysis import gait, summary
-    from annelid.draw.gait_table import add_gait
-    from annelid.draw.table import closing_sentence, summary_table
+    from annelid.draw.table import add_gait, closing_sentence, summary_table
     from annelid.terminal import Console
 
     numbers = summary(run)

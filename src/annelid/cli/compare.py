@@ -39,8 +39,8 @@ def compare_command(
     annelid compare runs/* --json | jq .numbers.period_s
     """
     from annelid.analysis.comparison import compare
-    from annelid.draw.comparison_table import comparison_table, fields_table
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
+    from annelid.draw.table import comparison_table, fields_table
     from annelid.output import write_json
     from annelid.simulation.runfile import open_run
     from annelid.terminal import Console

@@ -54,9 +54,9 @@ def limit_cycle_command(
     from typing import cast, get_args
 
     from annelid.analysis.limit_cycle import Time, limit_cycle
-    from annelid.draw.cycle_table import HEADINGS, cycle_numbers, cycle_table
     from annelid.draw.figures.limit_cycle import limit_cycle_figure
     from annelid.draw.plots import plot_path
+    from annelid.draw.table import TIMES, cycle_numbers, cycle_table
     from annelid.terminal import Console
 
     if output is not None:
@@ -70,5 +70,5 @@ def limit_cycle_command(
     else:
         Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
     if output is not None:
-        named = {HEADINGS[way]: cycle for way, cycle in cycles.items()}
+        named = {TIMES[way]: cycle for way, cycle in cycles.items()}
         typer.echo(limit_cycle_figure(named, output), err=as_json)

@@ -109,7 +109,7 @@ def render(
     annelid render runs/riddle2023-001 --video slow.mp4 --speed 0.25
     annelid render runs/riddle2023-001 --time 1.5 --camera side -o side.png
     """
-    from annelid.draw.gallery import video_bar
+    from annelid.draw.gallery import VIDEO_TASK, task_bar
     from annelid.draw.render import render_frame, render_video
     from annelid.simulation.runfile import open_run
 
@@ -125,6 +125,6 @@ def render(
     if at is not None:
         typer.echo(render_frame(opened, at, frame, camera=camera))
     if video is not None:
-        with video_bar() as progress:
+        with task_bar(VIDEO_TASK) as progress:
             render_video(opened, video, fps=fps, speed=speed, camera=camera, progress=progress)
         typer.echo(video)

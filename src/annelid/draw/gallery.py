@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FRAME_TIME_S = 1.5
 """Time of the frame, as in the paper's Fig. 8; half of the run where it is shorter."""
 BAR_AFTER_S = 2.0
+VIDEO_TASK = "drawing the video"
 
 
 def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
@@ -42,7 +43,7 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
     video_path = folder / "video.mp4"
 
     def draw_video(path: Path) -> Path:
-        with video_bar(quiet=quiet) as progress:
+        with task_bar(VIDEO_TASK, quiet=quiet) as progress:
             return render_video(run, path, progress=progress)
 
     pictures: list[tuple[str, Callable[[Path], Path], str]] = [
@@ -63,11 +64,6 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
         names = " and ".join(name for name, _ in failed)
         remedies = " and ".join(remedy for _, remedy in failed)
         complain(f"{names} not drawn: {reason} (the run is whole; then draw with: {remedies})")
-
-
-def video_bar(*, quiet: bool = False) -> AbstractContextManager[Progress | None]:
-    """Gives the progress callback of a video."""
-    return task_bar("drawing the video", quiet=quiet)
 
 
 @contextmanager

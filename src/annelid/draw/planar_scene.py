@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from itertools import chain
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from annelid.draw.style import STYLE, activation_color
 from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
+    from matplotlib.patches import Polygon
+    from matplotlib.text import Text
+
     from annelid.simulation.runfile import Run
 
 _DPI = 100
@@ -68,16 +72,12 @@ class PlanarScene:
                 axes.axhspan(-2 * half_height, -self._wall_height, color=_WALL, linewidth=0, zorder=0)
             axes.set_ylim(-half_height, half_height)
             self._title = axes.set_title(" ", animated=True)
-            self._rhombi = [
-                Polygon(np.zeros((4, 2)), closed=True, edgecolor="0.15", linewidth=1.2, animated=True)
-                for _ in range(self._lengths.shape[1])
-            ]
-            for rhombus in self._rhombi:
-                axes.add_patch(rhombus)
-            self._labels = [
-                axes.text(0, 0, str(i + 1), ha="center", va="center", color="w", size=13, weight="bold", animated=True)
-                for i in range(len(self._rhombi))
-            ]
+            look: dict[str, Any] = {"ha": "center", "va": "center", "color": "w", "size": 13, "weight": "bold"}
+            self._rhombi: list[tuple[Polygon, Text]] = []
+            for i in range(self._lengths.shape[1]):
+                patch = Polygon(np.zeros((4, 2)), closed=True, edgecolor="0.15", linewidth=1.2, animated=True)
+                axes.add_patch(patch)
+                self._rhombi.append((patch, axes.text(0, 0, str(i + 1), animated=True, **look)))
             self._canvas.draw()
         # Axes and grid stay as they are, so each picture redraws the worm only: a tenth of the time.
         self._background = self._canvas.copy_from_bbox(figure.bbox)
@@ -97,13 +97,13 @@ class PlanarScene:
             Pixels, shape ``(height, width, 3)``.
         """
         corners = self._corners(frame)
-        for i, (patch, label) in enumerate(zip(self._rhombi, self._labels, strict=True)):
+        for i, (patch, label) in enumerate(self._rhombi):
             patch.set_xy(corners[i])
             patch.set_facecolor(activation_color(float(self._activation[frame, i])))
             label.set_position(corners[i].mean(axis=0))
         self._title.set_text(f"{self.times_s[frame]:.2f} s   (red: contracted)")
         self._canvas.restore_region(self._background)
-        for artist in (*self._rhombi, *self._labels, self._title):
+        for artist in (*chain(*zip(*self._rhombi, strict=True)), self._title):
             self._axes.draw_artist(artist)
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
 
@@ -148,14 +148,8 @@ def rhombi(lengths: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArra
         Corners (left, top, right, bottom), shape ``(n_segments, 4, 2)``.
     """
     tips = np.concatenate(([0.0], np.cumsum(lengths))) - lengths.sum() / 2
-    left, right = tips[:-1], tips[1:]
-    middle, level = (left + right) / 2, np.zeros_like(left)
-    return np.stack(
-        [
-            np.stack([left, level], axis=1),
-            np.stack([middle, heights / 2], axis=1),
-            np.stack([right, level], axis=1),
-            np.stack([middle, -heights / 2], axis=1),
-        ],
-        axis=1,
-    )
+    corners = np.zeros((len(lengths), 4, 2))
+    corners[:, 0, 0], corners[:, 2, 0] = tips[:-1], tips[1:]
+    corners[:, 1::2, 0] = ((tips[:-1] + tips[1:]) / 2)[:, np.newaxis]
+    corners[:, 1, 1], corners[:, 3, 1] = heights / 2, -heights / 2
+    return corners

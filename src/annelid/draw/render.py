@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -131,12 +131,11 @@ def render_video(
         raise RunFileError(f"fps = {fps:g}: a video has {slowest:g} to {fastest:g} frames a second")
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a video must be positive and finite")
-    size = size or _video_size(run.config.body.kind, path)
-    with (
-        _scene(run, size, camera, fine=False) as scene,
-        whole_file(path) as draft,
-        _video_writer(draft, fps, size, path) as video,
-    ):
+    if size is None:
+        width, height = VIDEO_SIZE[run.config.body.kind]
+        # A GIF is large for what it shows, and so it is drawn smaller.
+        size = (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
+    with _scene(run, size, camera, fine=False) as scene, whole_file(path) as draft:
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
         pictures = (last - first) * fps / speed + 1.0
         if pictures > MOST_PICTURES:
@@ -145,10 +144,12 @@ def render_video(
                 f"pictures, more than {MOST_PICTURES:,}, which take about {pictures / 30 / 3600:.2g} h: raise the speed"
             )
         total = math.floor(pictures + 1e-6)
-        for done in range(total):
-            video.write(scene.picture(_nearest(run, scene.times_s, first + done * speed / fps)))
-            if progress is not None:
-                progress(done + 1, total)
+        with _video(draft, fps, size, path, total) as write:
+            for done in range(total):
+                frame = _nearest(run, scene.times_s, first + done * speed / fps)
+                write(np.ascontiguousarray(scene.picture(frame)))
+                if progress is not None:
+                    progress(done + 1, total)
     return path
 
 
@@ -174,27 +175,10 @@ def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
     return int(np.abs(times_s - time_s).argmin())
 
 
-def _video_size(kind: str, path: Path) -> tuple[int, int]:
-    """A GIF is large for what it shows, and so it is drawn smaller."""
-    width, height = VIDEO_SIZE[kind]
-    return (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
-
-
-class _VideoWriter:
-    """Hands pictures to ffmpeg and counts them."""
-
-    def __init__(self, frames: Generator[None, NDArray[np.uint8] | None, None]) -> None:
-        self._frames = frames
-        self.n_frames = 0
-
-    def write(self, pixels: NDArray[np.uint8]) -> None:
-        """Adds a picture."""
-        self._frames.send(np.ascontiguousarray(pixels))
-        self.n_frames += 1
-
-
 @contextmanager
-def _video_writer(path: Path, fps: float, size: tuple[int, int], name: Path) -> Iterator[_VideoWriter]:
+def _video(
+    path: Path, fps: float, size: tuple[int, int], name: Path, n_pictures: int
+) -> Iterator[Callable[[NDArray[np.uint8]], object]]:
     """Opens a video, and at the end makes sure that every picture is in it, for ffmpeg's exit status is lost."""
     try:
         import imageio_ffmpeg
@@ -213,11 +197,10 @@ def _video_writer(path: Path, fps: float, size: tuple[int, int], name: Path) -> 
         **settings,
     )
     frames.send(None)
-    writer = _VideoWriter(frames)
     broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"
     try:
         try:
-            yield writer
+            yield frames.send
         finally:
             frames.close()
     except OSError as error:
@@ -226,5 +209,5 @@ def _video_writer(path: Path, fps: float, size: tuple[int, int], name: Path) -> 
         n_frames, _ = imageio_ffmpeg.count_frames_and_secs(path)
     except (RuntimeError, OSError, ValueError) as error:
         raise RunFileError(broken) from error
-    if n_frames != writer.n_frames:
-        raise RunFileError(f"{broken} {n_frames} of {writer.n_frames} pictures are in it")
+    if n_frames != n_pictures:
+        raise RunFileError(f"{broken} {n_frames} of {n_pictures} pictures are in it")

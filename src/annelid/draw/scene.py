@@ -1,26 +1,152 @@
-"""A 3D worm drawn by MuJoCo: posed from a run's recorded postures, or in postures that are given one by one."""
+"""A 3D worm drawn by MuJoCo: as a run recorded it, in postures that are given one by one, or once on white."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import RunConfig, WormBody
-from annelid.draw.camera import FIXED, fitting_distance, view_angles
-from annelid.draw.drawn_worm import DrawnWorm, free_camera, middle, options
+from annelid.config import CourseTurning, Floor, RunConfig, WormBody
+from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.gl import Canvas, find_backend
-from annelid.draw.postures import postures_of
+from annelid.draw.style import CONTRACTED, activation_color
+from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
+    import mujoco
+
     from annelid.simulation.runfile import Run
+
+Array = NDArray[np.float64]
 
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
+AMBIENT, AMBIENT_ON_WHITE = 0.5, 0.7
+HEADLIGHT = 0.25
+"""Light from all sides, and from the camera; the lamp adds 0.4."""
+CONTRACTED_WIDTH = 1.8
+"""A contracted ring muscle is drawn this much thicker than a relaxed one."""
+HAZE = (0.94, 0.955, 0.97)
+"""What the floor fades into with distance."""
+PALE = 3.0
+"""On white, what lies this many half worms behind its middle would vanish."""
+SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
+"""Axial springs, apart from the red of a contracted ring."""
+WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
+WAYPOINT_HALF_HEIGHT_M = 1e-3
 
 
-class WormScene:
+class DrawnWorm:
+    """A 3D worm's compiled model, and the posture that it is drawn in.
+
+    Attributes:
+        model: The model, with a picture's lens and light.
+        posture: The engine's state of what is drawn.
+        upright: Rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``.
+    """
+
+    def __init__(self, config: RunConfig) -> None:
+        """Compiles the model of a 3D worm's configuration."""
+        import mujoco
+
+        from annelid.body import build_spec
+        from annelid.body.actuation import ring_names
+
+        assert isinstance(config.body, WormBody)
+        spec = build_spec(config)
+        _light(spec)
+        _mark_waypoints(spec, config)
+        self.model = spec.compile()
+        self.posture = mujoco.MjData(self.model)
+        self.upright = upright(config)
+        self._rings = [self.model.tendon(name).id for name in ring_names(config.body.n_segments, config.body.rings)]
+        self._widths = self.model.tendon_width[self._rings]
+
+    def pose(self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None = None) -> None:
+        """Brings all that is drawn into a posture.
+
+        Args:
+            qpos: Generalised positions, as a run records them.
+            activation: Gives the ring muscles their colours and widths, in [0, 1], ``(n_muscles,)``.
+        """
+        import mujoco
+
+        self.posture.qpos[:] = qpos
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex, mujoco.mj_tendon):
+            stage(self.model, self.posture)
+        if activation is None:
+            return
+        for ring, width, value in zip(self._rings, self._widths, activation.tolist(), strict=True):
+            self.model.tendon_rgba[ring] = (*activation_color(value), 1.0)
+            self.model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * value)
+
+    def part_ends(self, qpos: NDArray[np.floating]) -> Array:
+        """Both ends of every part of the worm in a posture, m, ``(point, 3)``.
+
+        The strands' free ends reach beyond the crossings, so these would not do.
+        """
+        import mujoco
+
+        model, posture = self.model, self.posture
+        parts = np.flatnonzero(model.geom_bodyid > 0)
+        capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
+        half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
+        posture.qpos[:] = qpos
+        mujoco.mj_kinematics(model, posture)
+        middles, axes = posture.geom_xpos[parts], posture.geom_xmat[parts].reshape(-1, 3, 3)[:, :, 2]
+        reach = half_lengths[:, None] * axes
+        return np.concatenate([middles - reach, middles + reach])
+
+
+class _Scene:
+    """Pictures of a worm from one direction, used as a context manager."""
+
+    def __init__(
+        self,
+        worm: DrawnWorm,
+        size: tuple[int, int],
+        angles_deg: tuple[float, float],
+        distance_m: float,
+        *,
+        fine: bool,
+        upright: Array | None,
+    ) -> None:
+        import mujoco
+
+        self._worm, self._upright = worm, upright
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+        self._camera.azimuth, self._camera.elevation = angles_deg
+        self._camera.distance = distance_m
+        # The rings stand for the actuators.
+        self._option = mujoco.MjvOption()
+        mujoco.mjv_defaultOption(self._option)
+        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
+        self._canvas = Canvas(worm.model, *size, find_backend(), fine=fine)
+
+    def __enter__(self) -> Self:
+        self._canvas.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the back-end."""
+        self._canvas.close()
+
+    def _draw(
+        self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None, target_m: Array, caption: str = ""
+    ) -> NDArray[np.uint8]:
+        self._worm.pose(qpos, activation)
+        self._camera.lookat[:] = target_m
+        return self._canvas.draw(self._worm.posture, self._camera, self._option, caption, upright=self._upright)
+
+
+class WormScene(_Scene):
     """Pictures of a 3D worm's run, used as a context manager."""
 
     def __init__(self, run: Run, width: int, height: int, camera: str, *, fine: bool) -> None:
@@ -39,33 +165,22 @@ class WormScene:
         """
         assert isinstance(run.config.body, WormBody)
         angles = view_angles(camera, run.config.body.heading_deg)
-        data = run.data
-        backend = find_backend()
-        self._run = run
-        self.times_s: NDArray[np.float64] = data["frame_time"].values
-        self._worm = DrawnWorm(run.config)
-        self._worm.light_for(angles[1])
-        model = self._worm.model
-        self._qpos = postures_of(run, model.nq)
-        self._target = data["crossing_position"].values.mean(axis=1)
-        points = np.stack([self._worm.part_ends(qpos) for qpos in self._qpos])
-        self._target[:, 2] = (points[:, :, 2].min() + points[:, :, 2].max()) / 2
+        worm = DrawnWorm(run.config)
+        self.times_s: Array = run.data["frame_time"].values
+        self._qpos = postures_of(run, worm.model.nq)
+        self._activation = run.data["activation"]
+        points = np.stack([worm.part_ends(qpos) for qpos in self._qpos])
+        box_middle = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
+        self._target = run.data["crossing_position"].values.mean(axis=1)
+        self._target[:, 2] = box_middle[2]
         if camera in FIXED:
-            self._target[:] = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
-        offsets = (points - self._target[:, None]).reshape(-1, 3) @ self._worm.upright.T
+            self._target[:] = box_middle
+        offsets = (points - self._target[:, None]).reshape(-1, 3) @ worm.upright.T
         distance = fitting_distance(offsets, *angles, width / height)
+        _dim(worm.model, angles[1])
         if camera in FIXED:
-            far = distance / model.stat.extent
-            model.vis.map.fogstart, model.vis.map.fogend = 2.0 * far, 6.0 * far
-        self._camera, self._option = free_camera(angles, distance), options()
-        self._canvas = Canvas(model, width, height, backend, fine=fine)
-
-    def __enter__(self) -> Self:
-        self._canvas.__enter__()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._canvas.close()
+            _set_fog(worm.model, 2.0 * distance, 6.0 * distance)
+        super().__init__(worm, (width, height), angles, distance, fine=fine, upright=worm.upright)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
         """Draws one recorded frame.
@@ -77,15 +192,11 @@ class WormScene:
             Pixels, shape ``(height, width, 3)``.
         """
         time_s = float(self.times_s[frame])
-        self._worm.pose(self._qpos[frame])
-        self._worm.color_rings(self._run.data["activation"].sel(time=time_s, method="nearest").values)
-        self._camera.lookat[:] = self._target[frame]
-        return self._canvas.draw(
-            self._worm.posture, self._camera, self._option, f"{time_s:.2f} s", upright=self._worm.upright
-        )
+        activation = self._activation.sel(time=time_s, method="nearest").values
+        return self._draw(self._qpos[frame], activation, self._target[frame], f"{time_s:.2f} s")
 
 
-class PostureScene:
+class PostureScene(_Scene):
     """Pictures of a 3D worm in postures that are given one by one.
 
     The camera looks at the worm's middle, from a distance that leaves it room to stretch.
@@ -104,25 +215,18 @@ class PostureScene:
             RunFileError: There is no such camera.
             RenderingUnavailable: No OpenGL back-end works.
         """
-        angles = view_angles(camera)
-        backend = find_backend()
-        self._worm = DrawnWorm(config)
-        self._worm.light_for(angles[1])
-        points = self._worm.part_ends(self._worm.model.qpos0)
-        offsets = (points - middle(points)) @ self._worm.upright.T
-        distance = ROOM * fitting_distance(offsets, *angles, width / height)
-        # The model's own rest has no heading.
         assert isinstance(config.body, WormBody)
-        self._camera = free_camera(view_angles(camera, config.body.heading_deg), distance)
-        self._option = options()
-        self._canvas = Canvas(self._worm.model, width, height, backend, fine=False)
-        self._canvas.__enter__()
+        # The model's own rest has no heading.
+        angles, headed = view_angles(camera), view_angles(camera, config.body.heading_deg)
+        worm = DrawnWorm(config)
+        points = worm.part_ends(worm.model.qpos0)
+        offsets = (points - _middle(points)) @ worm.upright.T
+        distance = ROOM * fitting_distance(offsets, *angles, width / height)
+        _dim(worm.model, angles[1])
+        super().__init__(worm, (width, height), headed, distance, fine=False, upright=worm.upright)
+        self.__enter__()
 
-    def close(self) -> None:
-        """Frees the back-end."""
-        self._canvas.close()
-
-    def picture(self, qpos: NDArray[np.float64], activation: NDArray[np.float64], caption: str) -> NDArray[np.uint8]:
+    def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture.
 
         Args:
@@ -133,7 +237,151 @@ class PostureScene:
         Returns:
             Pixels, shape ``(height, width, 3)``.
         """
-        self._camera.lookat[:] = middle(self._worm.part_ends(qpos))
-        self._worm.pose(qpos)
-        self._worm.color_rings(activation)
-        return self._canvas.draw(self._worm.posture, self._camera, self._option, caption, upright=self._worm.upright)
+        return self._draw(qpos, activation, _middle(self._worm.part_ends(qpos)), caption)
+
+
+@dataclass(frozen=True)
+class Still:
+    """A rendered posture that marks can be drawn on.
+
+    Attributes:
+        pixels: Shape ``(height, width, 3)``.
+        target_m: Point that the camera looks at, shape ``(3,)``.
+        angles_deg: Azimuth and elevation of the line of sight.
+        distance_m: From the camera to the point that it looks at.
+    """
+
+    pixels: NDArray[np.uint8]
+    target_m: Array
+    angles_deg: tuple[float, float]
+    distance_m: float
+
+    def places(self, points_m: ArrayLike) -> Array:
+        """Finds the pixels (column, row) at which points appear.
+
+        Args:
+            points_m: Points, m, shape ``(..., 3)``.
+
+        Returns:
+            Columns and rows, counted from the picture's upper left corner, shape ``(..., 2)``.
+        """
+        height, width = self.pixels.shape[:2]
+        offsets = np.asarray(points_m, dtype=float) - self.target_m
+        shares = picture_points(offsets, *self.angles_deg, self.distance_m, width / height)
+        return shares * [width, height] - 0.5
+
+
+def render_still(
+    config: RunConfig,
+    angles_deg: tuple[float, float],
+    size: tuple[int, int],
+    *,
+    qpos: Array | None = None,
+    activation: Array | None = None,
+) -> Still:
+    """Renders one posture on white, without a floor; what lies behind is paler.
+
+    Args:
+        config: Configuration of the 3D worm.
+        angles_deg: Azimuth and elevation of the line of sight.
+        size: Width and height, pixels.
+        qpos: The posture as a run records it; by default at rest.
+        activation: Colours and widths of the ring muscles; by default all rings and springs are red.
+
+    Raises:
+        RenderingUnavailable: No OpenGL back-end works.
+    """
+    worm = DrawnWorm(config)
+    model = worm.model
+    if activation is None:
+        model.tendon_rgba[:] = (*CONTRACTED, 1.0)
+    model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
+    model.vis.headlight.ambient[:] = AMBIENT_ON_WHITE
+    model.vis.rgba.fog[:] = 1.0
+    drawn = model.qpos0 if qpos is None else qpos
+    points = worm.part_ends(drawn)
+    target = _middle(points)
+    distance = fitting_distance(points - target, *angles_deg, size[0] / size[1])
+    reach = float(np.linalg.norm(points - target, axis=1).max())
+    _set_fog(model, distance - reach, distance + PALE * reach)
+    with _Scene(worm, size, angles_deg, distance, fine=True, upright=None) as scene:
+        return Still(scene._draw(drawn, activation, target), target, angles_deg, distance)
+
+
+def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
+    """Returns the generalised positions of every frame, ``(n_frames, n_coordinates)``.
+
+    Args:
+        run: The run of a 3D worm.
+        n_coordinates: Generalised positions of the body that is built from its configuration.
+
+    Raises:
+        RunFileError: No postures were recorded, or those of another body.
+    """
+    data = run.data
+    if "qpos" not in data or data.sizes.get("frame", 0) == 0:
+        raise RunFileError(f"{run.path} holds no recorded postures to draw")
+    if data.sizes["coordinate"] != n_coordinates:
+        raise RunFileError(
+            f"{run.path} holds postures of {data.sizes['coordinate']} coordinates, but the body built "
+            f"from its configuration has {n_coordinates}: it was written by another version"
+        )
+    return data["qpos"].values
+
+
+def upright(config: RunConfig) -> Array:
+    """Returns the rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``."""
+    slope = math.radians(config.arena.slope_deg) if isinstance(config.arena, Floor) else 0.0
+    c, s = math.cos(slope), math.sin(slope)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def _middle(points_m: Array) -> Array:
+    """Middle of the box about points, m, ``(point, 3)``."""
+    return (points_m.min(axis=0) + points_m.max(axis=0)) / 2
+
+
+def _dim(model: mujoco.MjModel, elevation_deg: float) -> None:
+    """Dims the light from all sides where the floor would be white: it takes the more of the headlight the steeper."""
+    steepness = abs(math.sin(math.radians(elevation_deg)))
+    model.vis.headlight.ambient[:] = min(AMBIENT, AMBIENT + 0.1 - HEADLIGHT * steepness)
+
+
+def _set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
+    model.vis.map.fogstart, model.vis.map.fogend = start_m / model.stat.extent, end_m / model.stat.extent
+
+
+def _light(spec: mujoco.MjSpec) -> None:
+    """Gives a model a picture's lens and light."""
+    import mujoco
+
+    visual = spec.visual
+    visual.global_.fovy = FIELD_OF_VIEW_DEG
+    visual.headlight.diffuse = [HEADLIGHT] * 3
+    visual.headlight.specular = [0.05, 0.05, 0.05]
+    visual.quality.shadowsize = 4096
+    visual.rgba.fog = [*HAZE, 1.0]
+    visual.map.fogstart, visual.map.fogend = 4.0, 12.0
+    for light in spec.lights:
+        light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        light.diffuse = [0.4, 0.4, 0.4]
+        light.specular = [0.1, 0.1, 0.1]
+    for tendon in spec.tendons:
+        tendon.rgba = SPRING_RGBA
+
+
+def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:
+    """Lays a disc on the floor where each waypoint of a course counts as reached."""
+    import mujoco
+
+    if not (isinstance(config.turning, CourseTurning) and isinstance(config.arena, Floor)):
+        return
+    for x, y in config.turning.waypoints:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[x, y, WAYPOINT_HALF_HEIGHT_M - config.arena.floor_gap_m],
+            size=[config.turning.reach_m, WAYPOINT_HALF_HEIGHT_M, 0.0],
+            rgba=WAYPOINT_RGBA,
+            contype=0,
+            conaffinity=0,
+        )

@@ -53,78 +53,37 @@ class Knob:
 
 def knobs_of(config: RunConfig) -> tuple[Knob, ...]:
     """Returns what can be turned of a 3D worm; sensors and drive only where its controller has them."""
-    body, arena, controller = config.body, config.arena, config.controller
+    body, arena, controller, sensor = config.body, config.arena, config.controller, config.sensor
     assert isinstance(body, WormBody)
     assert arena is not None
-    sliding = "forwards" if arena.has_setae else "any direction"
-    friction = _above(arena.friction, 2.0)
-    strands, springs = 1e-9 * body.strands.young_modulus_Pa, body.springs.stiffness_N_per_m
+    friction, strands, springs = "arena.friction", "body.strands.young_modulus_Pa", "body.springs.stiffness_N_per_m"
+    gpa, stiffness = 1e-9 * body.strands.young_modulus_Pa, body.springs.stiffness_N_per_m
+    sliding = f"Sliding friction of skin and ground ({'forwards' if arena.has_setae else 'any direction'}). "
+    rebuilt = "The body is rebuilt and goes on where it is."
+    bending = f"Young's modulus of the strands, which resists bending. {rebuilt}"
+    axial = f"Stiffness of the axial springs. {rebuilt}"
+    most = _above(arena.friction, 2.0)
     knobs = [
-        Knob(
-            "arena.friction",
-            "friction",
-            1.0,
-            _LEAST_FRICTION,
-            friction,
-            0.01,
-            f"Sliding friction of skin and ground ({sliding}). Takes effect in the next step.",
-        ),
-        Knob(
-            "body.strands.young_modulus_Pa",
-            "strands (GPa)",
-            1e-9,
-            _round(strands / 4),
-            _round(4 * strands),
-            _round(strands / 40),
-            "Young's modulus of the strands, which resists bending. The body is rebuilt and goes on where it is.",
-        ),
-        Knob(
-            "body.springs.stiffness_N_per_m",
-            "springs (N/m)",
-            1.0,
-            0.0,
-            _round(4 * springs) or 100.0,
-            0.1,
-            "Stiffness of the axial springs. The body is rebuilt and goes on where it is.",
-        ),
+        Knob(friction, "friction", 1.0, _LEAST_FRICTION, most, 0.01, sliding + "Takes effect in the next step."),
+        Knob(strands, "strands (GPa)", 1e-9, _round(gpa / 4), _round(4 * gpa), _round(gpa / 40), bending),
+        Knob(springs, "springs (N/m)", 1.0, 0.0, _round(4 * stiffness) or 100.0, 0.1, axial),
     ]
     if isinstance(controller, SnsController | AdaptiveSns | PressureSns):
-        knobs.append(
-            Knob(
-                "sensor.tolerance_m",
-                "sensor tolerance (mm)",
-                1e3,
-                0.0,
-                _above(1e3 * config.sensor.tolerance_m, 40.0),
-                0.5,
-                "A stretch sensor is on while its segment is within this of its rest length.",
-            )
-        )
+        most = _above(1e3 * sensor.tolerance_m, 40.0)
+        near = "A stretch sensor is on while its segment is within this of its rest length."
+        knobs.append(Knob("sensor.tolerance_m", "sensor tolerance (mm)", 1e3, 0.0, most, 0.5, near))
     if isinstance(controller, SnsController | AdaptiveSns | PressureSns | RobustSns):
-        knobs.append(
-            Knob(
-                "sensor.noise_m",
-                "sensor noise (mm)",
-                1e3,
-                0.0,
-                _above(1e3 * config.sensor.noise_m, 10.0),
-                0.1,
-                "Standard deviation of the noise on every reading of a stretch sensor.",
-            )
-        )
-    return (*knobs, *_drive(config))
-
-
-def _drive(config: RunConfig) -> tuple[Knob, ...]:
-    controller = config.controller
-    hint = "Descending drive: more of it makes the wave faster."
+        most = _above(1e3 * sensor.noise_m, 10.0)
+        noise = "Standard deviation of the noise on every reading of a stretch sensor."
+        knobs.append(Knob("sensor.noise_m", "sensor noise (mm)", 1e3, 0.0, most, 0.1, noise))
+    descending = "Descending drive: more of it makes the wave faster."
     if isinstance(controller, AdaptiveSns):
-        return (Knob("controller.drive", "drive", 1.0, 0.0, 1.0, 0.01, hint),)
-    if isinstance(controller, RobustSns) and controller.descending.lift:
-        return (Knob("controller.descending.drive", "drive", 1.0, 0.0, 1.0, 0.01, hint),)
-    if isinstance(controller, PhaseChain):
-        return (Knob("controller.drive", "drive", 1.0, 0.0, 6.0, 0.05, hint),)
-    return ()
+        knobs.append(Knob("controller.drive", "drive", 1.0, 0.0, 1.0, 0.01, descending))
+    elif isinstance(controller, RobustSns) and controller.descending.lift:
+        knobs.append(Knob("controller.descending.drive", "drive", 1.0, 0.0, 1.0, 0.01, descending))
+    elif isinstance(controller, PhaseChain):
+        knobs.append(Knob("controller.drive", "drive", 1.0, 0.0, 6.0, 0.05, descending))
+    return tuple(knobs)
 
 
 def _above(value: float, usual: float) -> float:

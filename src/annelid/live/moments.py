@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.draw.postures import postures_of
+from annelid.draw.scene import postures_of
 from annelid.simulation.runfile import Run
 
 KEEP_BYTES = 200_000_000

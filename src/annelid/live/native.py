@@ -6,9 +6,9 @@ import sys
 from time import perf_counter, sleep
 
 from annelid.config import RunConfig
-from annelid.draw.drawn_worm import DrawnWorm
+from annelid.draw.scene import DrawnWorm
 from annelid.errors import RenderingUnavailable, SimulationStopped
-from annelid.live.player import Player, config_of, player_of
+from annelid.live.player import config_of, player_of
 from annelid.simulation.runfile import Run
 
 FRAMES_A_SECOND = 30.0
@@ -47,29 +47,18 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
         last = perf_counter()
         while window.is_running():
             begun = perf_counter()
-            _obey(player, pressed)
+            while pressed:
+                {_SPACE: player.toggle, _BACKSPACE: player.restart}.get(pressed.pop(0), lambda: None)()
             player.tick(begun - last, deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             with window.lock():
-                worm.pose(player.moment.qpos)
-                worm.color_rings(player.moment.activation)
+                worm.pose(player.moment.qpos, player.moment.activation)
             window.sync()
             if player.stopped:
                 break
             sleep(max(0.0, begun + 1.0 / FRAMES_A_SECOND - perf_counter()))
     if player.stopped:
         raise SimulationStopped(player.stopped)
-
-
-def _obey(player: Player, pressed: list[int]) -> None:
-    while pressed:
-        key = pressed.pop(0)
-        if key == _BACKSPACE:
-            player.restart()
-        elif key == _SPACE and player.playing:
-            player.pause()
-        elif key == _SPACE:
-            player.play()
 
 
 def _require_display() -> None:

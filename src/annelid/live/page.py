@@ -5,19 +5,19 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import RunFileError
 from annelid.live.guard import content_policy
-from annelid.live.legend import legend_html
-from annelid.live.picture import Lines, Painter, Picture
+from annelid.live.panel import legend_html
+from annelid.live.picture import Painter, Picture
 from annelid.live.player import Player, config_of, player_of
 from annelid.live.server import Server
-from annelid.live.skeleton import Skeleton
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.anatomy import Anatomy
@@ -114,14 +114,8 @@ def _page(
 
 def _rounded(picture: Picture) -> Picture:
     """Places with fewer digits, which compress."""
-    lines: dict[str, Any] = {
-        name: _grained(getattr(picture, name)) for name in ("strands", "rings", "springs", "contacts")
-    }
-    return Picture(**lines, ring_colors=picture.ring_colors, spring_colors=picture.spring_colors, middle=picture.middle)
-
-
-def _grained(lines: Lines) -> Lines:
-    return (np.round(lines / GRAIN_M) * GRAIN_M).astype(np.float32)
+    lines = {name: getattr(picture, name) for name in ("strands", "rings", "springs", "contacts")}
+    return replace(picture, **{n: (np.round(v / GRAIN_M) * GRAIN_M).astype(np.float32) for n, v in lines.items()})
 
 
 def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> str:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.draw.style import segment_colors
+from annelid.draw.style import CONTRACTED, RELAXED, segment_colors
 from annelid.live.knobs import Knob
+from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
 from annelid.live.traces import Curve, Plot
@@ -38,7 +40,6 @@ class Panel:
         server: viser.ViserServer,
         show: Show,
         *,
-        living: bool,
         speed: float,
         weight_N: float,
         knobs: Mapping[Knob, float],
@@ -50,60 +51,44 @@ class Panel:
         Args:
             server: Where they are seen.
             show: Whom they ask.
-            living: Whether the worm runs, else it was recorded.
             speed: Simulated seconds a second at the start.
             weight_N: Of the worm on Earth, which pokes are measured by.
-            knobs: What can be turned, with the values that are shown first.
+            knobs: What can be turned, with the values that are shown first; none of a recorded run.
             plots: What can be plotted, by name; the first is.
             legend: What colours mean, as HTML.
         """
         gui = self._gui = server.gui
-        self._living = living
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self._status = gui.add_html("")
-        self._transport(show, living, speed)
+        self._transport(show, speed)
         self._knobs: dict[Knob, Any] = {}
         self._poke: Any = None
-        if living:
-            with gui.add_folder("Physics"):
-                for knob, shown in knobs.items():
-                    self._knobs[knob] = self._knob(show, knob, shown)
-                self._poke = gui.add_slider(
-                    "poke (N)",
-                    0.0,
-                    STRONGEST_POKE * weight_N,
-                    0.1,
-                    weight_N,
-                    hint="Force of a poke, the worm's weight at first: click on the worm, which is pushed away from "
-                    "you for 0.15 s.",
-                )
-                gui.add_button("as at first", hint="Gives every slider above its first value.").on_click(
-                    lambda _: show.ask(show.reset_knobs)
-                )
+        if show.player.worm is not None:
+            self._physics(show, weight_N, knobs)
         self._plot_folder = gui.add_folder("Nervous system, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
-            names = list(plots)
-            choice = gui.add_dropdown("plot", names, initial_value=names[0])
+            choice = gui.add_dropdown("plot", list(plots), initial_value=next(iter(plots)))
             choice.on_update(lambda event: show.ask(show.choose_plot, str(event.target.value)))
-        self.show_plot(plots[names[0]])
         with gui.add_folder("Colours"):
             gui.add_html(legend)
         with gui.add_folder("Shown", expand_by_default=False):
             follow = gui.add_checkbox("follow the worm", initial_value=True)
-            follow.on_update(lambda event: show.ask(show.set_follow, bool(event.target.value)))
+            follow.on_update(lambda event: show.ask(setattr, show, "follow", bool(event.target.value)))
             for layer in LAYERS:
-                self._layer(show, layer)
+                box = gui.add_checkbox(layer, initial_value=True)
+                box.on_update(_asking(show, show.stage.set_visible, layer))
 
     @property
     def poke_N(self) -> float:
         """Force of a poke, N."""
         return float(self._poke.value) if self._poke is not None else 0.0
 
-    def _transport(self, show: Show, living: bool, speed: float) -> None:
-        gui = self._gui
-        buttons = {PLAY: show.play_or_pause, **({NOW: show.go_live} if living else {}), AGAIN: show.restart}
+    def _transport(self, show: Show, speed: float) -> None:
+        gui, player = self._gui, show.player
+        living = player.worm is not None
+        buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: show.restart}
         row = gui.add_button_group(
             "",
             list(buttons),
@@ -113,20 +98,30 @@ class Panel:
         )
         row.on_click(lambda event: show.ask(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
-        self._time.on_update(_from_user(lambda value: show.ask(show.seek, float(value))))
+        self._time.on_update(_asking(show, player.seek))
         pace = gui.add_slider(
             "speed", SLOWEST, FASTEST, 0.05, speed, hint="Simulated seconds a second; the worm may not keep up."
         )
-        pace.on_update(_from_user(lambda value: show.ask(show.set_speed, float(value))))
+        pace.on_update(_asking(show, setattr, player, "speed"))
 
-    def _knob(self, show: Show, knob: Knob, shown: float) -> Any:
-        slider = self._gui.add_slider(knob.label, knob.low, knob.high, knob.step, shown, hint=knob.hint)
-        slider.on_update(_from_user(lambda value: show.ask(show.turn, knob.field, knob.value(float(value)))))
-        return slider
-
-    def _layer(self, show: Show, layer: str) -> None:
-        box = self._gui.add_checkbox(layer, initial_value=True)
-        box.on_update(lambda event: show.ask(show.set_visible, layer, bool(event.target.value)))
+    def _physics(self, show: Show, weight_N: float, knobs: Mapping[Knob, float]) -> None:
+        with self._gui.add_folder("Physics"):
+            for knob, shown in knobs.items():
+                slider = self._gui.add_slider(knob.label, knob.low, knob.high, knob.step, shown, hint=knob.hint)
+                slider.on_update(_asking(show, show.turn, knob))
+                self._knobs[knob] = slider
+            self._poke = self._gui.add_slider(
+                "poke (N)",
+                0.0,
+                STRONGEST_POKE * weight_N,
+                0.1,
+                weight_N,
+                hint="Force of a poke, the worm's weight at first: click on the worm, which is pushed away from "
+                "you for 0.15 s.",
+            )
+            self._gui.add_button("as at first", hint="Gives every slider above its first value.").on_click(
+                lambda _: show.ask(show.reset_knobs)
+            )
 
     def tell(self, status: str) -> None:
         """Shows the state of things first, as HTML."""
@@ -172,17 +167,60 @@ def _series(curve: Curve, colors: Sequence[str]) -> Any:
     return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {})
 
 
-def _from_user(tell: Callable[[Any], None]) -> Callable[[Any], None]:
-    """Passes on what a user does to a slider, not what `Panel` itself sets it to."""
+def _asking(show: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
+    """Asks for a call with a slider's value as its last argument, if it was the user who moved it and not `Panel`."""
 
     def on_update(event: Any) -> None:
         if event.client_id is not None:
-            tell(event.target.value)
+            show.ask(call, *first, event.target.value)
 
     return on_update
 
 
+def legend_html(arrow_N: float, radius_m: float) -> str:
+    """Returns the legend.
+
+    Args:
+        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, N.
+        radius_m: That radius, m.
+    """
+    percent = f"{100 * SPRING_RANGE:.0f}&thinsp;%"
+    rows = (
+        (_bar(STRAND_COLORS, smooth=False), "strands, one colour for either handedness"),
+        (_bar((RELAXED, CONTRACTED)), "ring muscles, activation 0 to 1"),
+        (_bar(SPRING_COLORS), f"axial springs, {percent} shorter to {percent} longer than at rest"),
+        (
+            f'<span style="color:{_css(CONTACT_COLOR)};font-size:1.3em;line-height:0.8">&#8593;</span>',
+            f"force of the ground on a segment: {100 * radius_m:.0f}&thinsp;cm are {arrow_N:g}&thinsp;N",
+        ),
+    )
+    cells = "".join(
+        f'<tr><td style="padding:2px 8px 2px 0;text-align:center">{mark}</td><td>{words}</td></tr>'
+        for mark, words in rows
+    )
+    return f'<table style="font-size:0.8em;line-height:1.25;border-collapse:collapse;margin-left:0.6em">{cells}</table>'
+
+
+def status_html(name: str, parts: Sequence[str], below: str) -> str:
+    """Returns the state of things, every word as it was written.
+
+    Args:
+        name: Of the worm.
+        parts: What stands beside it.
+        below: A sentence under it, or none.
+    """
+    line = "&emsp;".join([f"<b>{html.escape(name)}</b>", *map(html.escape, parts)])
+    rest = f'<div style="margin-top:0.5em">{html.escape(below)}</div>' if below else ""
+    return f'<div style="font-size:0.9em;margin:0 0.6em;overflow-wrap:anywhere">{line}{rest}</div>'
+
+
+def _bar(colors: Sequence[Sequence[float]], *, smooth: bool = True) -> str:
+    stops = ",".join(_css(color) for color in colors)
+    if not smooth:
+        stops = f"{_css(colors[0])} 50%,{_css(colors[1])} 50%"
+    style = f"display:inline-block;width:4em;height:0.8em;background:linear-gradient(90deg,{stops})"
+    return f'<span style="{style}"></span>'
+
+
 def _css(color: Any) -> str:
-    if isinstance(color, str):
-        return color
-    return "#" + "".join(f"{round(255 * channel):02x}" for channel in color[:3])
+    return color if isinstance(color, str) else "#" + "".join(f"{round(255 * channel):02x}" for channel in color[:3])

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.config import RunConfig
+from annelid.draw.skeleton import Skeleton
 from annelid.draw.style import CONTRACTED, RELAXED
 from annelid.live.moments import Moment
-from annelid.live.skeleton import Skeleton
 from annelid.morphology import Array
 
 Lines = NDArray[np.float32]
@@ -26,6 +26,8 @@ SPRING_RANGE = 0.3
 """Strain at which these colours are full."""
 CONTACT_COLOR = (0.04, 0.45, 0.14)
 SCREEN_GAMMA = 2.2
+REACH_M = 0.04
+"""Distance from the line of sight within which a point of the mesh is hit; its meshes are wider than a mouse."""
 LONGEST_ARROW = 4.0
 """Of the arrows of contact forces, in radii of the worm at rest."""
 
@@ -129,6 +131,24 @@ def spring_colors(strain: NDArray[np.floating]) -> Colors:
     stops = (-SPRING_RANGE, 0.0, SPRING_RANGE)
     colors = np.stack([np.interp(strain, stops, channel) for channel in np.transpose(SPRING_COLORS)], axis=-1)
     return _bytes(np.repeat(colors, 2, axis=0)).reshape(-1, 2, 3)
+
+
+def struck(points_m: Array, origin_m: Array, direction: Array) -> Array | None:
+    """Returns the point that a ray hits first.
+
+    Args:
+        points_m: Points of the worm, m, ``(n, 3)``.
+        origin_m: Where the ray begins, m, ``(3,)``.
+        direction: Its unit direction, ``(3,)``.
+
+    Returns:
+        The nearest to the origin of all points within `REACH_M` of the ray, ``(3,)``, or None.
+    """
+    offsets = points_m - origin_m
+    depth = offsets @ direction
+    beside = np.linalg.norm(offsets - depth[:, np.newaxis] * direction, axis=-1)
+    hit = np.flatnonzero((beside < REACH_M) & (depth > 0))
+    return points_m[hit[depth[hit].argmin()]] if hit.size else None
 
 
 def _segments(vertices: Array) -> Lines:

@@ -30,7 +30,7 @@ class Player:
     def __init__(self, source: LivingWorm | Reel, speed: float = 1.0) -> None:
         """Begins with the first moment, playing."""
         self.worm = source if isinstance(source, LivingWorm) else None
-        self._reel = source if isinstance(source, Reel) else None
+        self._reel = None if isinstance(source, LivingWorm) else source
         self.speed = speed
         self.stopped = ""
         self._rewind()
@@ -54,6 +54,10 @@ class Player:
             self.worm.restart()
         self.stopped = ""
         self._rewind()
+
+    def toggle(self) -> None:
+        """Pauses where it plays, and plays where it is paused."""
+        self.pause() if self.playing else self.play()
 
     def play(self) -> None:
         """Lets time go on; a run that has ended begins again."""
@@ -92,16 +96,13 @@ class Player:
         if wanted >= self.reel.span_s[1]:
             self.at_end = True
             if self.worm is not None and not self.stopped:
-                self._live_on(self.worm, wanted, deadline)
+                try:
+                    self.worm.advance(wanted, deadline)
+                except SimulationStopped as stop:
+                    self.stopped, self.playing = str(stop), False
             else:
                 self.playing = False
         self._clock_s = min(wanted, self.reel.span_s[1])
-
-    def _live_on(self, worm: LivingWorm, until_s: float, deadline: float) -> None:
-        try:
-            worm.advance(until_s, deadline)
-        except SimulationStopped as stop:
-            self.stopped, self.playing = str(stop), False
 
     def _rewind(self) -> None:
         first, last = self.reel.span_s

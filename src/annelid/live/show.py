@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.draw.skeleton import Skeleton
 from annelid.errors import AnnelidError
-from annelid.live.knobs import knobs_of
-from annelid.live.legend import legend_html, status_html
+from annelid.live.knobs import Knob, knobs_of
 from annelid.live.moments import Moment
-from annelid.live.panel import Panel
-from annelid.live.picture import Painter
+from annelid.live.panel import Panel, legend_html, status_html
+from annelid.live.picture import Painter, struck
 from annelid.live.player import config_of, player_of
-from annelid.live.poke import struck
 from annelid.live.server import LOOPBACK, Server
-from annelid.live.skeleton import Skeleton
 from annelid.live.stage import Stage
 from annelid.live.traces import SECONDS, plots_of
 from annelid.morphology import Array
@@ -50,6 +48,8 @@ class Show:
     Attributes:
         player: What is shown when.
         picture: What is seen, in the model's axes.
+        stage: Where it is seen.
+        follow: Whether the worm is kept in the middle, or may crawl away.
         address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
     """
@@ -69,26 +69,24 @@ class Show:
         """
         self._config = config_of(source)
         self.player, anatomy = player_of(source, speed)
-        living = self.player.worm is not None
         self._painter = Painter(Skeleton(anatomy), self._config)
         self.picture = self._painter.paint(self.player.moment)
         self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
         self._wishing = threading.Lock()
         self._ending = threading.Event()
-        self._follow = True
+        self.follow = True
         self._notice = ""
         self._pace: deque[tuple[float, float]] = deque()
         self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
-        self._knobs = knobs_of(self._config) if living else ()
+        self._knobs = knobs_of(self._config) if self.player.worm is not None else ()
         self._plots = plots_of(self.player.reel.names)
         self._server = Server(host, port)
         self.address = self._server.address
-        self._stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
+        self.stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
         self._panel = Panel(
             self._server,
             self,
-            living=living,
             speed=speed,
             weight_N=round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1),
             knobs={knob: knob.shown(self._config) for knob in self._knobs},
@@ -96,7 +94,7 @@ class Show:
             legend=legend_html(self._painter.arrow_N, anatomy.geometry.radius_m),
         )
         self.choose_plot(next(iter(self._plots)))
-        if living:
+        if self.player.worm is not None:
             self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
 
     def __enter__(self) -> Self:
@@ -122,7 +120,7 @@ class Show:
     @property
     def shift_m(self) -> Array:
         """Where the model's origin is in the page, m, ``(3,)``."""
-        return self._stage.shift_m
+        return self.stage.shift_m
 
     def clients(self) -> list[viser.ClientHandle]:
         """Returns the browsers that look on, each with its camera."""
@@ -133,42 +131,23 @@ class Show:
         self._ending.set()
 
     def ask(self, call: Callable[..., None], *arguments: Any) -> None:
-        """Has the loop call one of the methods below; may be called from any thread.
+        """Has the loop call something; may be called from any thread.
 
         Of calls that differ in their last argument only, as while a slider is dragged, the last one counts.
         """
         with self._wishing:
             self._wishes[call.__name__, *arguments[:-1]] = call, arguments
 
-    def play_or_pause(self) -> None:
-        """Changes between the two."""
-        if self.player.playing:
-            self.player.pause()
-        else:
-            self.player.play()
-
-    def go_live(self) -> None:
-        """Shows the present."""
-        self.player.go_live()
-
     def restart(self) -> None:
         """Begins anew, under what the knobs say."""
         self._notice = ""
         self.player.restart()
 
-    def seek(self, time_s: float) -> None:
-        """Shows another time."""
-        self.player.seek(time_s)
-
-    def set_speed(self, speed: float) -> None:
-        """Sets simulated seconds a second."""
-        self.player.speed = speed
-
-    def turn(self, field: str, value: float) -> None:
-        """Changes a field of the running worm."""
+    def turn(self, knob: Knob, shown: float) -> None:
+        """Changes a field of the running worm to what a slider shows."""
         assert self.player.worm is not None
         self._notice = ""
-        self.player.worm.adjust({field: value})
+        self.player.worm.adjust({knob.field: knob.value(shown)})
 
     def reset_knobs(self) -> None:
         """Gives all knobs their first values."""
@@ -185,18 +164,10 @@ class Show:
         if not self.player.at_end:
             self._notice = "This is the past: press now and poke the worm again."
             return
-        origin, sight = self._stage.to_model(np.asarray(origin_m), np.asarray(direction))
+        origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
         place = struck(self.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
             worm.poke(place, self._panel.poke_N * sight)
-
-    def set_follow(self, follow: bool) -> None:
-        """Keeps the worm in the middle, or lets it crawl away."""
-        self._follow = follow
-
-    def set_visible(self, layer: str, visible: bool) -> None:
-        """Shows or hides a layer of the scene."""
-        self._stage.set_visible(layer, visible)
 
     def choose_plot(self, name: str) -> None:
         """Plots other signals."""
@@ -214,13 +185,13 @@ class Show:
                 self._notice = str(error)
 
     def _draw(self) -> None:
-        wanted = self.player.moment, self._follow
+        wanted = self.player.moment, self.follow
         if wanted == self._drawn:
             return
         self._drawn = wanted
         self.picture = self._painter.paint(self.player.moment)
         with self._server.atomic():
-            self._stage.show(self.picture, follow=self._follow)
+            self.stage.show(self.picture, follow=self.follow)
         self._server.flush()
         self.frames_drawn += 1
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from annelid.arena.scenery import (
 from annelid.arena.shapes import shape_of
 from annelid.config import Floor, Pipe, RunConfig, WormBody
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
-from annelid.draw.drawn_worm import upright
+from annelid.draw.scene import upright
 from annelid.live.picture import CONTACT_COLOR, Colors, Picture
 from annelid.morphology import Array, heading_turn
 
@@ -73,14 +73,13 @@ class Stage:
         self.turn = upright(config)
         self.shift_m = np.zeros(3)
         self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=SO3.from_matrix(self.turn).wxyz)
-        self._strands = scene.add_line_segments(
-            f"{_ROOT}/strands", first.strands, strand_colors, thickness=STRAND_PIXELS, thickness_units="screen"
-        )
-        self._rings = scene.add_line_segments(
-            f"{_ROOT}/rings", first.rings, first.ring_colors, thickness=RING_PIXELS, thickness_units="screen"
-        )
-        self._springs = scene.add_line_segments(
-            f"{_ROOT}/springs", first.springs, first.spring_colors, thickness=SPRING_PIXELS, thickness_units="screen"
+        self._strands, self._rings, self._springs = (
+            scene.add_line_segments(f"{_ROOT}/{name}", points, colors, thickness=width, thickness_units="screen")
+            for name, points, colors, width in (
+                ("strands", first.strands, strand_colors, STRAND_PIXELS),
+                ("rings", first.rings, first.ring_colors, RING_PIXELS),
+                ("springs", first.springs, first.spring_colors, SPRING_PIXELS),
+            )
         )
         self._contacts = scene.add_arrows(
             f"{_ROOT}/contacts",
@@ -149,14 +148,8 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, h
     shape = shape_of(arena, length_m)
     pipe = isinstance(arena, Pipe)
     if shape is not None and pipe:
-        scene.add_mesh_simple(
-            f"{_ROOT}/ground/pipe",
-            shape.vertices_m,
-            shape.faces,
-            color=PIPE_RGBA[:3],
-            opacity=PIPE_RGBA[3],
-            side="double",
-        )
+        look: dict[str, Any] = {"color": PIPE_RGBA[:3], "opacity": PIPE_RGBA[3], "side": "double"}
+        scene.add_mesh_simple(f"{_ROOT}/ground/pipe", shape.vertices_m, shape.faces, **look)
     elif shape is not None:
         import trimesh
         from trimesh.visual import ColorVisuals
@@ -167,16 +160,10 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, h
     if shape is None or pipe:
         depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
         vertices, faces = _squares(-depth)
+        vertices = vertices @ heading_turn(heading_deg).T
         # The plainest of the viewer's materials.
-        scene.add_mesh_simple(
-            f"{_ROOT}/ground/floor",
-            vertices @ heading_turn(heading_deg).T,
-            faces,
-            color=SQUARE_COLOR,
-            material="toon3",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        look = {"color": SQUARE_COLOR, "material": "toon3", "cast_shadow": False, "receive_shadow": False}
+        scene.add_mesh_simple(f"{_ROOT}/ground/floor", vertices, faces, **look)
     if isinstance(arena, Floor):
         _add_walls(scene, arena)
 

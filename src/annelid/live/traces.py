@@ -65,15 +65,19 @@ def plots_of(names: Sequence[str]) -> dict[str, Plot]:
     if by_segment:
         plots["half-centres"] = _half_centres(by_segment)
         for segment, neurons in by_segment.items():
-            curves = tuple(Curve(n, n.rsplit("_", 1)[0], i) for i, n in enumerate(neurons))
-            plots[f"neurons of segment {segment}"] = Plot(f"segment {segment}: potentials (mV)", curves, len(curves))
+            labels = [neuron.rsplit("_", 1)[0] for neuron in neurons]
+            plots[f"neurons of segment {segment}"] = _plot(f"segment {segment}: potentials (mV)", neurons, labels)
     if others:
-        curves = tuple(Curve(name, name, i) for i, name in enumerate(others))
-        plots["other neurons"] = Plot("potentials (mV)", curves, len(curves))
+        plots["other neurons"] = _plot("potentials (mV)", others, others)
     muscles = [name for name in names if name.startswith("activation_")]
-    curves = tuple(Curve(name, name.removeprefix("activation_"), i) for i, name in enumerate(muscles))
-    plots["activation"] = Plot("activation of the muscles", curves, len(curves), (-0.05, 1.05))
+    numbers = [name.removeprefix("activation_") for name in muscles]
+    plots["activation"] = _plot("activation of the muscles", muscles, numbers, (-0.05, 1.05))
     return plots
+
+
+def _plot(title: str, signals: Sequence[str], labels: Sequence[str], limits: tuple[float, float] | None = None) -> Plot:
+    curves = tuple(Curve(*names, i) for i, names in enumerate(zip(signals, labels, strict=True)))
+    return Plot(title, curves, len(curves), limits)
 
 
 def _half_centres(by_segment: dict[int, list[str]]) -> Plot:

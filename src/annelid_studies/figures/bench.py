@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,29 +48,26 @@ def bench_figure(report: Mapping[str, Any], stem: str | Path) -> Path:
     judged = [entry for entry in measured if entry["kind"] == "judged"]
     scaled = [entry for entry in measured if {"segments", "chain"} & set(entry["lines"])]
     divided = _divided(measured)
-    references = list(report["fronts"]) if judged else []
-    panels: list[tuple[str, float]] = []
-    panels += [("front", 2.9)] if references else []
-    panels += [("cost", 2.7)] if scaled else []
-    panels += [("shares", 1.2 + 0.24 * len(divided))] if divided else []
-    height_in = sum(height for _, height in panels) or 1.0
-    with canvas(height_in) as figure:
+    panels: dict[Callable[[SubFigure], None], float] = {}
+    if judged and report["fronts"]:
+        panels[lambda part: _fronts(part, report, judged)] = 2.9
+    if scaled:
+        panels[lambda part: _cost(part, scaled, report["cost_exponents"])] = 2.7
+    if divided:
+        panels[lambda part: _shares(part, divided)] = 1.2 + 0.24 * len(divided)
+    heights = list(panels.values())
+    with canvas(sum(heights) or 1.0) as figure:
         if panels:
-            ratios = [height for _, height in panels]
-            rows = figure.subfigures(len(panels), 1, height_ratios=ratios, squeeze=False)[:, 0]
-            for part, (name, _) in zip(rows, panels, strict=True):
-                if name == "front":
-                    _fronts(part, report, judged, references)
-                elif name == "cost":
-                    _cost(part, scaled, report["cost_exponents"])
-                else:
-                    _shares(part, divided)
+            rows = figure.subfigures(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
+            for part, draw in zip(rows, panels, strict=True):
+                draw(part)
         return save_both(figure, stem)
 
 
-def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any], references: Sequence[str]) -> None:
+def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -> None:
     from matplotlib.lines import Line2D
 
+    references = list(report["fronts"])
     elements = sorted({entry["elements_per_side"] for entry in judged})
     steps = sorted({entry["physics_step_ms"] for entry in judged})
     colors = dict(zip(elements, segment_colors(len(elements)), strict=True))
@@ -85,15 +82,9 @@ def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any], r
             if point is None:
                 continue
             color = colors[entry["elements_per_side"]]
-            ordered = entry["rhythm"]["verdict"] == "ordered"
-            axes.plot(
-                *point,
-                markers[entry["physics_step_ms"]],
-                color=color,
-                markerfacecolor=color if ordered else "none",
-                markersize=5.5,
-                zorder=2,
-            )
+            face = color if entry["rhythm"]["verdict"] == "ordered" else "none"
+            marker = markers[entry["physics_step_ms"]]
+            axes.plot(*point, marker, color=color, markerfacecolor=face, markersize=5.5, zorder=2)
         _front_axes(axes, report, f"Against {reference} (0.5 ms)")
     panels[0].set_ylabel("error of elongation or period (%)")
     meshes = [Line2D([], [], color=color, linewidth=4, label=_count(n)) for n, color in colors.items()]
@@ -114,35 +105,18 @@ def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.axhline(TOLERATED_PERCENT, color="#c2410c", linewidth=0.8, linestyle="--", zorder=0)
-    axes.annotate(
-        f"{TOLERATED_PERCENT:g} %",
-        (1.0, TOLERATED_PERCENT),
-        xycoords=axes.get_yaxis_transform(),
-        xytext=(0, 2),
-        textcoords="offset points",
-        ha="right",
-        fontsize=7.5,
-        color="#c2410c",
-    )
+    words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5}
+    limit = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "right", "color": "#c2410c"}
+    axes.annotate(f"{TOLERATED_PERCENT:g} %", (1.0, TOLERATED_PERCENT), **limit, **words)
     axes.axvline(1.0, color=_FADED, linewidth=0.8, zorder=0)
     outsiders = sorted(_outsiders(report).items())
     for speed, _ in outsiders:
         axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
     # Words stand to the left of their lines, but for the faster outsider's: the two lines may be close.
-    for index, (speed, words) in enumerate([*outsiders, (1.0, "real time")]):
-        right = 0 < index < len(outsiders)
-        axes.annotate(
-            words,
-            (speed, 0.99),
-            xycoords=axes.get_xaxis_transform(),
-            xytext=(2 if right else -2, 0),
-            textcoords="offset points",
-            rotation=90,
-            ha="left" if right else "right",
-            va="top",
-            fontsize=7.5,
-            color=_FADED,
-        )
+    upright = {"xycoords": axes.get_xaxis_transform(), "rotation": 90, "va": "top", "color": _FADED}
+    for index, (speed, name) in enumerate([*outsiders, (1.0, "real time")]):
+        side, offset = ("left", (2, 0)) if 0 < index < len(outsiders) else ("right", (-2, 0))
+        axes.annotate(name, (speed, 0.99), xytext=offset, ha=side, **upright, **words)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.margins(x=0.08, y=0.12)
@@ -218,13 +192,8 @@ def _shares(part: SubFigure, entries: Mapping[str, Any]) -> None:
         axes.barh(places, widths, 0.72, left=left, color=color, label=phase, edgecolor="w", linewidth=0.4)
         left += widths
     for place, entry in zip(places, entries.values(), strict=True):
-        axes.annotate(
-            f"{entry['step_mean_ms']:.3g} ms",
-            (101.0, float(place)),
-            va="center",
-            fontsize=8,
-            annotation_clip=False,
-        )
+        end = 101.0, float(place)
+        axes.annotate(f"{entry['step_mean_ms']:.3g} ms", end, va="center", fontsize=8, annotation_clip=False)
     axes.set_yticks(places, list(entries))
     axes.invert_yaxis()
     axes.set_xlim(0.0, 100.0)

@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, plain, segment_colors
+from annelid.draw.lines import draw_lines
+from annelid.draw.style import panel_title
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_MARKERS = ("o", "s", "^", "D")
 _ROWS = {
     "body_lengths_per_s": "speed (body lengths/s)",
     "cost_of_transport": "cost of transport",
@@ -59,25 +53,15 @@ def crawling_figure(lines: Mapping[str, Sequence[Line]], stem: str | Path) -> Pa
     """
     with canvas(7.0) as figure:
         grid = figure.subplots(len(_ROWS), len(lines), squeeze=False, sharex="col", sharey="row")
-        letters = iter("abcdefgh")
+        for letter, axes in zip("abcdefgh", grid.flat, strict=False):
+            panel_title(axes, f"{letter})")
         for row, (name, label) in zip(grid, _ROWS.items(), strict=True):
             row[0].set_ylabel(label)
             for axes, of_quantity in zip(row, lines.values(), strict=True):
-                _draw(axes, of_quantity, name)
-                panel_title(axes, f"{next(letters)})")
+                draw_lines(axes, {one.gait: (one.values, getattr(one, name)) for one in of_quantity}, markersize=4.0)
             row[0].set_ylim(bottom=0.0)
         for axes, label in zip(grid[-1], lines, strict=True):
             axes.set_xlabel(label)
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
         return save_both(figure, stem)
-
-
-def _draw(axes: Axes, lines: Sequence[Line], name: str) -> None:
-    for line, color, marker in zip(lines, segment_colors(4), _MARKERS, strict=False):
-        y = np.array([np.nan if one is None else one for one in getattr(line, name)], dtype=float)
-        x = np.array(line.values)
-        axes.plot(x, y, marker=marker, markersize=4.0, color=color, label=plain(line.gait))
-        lost = np.isnan(y)
-        edge = axes.get_xaxis_transform()
-        axes.plot(x[lost], np.full(lost.sum(), 0.04), "x", color=color, transform=edge, markersize=5.0)

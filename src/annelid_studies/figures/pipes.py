@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from annelid.analysis.passage import Passage
 from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
 from annelid.draw.style import panel_title, segment_colors
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 WINDOW_S = 5.25
 """Speed and drive are means over this time, the undriven wave's cycle."""
 CM = 100.0
-_MARKERS = ("o", "s", "^", "D")
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,11 @@ def pipes_figure(ways: Mapping[tuple[str, str], Way], bends: Mapping[str, BendLi
             panel_title(rows[2], "foremost ring (cm); dashed: the bore")
             for gait in gaits:
                 if (pipe, gait) in ways:
-                    _draw(rows, ways[pipe, gait], colors[gait], gait)
+                    way, style = ways[pipe, gait], {"color": colors[gait], "linewidth": 1.1, "alpha": 0.85}
+                    for axes, values in zip(
+                        rows, (CM * way.speed_m_per_s, way.drive, CM * way.first_ring_m), strict=True
+                    ):
+                        axes.plot(way.front_m, values, label=gait, **style)
             bore = max((ways[key] for key in ways if key[0] == pipe), key=lambda way: way.front_m.max())
             order = np.argsort(bore.front_m)
             # The ring is the hexagon of six crossings that lie in the bore.
@@ -114,17 +118,13 @@ def pipes_figure(ways: Mapping[tuple[str, str], Way], bends: Mapping[str, BendLi
         return save_both(figure, stem)
 
 
-def _draw(rows: Sequence[Axes], way: Way, color: object, name: str) -> None:
-    for axes, values in zip(rows, (CM * way.speed_m_per_s, way.drive, CM * way.first_ring_m), strict=True):
-        axes.plot(way.front_m, values, color=color, label=name, linewidth=1.1, alpha=0.85)
-
-
 def _bends(axes: Axes, bends: Mapping[str, BendLine]) -> None:
-    for (name, line), color, marker in zip(bends.items(), segment_colors(len(bends)), _MARKERS, strict=False):
-        radius, speed = np.array(line.radius_m), CM * np.array(line.speed_m_per_s)
-        axes.plot(radius, speed, color=color, marker=marker, label=name, markerfacecolor="none")
+    lines = {name: (line.radius_m, CM * np.array(line.speed_m_per_s)) for name, line in bends.items()}
+    draw_lines(axes, lines, markerfacecolor="none")
+    for (radius, speed), line, drawn in zip(lines.values(), bends.values(), list(axes.lines), strict=True):
         passed = np.array(line.passed, dtype=bool)
-        axes.plot(radius[passed], speed[passed], color=color, marker=marker, linestyle="none")
+        style = {"color": drawn.get_color(), "marker": drawn.get_marker(), "linestyle": "none"}
+        axes.plot(np.array(radius)[passed], speed[passed], **style)
     panel_title(axes, "Bends of 90 degrees: speed along the centre line (cm/s); filled: the worm came through")
     axes.set_xlabel("radius of the centre line (m)")
     axes.set_ylim(bottom=0.0)

@@ -6,10 +6,10 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw.lines import draw_lines
+from annelid.draw.style import panel_title
 from annelid.morphology import Array
 
-_MARKERS = "os^Dv"
 _LOSSES = (2, 5, 10, 20, 50, 100)
 
 
@@ -30,28 +30,22 @@ def feedback_figure(
         RunFileError: A file cannot be written.
     """
     with canvas(3.0) as figure:
-        panels = figure.subplots(1, 2)
-        for axes, title, label in zip(
-            panels,
-            ("What slip costs", "How fast it is"),
-            ("work lost to friction (J/m)", "speed (cm/s)"),
-            strict=True,
-        ):
-            panel_title(axes, title)
+        cost, pace = figure.subplots(1, 2)
+        for axes in (cost, pace):
             axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at else ""))
             for friction in tuned_at:
                 axes.axvline(friction, color="0.35", linewidth=0.8, linestyle=":")
-            axes.set_ylabel(label)
-        for (name, (friction, loss, speed)), color, marker in zip(
-            lines.items(), segment_colors(len(lines)), _MARKERS, strict=False
-        ):
-            panels[0].plot(friction, loss, color=color, marker=marker, markersize=4, label=name)
-            panels[1].plot(friction, 100.0 * speed, color=color, marker=marker, markersize=4)
-        panels[0].set_yscale("log")
-        panels[0].set_yticks(_LOSSES, [f"{loss}" for loss in _LOSSES])
-        panels[0].minorticks_off()
-        panels[1].set_ylim(bottom=0.0)
-        panels[0].legend(title="feedback")
+        draw_lines(cost, {name: (friction, loss) for name, (friction, loss, _) in lines.items()}, markersize=4)
+        draw_lines(pace, {name: (friction, 100 * speed) for name, (friction, _, speed) in lines.items()}, markersize=4)
+        panel_title(cost, "What slip costs")
+        cost.set_ylabel("work lost to friction (J/m)")
+        cost.set_yscale("log")
+        cost.set_yticks(_LOSSES, [f"{loss}" for loss in _LOSSES])
+        cost.minorticks_off()
+        cost.legend(title="feedback")
+        panel_title(pace, "How fast it is")
+        pace.set_ylabel("speed (cm/s)")
+        pace.set_ylim(bottom=0.0)
         return save_both(figure, stem)
 
 
@@ -71,8 +65,7 @@ def detector_figure(curves: Mapping[str, tuple[Array, Array]], chosen: tuple[flo
     """
     with canvas(3.6) as figure:
         axes = figure.subplots()
-        for (name, (recall, precision)), color in zip(curves.items(), segment_colors(len(curves)), strict=True):
-            axes.plot(recall, precision, color=color, label=name, linewidth=1.1)
+        draw_lines(axes, curves, markers=False, linewidth=1.1)
         axes.plot(*chosen, marker="o", markersize=7, color="black", linestyle="none", label="all runs, as it is set")
         axes.set_xlim(0.0, 1.0)
         axes.set_ylim(0.0, 1.02)

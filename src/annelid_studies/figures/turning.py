@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from annelid.analysis.track import Track
 from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
 from annelid.draw.style import panel_title, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MARKERS = ("o", "s", "^", "D")
 _LARGEST_RADIUS_M = 20.0
 """Where the axis of the radius ends: a worm that turns more weakly than this goes straight."""
 
@@ -44,10 +44,11 @@ def turning_figure(lines: Mapping[str, Line], tracks: Mapping[float, Track], tit
         grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.25])
         curvature, radius = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
         from_above = figure.add_subplot(grid[:, 1])
-        _against_modulation(curvature, lines, lambda values: values)
+        draw_lines(curvature, lines, markersize=4.5)
         panel_title(curvature, "Curvature, positive to the left")
         curvature.set_ylabel("1/m")
-        _against_modulation(radius, lines, lambda values: 1.0 / np.maximum(np.abs(values), 1e-9))
+        radii = {name: (x, 1.0 / np.maximum(np.abs(bend), 1e-9)) for name, (x, bend) in lines.items()}
+        draw_lines(radius, radii, markersize=4.5)
         panel_title(radius, "Radius")
         radius.set_ylabel("m")
         radius.set_xlabel("modulation")
@@ -58,13 +59,6 @@ def turning_figure(lines: Mapping[str, Line], tracks: Mapping[float, Track], tit
         handles, labels = curvature.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         return save_both(figure, stem)
-
-
-def _against_modulation(axes: Axes, lines: Mapping[str, Line], quantity: Callable[[Values], Values]) -> None:
-    for (name, (modulation, curvature)), color, marker in zip(
-        lines.items(), segment_colors(len(lines)), _MARKERS, strict=False
-    ):
-        axes.plot(modulation, quantity(curvature), marker=marker, color=color, label=name, markersize=4.5)
 
 
 def _tracks(axes: Axes, tracks: Mapping[float, Track]) -> None:

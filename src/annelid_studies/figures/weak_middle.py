@@ -71,7 +71,9 @@ def weak_middle_figure(panels: Sequence[Panel], marks: Mapping[str, float], stem
         for left, right in grid:
             left.set_ylabel("interior below the ends (%)")
             for name, value in marks.items():
-                _name_line(right, PERCENT * value, f"{name}\n{PERCENT * value:.0f} %")
+                place, at = (1.0, PERCENT * value), {"xycoords": right.get_yaxis_transform(), "xytext": (4, 0)}
+                words = {"textcoords": "offset points", "va": "center", "fontsize": 7.5, "color": _FADED}
+                right.annotate(f"{name}\n{PERCENT * value:.0f} %", place, **at, **words)
         handles, labels = grid.flat[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=3.0)
         return save_both(figure, stem)
@@ -82,17 +84,8 @@ def _draw(axes: Axes, panel: Panel) -> None:
     for order, ((name, (x, y)), (color, marker, dashes)) in enumerate(zip(panel.lines.items(), styles, strict=True)):
         # Wherever the servo stalls its line lies on the force-limited one, so it is drawn as rings around that.
         ring = marker == "o" and order > 0
-        axes.plot(
-            x,
-            PERCENT * y,
-            label=name,
-            color=color,
-            marker=marker,
-            linestyle=dashes,
-            markersize=7.5 if ring else 4.5,
-            markerfacecolor="none" if ring else color,
-            zorder=6 - order,
-        )
+        look = {"markersize": 7.5 if ring else 4.5, "markerfacecolor": "none" if ring else color, "zorder": 6 - order}
+        axes.plot(x, PERCENT * y, label=name, color=color, marker=marker, linestyle=dashes, **look)
     axes.axvline(panel.base, color="0.7", linewidth=0.8, zorder=0, label="base worm")
     axes.set_xlabel(panel.label)
     values = next(iter(panel.lines.values()))[0]
@@ -100,16 +93,3 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.set_xscale("log")
     axes.set_xticks(values, [panel.names.get(value, f"{value:g}") for value in values])
     axes.minorticks_off()
-
-
-def _name_line(axes: Axes, y: float, text: str) -> None:
-    axes.annotate(
-        text,
-        (1.0, y),
-        xycoords=axes.get_yaxis_transform(),
-        xytext=(4, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=7.5,
-        color=_FADED,
-    )

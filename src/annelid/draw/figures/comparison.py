@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,6 @@ from annelid.draw.style import panel_title, plain, segment_colors
 from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from annelid.simulation.runfile import Run
@@ -24,6 +23,11 @@ if TYPE_CHECKING:
 MOST_ROWS = 6
 """Segments that get a panel: of more, as many from the first to the last, evenly spaced."""
 _CM = 100.0
+
+Values = NDArray[np.float64] | None
+"""One column a segment, ``(n_times, n_segments)``; None if they were not recorded."""
+Curves = Callable[["Run"], Sequence[tuple[Values, float | None]]]
+"""What is drawn of a run, each with the width of its lines."""
 
 
 def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
@@ -37,51 +41,26 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
     Raises:
         RunFileError: No run recorded lengths, or the file cannot be written.
     """
-    drawn = ["stretch_length" in run.data or "ring_length" in run.data for run in runs]
-    if not any(drawn):
-        raise RunFileError("none of these runs recorded lengths of segments or rings")
-    segments = _shown(runs, drawn)
-    with canvas(0.8 + 1.15 * len(segments)) as figure:
-        panels = figure.subplots(len(segments), 2, sharex=True, sharey="col", squeeze=False)
-        panel_title(panels[0, 0], "Segment, longer than at rest (cm)")
-        panel_title(panels[0, 1], "Ring (% of its longest)")
-        for run, color in zip(runs, segment_colors(len(runs)), strict=True):
-            for (left, right), segment in zip(panels, segments, strict=True):
-                if segment < run.config.body.n_segments:
-                    _plot(left, run, _elongation(run), segment, color)
-                    _plot(right, run, _rings(run), segment, color)
-        for (left, _), segment in zip(panels, segments, strict=True):
-            left.set_ylabel(f"segment {segment + 1}")
-        for axes in panels[-1]:
-            axes.set_xlabel("time (s)")
-        _legend(figure, labels, drawn)
-        return save(figure, path)
+    panels: dict[str, Curves] = {
+        "Segment, longer than at rest (cm)": lambda run: [(_elongation(run), None)],
+        "Ring (% of its longest)": lambda run: [(_rings(run), None)],
+    }
+    return _over_time(runs, labels, panels, "lengths of segments or rings", path)
 
 
 def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the potentials of each segment's half-centre: contraction neurons solid, expansion neurons thin.
+    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin.
 
     Raises:
         RunFileError: No run recorded neurons of half-centres, or the file cannot be written.
     """
-    drawn = [_potential(run, "contraction", 0) is not None for run in runs]
-    if not any(drawn):
-        raise RunFileError("none of these runs recorded potentials of half-centres")
-    segments = _shown(runs, drawn)
-    with canvas(0.8 + 1.15 * len(segments)) as figure:
-        panels = figure.subplots(len(segments), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        panel_title(panels[0], "Half-centres, above rest (mV); thick: contraction, thin: expansion")
-        for run, color in zip(runs, segment_colors(len(runs)), strict=True):
-            for axes, segment in zip(panels, segments, strict=True):
-                for kind, width in (("contraction", 1.5), ("expansion", 0.7)):
-                    values = _potential(run, kind, segment)
-                    if values is not None:
-                        axes.plot(run.data["time"].values, values, color=color, linewidth=width)
-        for axes, segment in zip(panels, segments, strict=True):
-            axes.set_ylabel(f"segment {segment + 1}")
-        panels[-1].set_xlabel("time (s)")
-        _legend(figure, labels, drawn)
-        return save(figure, path)
+    panels: dict[str, Curves] = {
+        "Half-centres, above rest (mV); thick: contraction, thin: expansion": lambda run: [
+            (_potentials(run, "contraction"), 1.5),
+            (_potentials(run, "expansion"), 0.7),
+        ]
+    }
+    return _over_time(runs, labels, panels, "potentials of half-centres", path)
 
 
 def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
@@ -116,27 +95,39 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
         return save(figure, path)
 
 
-def _shown(runs: Sequence[Run], drawn: Sequence[bool]) -> list[int]:
-    """Segments that get a panel, counted from 0."""
+def _over_time(runs: Sequence[Run], labels: Sequence[str], panels: Mapping[str, Curves], what: str, path: Path) -> Path:
+    """Draws a column for each kind of curve, and in it a panel for each segment."""
+    curves = [[of(run) for of in panels.values()] for run in runs]
+    drawn = [any(values is not None for column in of_run for values, _ in column) for of_run in curves]
+    if not any(drawn):
+        raise RunFileError(f"none of these runs recorded {what}")
     n_segments = max(run.config.body.n_segments for run, shown in zip(runs, drawn, strict=True) if shown)
-    count = min(n_segments, MOST_ROWS)
-    return np.linspace(0, n_segments - 1, count).round().astype(int).tolist()
+    segments = np.linspace(0, n_segments - 1, min(n_segments, MOST_ROWS)).round().astype(int)
+    with canvas(0.8 + 1.15 * len(segments)) as figure:
+        grid = figure.subplots(len(segments), len(panels), sharex=True, sharey="col", squeeze=False)
+        for i, (title, column) in enumerate(zip(panels, grid.T, strict=True)):
+            panel_title(column[0], title)
+            column[-1].set_xlabel("time (s)")
+            for run, of_run, color in zip(runs, curves, segment_colors(len(runs)), strict=True):
+                for values, width in of_run[i]:
+                    for axes, segment in zip(column, segments, strict=True):
+                        if values is not None and segment < values.shape[1]:
+                            axes.plot(run.data["time"].values, values[:, segment], color=color, linewidth=width)
+        for axes, segment in zip(grid[:, 0], segments, strict=True):
+            axes.set_ylabel(f"segment {segment + 1}")
+        _legend(figure, labels, drawn)
+        return save(figure, path)
 
 
-def _plot(axes: Axes, run: Run, values: NDArray[np.float64] | None, segment: int, color: object) -> None:
-    if values is not None:
-        axes.plot(run.data["time"].values, values[:, segment], color=color)
-
-
-def _elongation(run: Run) -> NDArray[np.float64] | None:
-    """Mean lengthening of each segment's sensors, cm, ``(n_times, n_segments)``."""
+def _elongation(run: Run) -> Values:
+    """Mean lengthening of each segment's sensors, cm."""
     if "stretch_length" not in run.data:
         return None
     stretch, rest = run.data["stretch_length"].values, run.data["stretch_rest_length"].values
     return _CM * (stretch - rest).mean(axis=2)
 
 
-def _rings(run: Run) -> NDArray[np.float64] | None:
+def _rings(run: Run) -> Values:
     """Length of each segment's ring in percent of its longest in the run; a ring of two halves is as long as both."""
     if "ring_length" not in run.data:
         return None
@@ -145,15 +136,17 @@ def _rings(run: Run) -> NDArray[np.float64] | None:
     return 100.0 * whole / whole.max(axis=0)
 
 
-def _potential(run: Run, kind: str, segment: int) -> NDArray[np.float64] | None:
+def _potentials(run: Run, kind: str) -> Values:
     if "potential" not in run.data:
         return None
     names = [str(name) for name in run.data["neuron"].values]
-    name = f"{kind}_{segment + 1}"
-    return run.data["potential"].values[:, names.index(name)] if name in names else None
+    wanted = [f"{kind}_{segment + 1}" for segment in range(run.config.body.n_segments)]
+    if wanted[0] not in names:
+        return None
+    return run.data["potential"].values[:, [names.index(name) for name in wanted]]
 
 
-def _centre(run: Run) -> NDArray[np.float64] | None:
+def _centre(run: Run) -> Values:
     """Way of the centre of mass from its first place, cm, ``(n_times, 3)``; None for worms that go nowhere."""
     if "center_of_mass" not in run.data:
         return None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import mark_lost
 from annelid.draw.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
@@ -70,9 +71,7 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
         axes.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="0.65", markersize=4.0)
     on_a_grid = data[field].dims == (field,)
     axes.plot(x[order], mean[order], "o-" if on_a_grid else "o", color=line if on_a_grid else dot, markersize=3.5)
-    lost = np.isnan(y).any(axis=1)
-    edge = axes.get_xaxis_transform()
-    axes.plot(x[lost], np.full(lost.sum(), 0.03), "x", color=_FAILED, transform=edge, markersize=5.0)
+    mark_lost(axes, x[np.isnan(y).any(axis=1)], _FAILED, 0.03)
     _name_axis(axes, "x", data[field], ticks)
     axes.set_ylabel(worded(name, values.attrs["units"]))
 

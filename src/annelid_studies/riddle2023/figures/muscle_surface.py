@@ -25,6 +25,8 @@ SETTLED_FORCE_N = 2.5
 """Force at which the paper's contracted rings settle, N."""
 
 _VELOCITIES = (-0.75, -0.3, 0.0, 0.3)
+_BLUE, _ORANGE, _GREEN, _ = segment_colors(4)
+_CUT_COLORS = (_GREEN, _ORANGE, "0.1", _BLUE)
 _DASHES = ((0, (1, 1.2)), (0, (4, 1.5)), "-", (0, (6, 1.5, 1, 1.5)))
 
 
@@ -42,18 +44,8 @@ def engine_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activati
     """
     import mujoco
 
-    parameters = np.array(
-        [
-            *SCALED_RANGE,
-            1.0,
-            1.0,
-            rings.minimum_length,
-            rings.maximum_length,
-            rings.maximum_velocity,
-            rings.passive_peak,
-            rings.lengthening_peak,
-        ]
-    )
+    own = rings.minimum_length, rings.maximum_length, rings.maximum_velocity, rings.passive_peak, rings.lengthening_peak
+    parameters = np.array([*SCALED_RANGE, 1.0, 1.0, *own])
     # With this length range a scaled length is a length in metres.
     span = np.array(SCALED_RANGE)
 
@@ -65,21 +57,12 @@ def engine_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activati
 
 
 def closed_form_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activation: float = 1.0) -> Array:
-    """Computes the same force by the documented formula, ``activation FL(L) FV(V) + FP(L)``.
+    """Computes the same force as `engine_flv` by the documented formula, ``activation FL(L) FV(V) + FP(L)``.
 
     FL is a bump of four parabolas from lmin over 1 to lmax. FV is a parabola that reaches 0 at -vmax and 1 at rest,
     then another that saturates at fvmax. FP is 0 up to 1, a parabola to half fpmax at the middle b between 1
     and lmax, and its tangent from there: it passes fpmax midway between b and lmax, and is 1.5 fpmax at lmax.
-    MuJoCo's documentation, "Muscles", with its FLV.m.
-
-    Args:
-        lengths: Relative to the optimal length L0.
-        velocities: Relative to L0, 1/s; negative while the muscle shortens. Broadcast against the lengths.
-        rings: The muscle's parameters.
-        activation: In [0, 1].
-
-    Returns:
-        Pulling force relative to the peak force F0, in the shape of the broadcast arguments.
+    MuJoCo's documentation, "Muscles", with its FLV.m. Arguments and result are those of `engine_flv`.
     """
     length, velocity = np.broadcast_arrays(np.asarray(lengths, float), np.asarray(velocities, float))
     reach = np.where(length < 1.0, 1.0 - rings.minimum_length, rings.maximum_length - 1.0)
@@ -185,7 +168,7 @@ def _draw_cuts(axes: Axes, rings: Rings, working: tuple[float, float]) -> None:
     lengths, _ = _grids(rings, 301)
     sparse = lengths[::15]
     axes.axvspan(*working, color="0.9", zorder=0)
-    for velocity, dashes, color in zip(_VELOCITIES, _DASHES, _cut_colors(), strict=True):
+    for velocity, dashes, color in zip(_VELOCITIES, _DASHES, _CUT_COLORS, strict=True):
         label = f"${velocity:+.2f}\\ L_0$/s" if velocity else "isometric"
         axes.plot(lengths, engine_flv(lengths, velocity, rings), color=color, linestyle=dashes, label=label)
         axes.plot(sparse, closed_form_flv(sparse, velocity, rings), "o", color=color, markersize=3, fillstyle="none")
@@ -197,11 +180,6 @@ def _draw_cuts(axes: Axes, rings: Rings, working: tuple[float, float]) -> None:
     axes.set_ylabel("force ($F_0$)")
     axes.legend(loc="upper left")
     panel_title(axes, "b) cuts at constant velocity")
-
-
-def _cut_colors() -> tuple[str, ...]:
-    blue, orange, green, _ = segment_colors(4)
-    return (green, orange, "0.1", blue)
 
 
 def _grids(rings: Rings, n: int) -> tuple[Array, Array]:

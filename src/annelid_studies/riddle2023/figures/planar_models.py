@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from annelid.config import PlanarWorm, RunConfig, load_config
 from annelid.draw.canvas import canvas, save_both
+from annelid.draw.planar_scene import bent_rhombi, rhombi
 from annelid.draw.style import panel_title, segment_colors
 from annelid.errors import ConfigError
 from annelid.protocols import Records
@@ -58,9 +59,8 @@ def contracted_outline(config: RunConfig, contracted: int) -> Array:
     if "outline" not in signals:
         return rigid_outline(sensation.ring_length_m, sensation.stretch_m[:, 0])
     upper = np.asarray(signals["outline"], dtype=float)
-    pieces = (len(upper) - 1) // plant.n_segments
-    corners = pieces * np.arange(plant.n_segments)[:, np.newaxis] + np.arange(pieces + 1)
-    return (upper - [upper[0, 0], 0.0])[corners]
+    corners = bent_rhombi(upper - [upper[0, 0], 0.0], plant.n_segments)
+    return corners[:, : corners.shape[1] // 2 + 1]
 
 
 def rigid_outline(height_m: Array, length_m: Array) -> Array:
@@ -73,11 +73,7 @@ def rigid_outline(height_m: Array, length_m: Array) -> Array:
     Returns:
         Upper half of each, shape ``(n_segments, 3, 2)``: front joint on the axis, top, rear joint, m.
     """
-    front = np.concatenate([[0.0], np.cumsum(length_m)])
-    outline = np.zeros((len(height_m), 3, 2))
-    outline[:, 0, 0], outline[:, 2, 0] = front[:-1], front[1:]
-    outline[:, 1] = np.column_stack([front[:-1] + length_m / 2.0, height_m / 2.0])
-    return outline
+    return rhombi(length_m, height_m)[:, :3] + [np.sum(length_m) / 2.0, 0.0]
 
 
 def zigzag(start: Array, end: Array, amplitude: float, n_teeth: int = 9, lead: float = 0.2) -> Array:
@@ -163,8 +159,8 @@ def _draw_worm(axes: Axes, outline: Array, contracted: int) -> None:
         lower = upper * [1.0, -1.0]
         if index == contracted:
             axes.fill(*np.concatenate([upper, lower[::-1]]).T, color="0.91", linewidth=0.0, zorder=0)
-        axes.plot(*upper.T, color=_SIDE, linewidth=1.8, solid_joinstyle="round", zorder=2)
-        axes.plot(*lower.T, color=_SIDE, linewidth=1.8, solid_joinstyle="round", zorder=2)
+        for half in (upper, lower):
+            axes.plot(*half.T, color=_SIDE, linewidth=1.8, solid_joinstyle="round", zorder=2)
         top = upper[len(upper) // 2]
         for end in (top, top * [1.0, -1.0]):
             _draw_hinge(axes, end)
@@ -181,19 +177,9 @@ def _draw_hinge(axes: Axes, place: Array) -> None:
 def _draw_actuator(axes: Axes, start: Array, end: Array, *, active: bool) -> None:
     from matplotlib.patches import FancyArrowPatch
 
-    axes.add_patch(
-        FancyArrowPatch(
-            (start[0], start[1]),
-            (end[0], end[1]),
-            arrowstyle="simple,head_length=5,head_width=7,tail_width=2.4",
-            shrinkA=0.0,
-            shrinkB=0.0,
-            facecolor=_ACTUATOR if active else "w",
-            edgecolor=_ACTUATOR,
-            linewidth=0.9,
-            zorder=3,
-        )
-    )
+    shape = {"arrowstyle": "simple,head_length=5,head_width=7,tail_width=2.4", "shrinkA": 0.0, "shrinkB": 0.0}
+    look = {"facecolor": _ACTUATOR if active else "w", "edgecolor": _ACTUATOR, "linewidth": 0.9, "zorder": 3}
+    axes.add_patch(FancyArrowPatch((start[0], start[1]), (end[0], end[1]), **shape, **look))
 
 
 def _draw_torsional_spring(axes: Axes, place: Array) -> None:
@@ -220,13 +206,7 @@ def _draw_dimensions(axes: Axes, outline: Array) -> None:
 
 def _draw_key(axes: Axes, half_height: float) -> None:
     """Explains the symbols and gives the scale; lengths in cm."""
-    entries = (
-        "rigid side with hinges",
-        "actuator (filled: contracted)",
-        "linear spring",
-        "torsional spring",
-        "5 cm",
-    )
+    entries = "rigid side with hinges", "actuator (filled: contracted)", "linear spring", "torsional spring", "5 cm"
     rows = np.linspace(0.78, -0.78, len(entries)) * half_height
     left, right = 1.0, 6.0
     for text, y in zip(entries, rows, strict=True):

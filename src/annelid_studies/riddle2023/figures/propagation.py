@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,13 +100,6 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
 
     Of rhombi as near to the contracted ring or as far from it as each other, those that figure 8 shows best are taken.
 
-    Args:
-        run: The run of a 3D worm.
-        time_s: Time whose nearest recorded posture is measured, s.
-
-    Returns:
-        The measurement.
-
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
@@ -191,9 +184,9 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
         grid.set_height_ratios(heights_in)
         figure.set_figheight(sum(heights_in))
         # The first segment is on the left.
-        near_left = measured.near.distance_m < measured.far.distance_m
-        _outline(picture, place, posture, measured.near, "near rhombus", GREEN, "-", share=0.24 if near_left else 0.78)
-        _outline(picture, place, posture, measured.far, "far rhombus", PINK, "--", share=0.78 if near_left else 0.24)
+        places = (0.24, 0.78) if measured.near.distance_m < measured.far.distance_m else (0.78, 0.24)
+        _outline(picture, place, posture, measured.near, "near rhombus", GREEN, "-", places[0])
+        _outline(picture, place, posture, measured.far, "far rhombus", PINK, "--", places[1])
         panel_title(picture, f"a) segment {measured.segment + 1} contracted, t = {posture.time_s:.2f} s")
         axial, lateral = below.subplots(1, 2, sharex=True)
         change = deformation(posture.crossings_m, posture.geometry)
@@ -305,8 +298,7 @@ def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) 
 
 def _height_over_width(axes: Axes) -> float:
     """Shape of what the limits of axes hold, where both axes have one scale."""
-    width, height = (abs(float(high - low)) for low, high in (axes.get_xlim(), axes.get_ylim()))
-    return height / width
+    return abs(float(np.diff(axes.get_ylim())[0] / np.diff(axes.get_xlim())[0]))
 
 
 def _scale_bar(axes: Axes, corners: Array) -> None:
@@ -317,15 +309,7 @@ def _scale_bar(axes: Axes, corners: Array) -> None:
 
 
 def _outline(
-    axes: Axes,
-    place: Place,
-    posture: Posture,
-    measured: Measured,
-    name: str,
-    color: str,
-    linestyle: str,
-    *,
-    share: float,
+    axes: Axes, place: Place, posture: Posture, measured: Measured, name: str, color: str, linestyle: str, share: float
 ) -> None:
     """Follows a rhombus' sides, and writes its measurement below the picture, at a share of its width."""
     line = place(rhombus_outline(posture, measured.rhombus))
@@ -333,31 +317,21 @@ def _outline(
     axes.plot(*line.T, color="white", linewidth=6.5, zorder=8)
     axes.plot(*line.T, linestyle=linestyle, color=color, linewidth=3.0, zorder=9)
     tip = line[np.argmin(axes.transData.transform(line)[:, 1])]
-    axes.annotate(
-        f"{name}\n{measured}",
-        xy=tuple(tip),
-        xytext=(share, -0.04),
-        textcoords="axes fraction",
-        color=color,
-        ha="center",
-        va="top",
-        arrowprops={"arrowstyle": "-", "color": color, "linestyle": linestyle, "shrinkB": 2},
-        zorder=10,
-    )
+    arrow = {"arrowstyle": "-", "color": color, "linestyle": linestyle, "shrinkB": 2}
+    below: Any = {"textcoords": "axes fraction", "ha": "center", "va": "top", "arrowprops": arrow, "zorder": 10}
+    axes.annotate(f"{name}\n{measured}", tuple(tip), (share, -0.04), color=color, **below)
 
 
 def _scatter(axes: Axes, geometry: MeshGeometry, measured: Propagation, change: Array, mean: Array) -> None:
     """Change of every rhombus over its distance from the contracted ring."""
     distance = _CM * distance_from_ring_m(geometry, measured.segment)
     with_muscle = actuated(geometry)
-    for mask, marker, color, name in (
-        (~with_muscle, "o", "0.35", "unactuated"),
-        (with_muscle, "s", "#1b2a6b", "with a ring muscle"),
+    for mask, marker, color, face, name in (
+        (~with_muscle, "o", "0.35", "white", "unactuated"),
+        (with_muscle, "s", "#1b2a6b", "#1b2a6b", "with a ring muscle"),
     ):
-        face = color if marker == "s" else "white"
-        axes.plot(
-            distance[mask], _PERCENT * change[mask], marker, color=color, markerfacecolor=face, markersize=4, label=name
-        )
+        look = {"color": color, "markerfacecolor": face, "markersize": 4, "label": name}
+        axes.plot(distance[mask], _PERCENT * change[mask], marker, **look)
     axes.plot(_CM * measured.plane_distance_m, _PERCENT * mean, "-", color="0.1", linewidth=1.2, label="mean")
     for one, marker, color, name in ((measured.near, "D", GREEN, "near"), (measured.far, "v", PINK, "far")):
         place = _CM * one.distance_m, _PERCENT * change[one.rhombus]
@@ -390,9 +364,8 @@ def _measure(posture: Posture) -> Propagation:
 
 def _measured(posture: Posture, rhombus: int, distance_m: float) -> Measured:
     corners = posture.geometry.rhombi[[rhombus]]
-    rest = rhombus_diagonals(posture.geometry.crossings_m, corners)
-    now = rhombus_diagonals(posture.crossings_m, corners)
-    length, width = ((float(before[0]), float(after[0])) for before, after in zip(rest, now, strict=True))
+    both = [rhombus_diagonals(crossings, corners) for crossings in (posture.geometry.crossings_m, posture.crossings_m)]
+    length, width = ((float(rest[0]), float(now[0])) for rest, now in zip(*both, strict=True))
     return Measured(rhombus, distance_m, length, width)
 
 

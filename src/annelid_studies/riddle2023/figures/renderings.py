@@ -11,17 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.analysis.rhombi import nearest_frame
-from annelid.body import build_spec, mesh_of
+from annelid.body import mesh_of
 from annelid.body.rods import PIN_RGBA, STRAND_RGBA
 from annelid.config import RunConfig, WormBody
 from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.drawn_worm import CONTRACTED_WIDTH, SPRING_RGBA
 from annelid.draw.gl import find_backend
-from annelid.draw.still import render_still
+from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, postures_of, render_still
+from annelid.draw.skeleton import Skeleton
 from annelid.draw.style import CONTRACTED, activation_color, panel_title
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
+from annelid.simulation.worm import compile_worm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,56 +88,17 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
     geometry = mesh_of(_worm(run.config).mesh)
     frame = nearest_frame(run, time_s)
     recorded_s = float(run.data["frame_time"].values[frame])
-    qpos = run.data["qpos"].values[frame]
+    anatomy = compile_worm(run.config)
+    qpos = postures_of(run, anatomy.model.nq)[frame]
     return Posture(
         config=run.config,
         geometry=geometry,
         time_s=recorded_s,
         crossings_m=run.data["crossing_position"].values[frame],
-        strands_m=strand_points(run.config, qpos, geometry),
+        strands_m=Skeleton(anatomy).locate(qpos)[0],
         qpos=qpos,
         activation=run.data["activation"].sel(time=recorded_s, method="nearest").values,
     )
-
-
-def strand_points(config: RunConfig, qpos: Array, geometry: MeshGeometry) -> Array:
-    """Finds the points of every strand in a posture, by the engine's kinematics.
-
-    Args:
-        config: Configuration of the 3D worm.
-        qpos: The engine's coordinates, as a run records them.
-        geometry: The worm's mesh at rest.
-
-    Returns:
-        Points from front to back, m, shape ``(n_strands, n_vertices, 3)``.
-
-    Raises:
-        RunFileError: The coordinates are not those of the body built from the configuration.
-    """
-    import mujoco
-
-    model = build_spec(config).compile()
-    if len(qpos) != model.nq:
-        raise RunFileError(
-            f"{config.name} has postures of {len(qpos)} coordinates, but the body built from its configuration has "
-            f"{model.nq}: another version wrote them"
-        )
-    posture = mujoco.MjData(model)
-    posture.qpos[:] = qpos
-    mujoco.mj_kinematics(model, posture)
-    shape = geometry.vertices_m.shape
-    if model.nflex:
-        mujoco.mj_flex(model, posture)
-        return posture.flexvert_xpos.reshape(shape).copy()
-    elements = [[model.body(f"strand_{s}_{e}").id for e in range(shape[1] - 1)] for s in range(shape[0])]
-    geoms = model.body_geomadr[np.asarray(elements)]
-    middles, axes = posture.geom_xpos[geoms], posture.geom_xmat[geoms].reshape(*geoms.shape, 3, 3)[..., 2]
-    half = model.geom_size[geoms, 1, None] * axes
-    # Which end of a capsule is in front is the engine's choice, the same for all of them.
-    ends = [middles - half, middles + half]
-    gaps = [np.linalg.norm(b[:, :-1] - a[:, 1:], axis=-1).sum() for a, b in (ends, ends[::-1])]
-    front, rear = ends if gaps[0] < gaps[1] else ends[::-1]
-    return np.concatenate([front, rear[:, -1:]], axis=1)
 
 
 def rendering_works() -> bool:

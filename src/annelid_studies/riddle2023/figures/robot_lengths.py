@@ -54,16 +54,9 @@ def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) ->
         relative.set_ylabel("relative elongation (1)")
         relative.set_xticks(range(len(groups)), [fill(label, _LABEL_WIDTH) for label in groups])
         handles = absolute.containers[np.argmax([len(values) for values in groups.values()])]
-        absolute.legend(
-            list(handles),
-            [f"segment {segment}" for segment in range(1, n_segments + 1)],
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.0),
-            ncols=n_segments,
-            columnspacing=1.2,
-            handlelength=1.2,
-            borderaxespad=0.1,
-        )
+        names = [f"segment {segment}" for segment in range(1, n_segments + 1)]
+        room = {"columnspacing": 1.2, "handlelength": 1.2, "borderaxespad": 0.1}
+        absolute.legend(list(handles), names, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=n_segments, **room)
         return save_both(figure, stem)
 
 

@@ -45,7 +45,7 @@ def _computed_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("annelid.experiment.workers.Processes.submit", submit)
     for figure in ("sweep.results.sweep_figure", "tune.results._figure"):
-        monkeypatch.setattr(f"annelid_studies.{figure}", lambda *_: Path("figure.png"))
+        monkeypatch.setattr(f"annelid.experiment.{figure}", lambda *_: Path("figure.png"))
 
 
 def test_the_page_lists_the_exit_codes() -> None:

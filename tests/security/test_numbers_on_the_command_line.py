@@ -88,7 +88,7 @@ def test_a_number_ends_soon_in_a_sentence_or_a_result(
     command: str, option: str, value: str, run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("annelid.view.gallery.draw_all", lambda *_, **__: [])
+    monkeypatch.setattr("annelid.draw.gallery.draw_all", lambda *_, **__: [])
     words = next(WITH[key] for key in (f"{command} {option}", command, command.split()[0]) if key in WITH)
     arguments = [*command.split(), *(str(run) if word == "RUN" else word for word in words), f"{option}={value}"]
 

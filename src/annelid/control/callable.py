@@ -52,25 +52,26 @@ class CallableController:
         Raises:
             ConfigError: The activation is no number, has another shape, or leaves [0, 1].
         """
-        result, must = self._function(sensation), f"at {sensation.time_s:g} s; it must"
+        result = self._function(sensation)
         try:
             activation = np.array(result, dtype=np.float64)
         except (TypeError, ValueError):
             raise ConfigError(
-                f"the controller function returned {type(result).__name__} {must} return {self._n_muscles} numbers "
-                "in [0, 1]"
+                f"the controller function returned {type(result).__name__} at {sensation.time_s:g} s; "
+                f"it must return {self._n_muscles} numbers in [0, 1]"
             ) from None
         if activation.ndim == 0:
             activation = np.full(self._n_muscles, activation)
         if activation.shape != (self._n_muscles,):
             raise ConfigError(
-                f"the controller function returned shape {activation.shape} {must} return shape ({self._n_muscles},)"
+                f"the controller function returned shape {activation.shape} at {sensation.time_s:g} s; "
+                f"it must return shape ({self._n_muscles},)"
             )
         within = (activation >= 0.0) & (activation <= 1.0)
         if not within.all():
             worst = int(np.argmin(within))
             raise ConfigError(
-                f"the controller function returned activation {activation[worst]:g} for muscle {worst + 1} {must} lie "
-                "in [0, 1]"
+                f"the controller function returned activation {activation[worst]:g} for muscle {worst + 1} at "
+                f"{sensation.time_s:g} s; it must lie in [0, 1]"
             )
         return activation

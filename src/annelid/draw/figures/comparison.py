@@ -141,7 +141,7 @@ def _potentials(run: Run, kind: str) -> Values:
         return None
     names = [str(name) for name in run.data["neuron"].values]
     wanted = [f"{kind}_{segment + 1}" for segment in range(run.config.body.n_segments)]
-    if wanted[0] not in names:
+    if not set(wanted) <= set(names):
         return None
     return run.data["potential"].values[:, [names.index(name) for name in wanted]]
 

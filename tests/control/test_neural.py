@@ -83,9 +83,10 @@ def test_a_stride_under_a_drive_is_its_steps_bit_for_bit(slope_per_s: float) -> 
     walked, strode = (AdaptiveController(section, sensor, N, N, 0.001) for _ in range(2))
     rest, zeros = np.full((N, 2), 0.1), np.zeros(N)
     for first in range(0, 60, 10):
-        longer = rest + 0.002 * np.arange(first, first + N)[:, np.newaxis] % 0.03
+        extra = 0.002 * np.arange(first, first + N, dtype=np.float64) % 0.03
+        longer = np.asarray(rest + extra[:, np.newaxis], dtype=np.float64)
         felt = Sensation(first * 0.001, longer, rest, zeros, zeros, np.zeros((N, 3)), np.zeros(3))
         stepped = [walked.step(replace(felt, time_s=(first + k) * 0.001)) for k in range(10)]
         assert np.array_equal(strode.stride(felt, 10), stepped[-1])
     assert all(np.array_equal(walked.get_state()[name], value) for name, value in strode.get_state().items())
-    assert walked.read(frame=False)["drive"] > 0.0
+    assert np.asarray(walked.read(frame=False)["drive"], dtype=np.float64) > 0.0

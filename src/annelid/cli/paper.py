@@ -16,7 +16,7 @@ from annelid.errors import RunFileError
 
 def paper_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 4 minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 6 minutes.")] = False,
     only: Annotated[
         list[str] | None,
         typer.Option("--only", metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
@@ -31,7 +31,7 @@ def paper_command(
     """Reproduce the paper's figures and claims, and examine them.
 
     Writes report.html, one file with all pictures to read and to send, and report.md beside its figures.
-    The whole takes about 40 minutes on two cores, --quick about 4. Every run is kept in report/runs, so
+    The whole takes about an hour on two cores, --quick about 6 min. Every run is kept in report/runs, so
     a second call takes seconds, and a killed one goes on where it was.
 
     \b

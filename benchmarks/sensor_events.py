@@ -18,9 +18,10 @@ import numpy as np
 from annelid import Run, load_config, simulate
 from annelid.analysis import rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
-from annelid.experiment.case import PAPERS_MESH, SHEAR_OVER_YOUNG
+from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.plausibility import tolerance_window_m
 from annelid_studies.robustness import TIMED
+from annelid_studies.worms import PAPERS_MESH
 
 SLIPPERY = {"arena.friction": 0.3}
 UNDAMPED_ACROSS = {

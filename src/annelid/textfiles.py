@@ -6,7 +6,7 @@ import json
 import re
 import stat
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -94,22 +94,19 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     text = _bounded(text, name, len(text))
     if _has_long_key(text):
         raise _too_deep(name)
-    try:
-        tree = tomllib.loads(text)
-    except ValueError as error:
-        raise UnreadableText(f"{name} is not valid TOML: {shortened(str(error))}") from None
-    except RecursionError:
-        raise _too_deep(name) from None
-    check_depth(tree, name)
-    return tree
+    return _parsed(tomllib.loads, "TOML", text, name)
 
 
 def parse_json(text: str, name: str) -> Any:
     """Reads JSON, as `parse_toml` reads TOML."""
+    return _parsed(json.loads, "JSON", _bounded(text, name, len(text)), name)
+
+
+def _parsed(load: Callable[[str], Any], language: str, text: str, name: str) -> Any:
     try:
-        tree = json.loads(_bounded(text, name, len(text)))
+        tree = load(text)
     except ValueError as error:
-        raise UnreadableText(f"{name} is not valid JSON: {shortened(str(error))}") from None
+        raise UnreadableText(f"{name} is not valid {language}: {shortened(str(error))}") from None
     except RecursionError:
         raise _too_deep(name) from None
     check_depth(tree, name)

@@ -26,7 +26,7 @@ from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
 from annelid.draw.markdown import table
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment.case import RODS, SHEAR_OVER_YOUNG, Case
+from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
 from annelid.experiment.fingerprint import code_fingerprint
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Workers
@@ -34,6 +34,7 @@ from annelid.output import whole_file
 from annelid.plausibility import tolerance_window_m
 from annelid.simulation.lock import locks
 from annelid.textfiles import read_json
+from annelid_studies.worms import RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
 """The paper's with the preset's tolerance, and with the tolerance that the body needs; ours; a wave without sensing."""

@@ -22,7 +22,7 @@ def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command
     command = ("run", RODS, "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")
     done = annelid(*command)
     assert done.exit_code == 0, done.err
-    assert "drawn worms kept an ordered rhythm" in done.out
+    assert "Monte Carlo samples kept an ordered rhythm" in done.out
     assert "+-" in done.out
     printed = [Path(line).name for line in done.out.splitlines() if line.startswith("walk")]
     assert printed[:4] == ["run.nc", "uncertainty.json", "uncertainty.csv", "uncertainty.png"]

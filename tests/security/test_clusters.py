@@ -25,11 +25,12 @@ from annelid.config import find_cluster
 from annelid.config.cluster import Slurm
 from annelid.errors import ClusterError, ConfigError
 from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Files, Task, attempt
-from annelid.experiment.case import PLANAR, Case
+from annelid.experiment.case import Case
 from annelid.experiment.cluster import slurm_cluster
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
+from annelid_studies.worms import PLANAR
 
 STUDY = """
 preset = "riddle2022-planar"

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from annelid.config import LEVELS, WormBody, load_config
 from annelid.errors import ConfigError
-from annelid.experiment.case import CHAIN, RODS
 from annelid_studies.bench import peer as peer_module
 from annelid_studies.bench import store as store_module
 from annelid_studies.bench.benchmark import JSON_NAME, bench, judge
@@ -25,6 +24,7 @@ from annelid_studies.bench.store import MeasurementFailed, Measurements
 from annelid_studies.bench.table import bench_table
 from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
 from annelid_studies.figures.bench import bench_figure
+from annelid_studies.worms import CHAIN, RODS
 
 positive = st.floats(1e-3, 1e3)
 

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import Program, RunConfig, WormBody, load_config, parse_assignments
-from annelid.experiment.case import CHAIN, PLANAR, RODS, Case, chain, fast, one_after_the_other, rods
+from annelid.experiment.case import Case
+from annelid_studies.worms import CHAIN, PLANAR, RODS, chain, fast, one_after_the_other, rods
 
 
 def typed(command: str) -> RunConfig:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from test_examinations_a import WAVE, results, synthetic
 
-from annelid.experiment.case import FAST, Case, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import Store, case_key
 from annelid.simulation.loop import simulate
@@ -22,6 +22,7 @@ from annelid_studies.riddle2023.claims.results import cost_claim
 from annelid_studies.riddle2023.claims.structure import elements_claim, pins_claim
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
+from annelid_studies.worms import FAST, rods
 
 SIX_SPRINGS = (0.392, 0.302, 0.284, 0.334, 0.285, 0.322)
 """How far segment 2 stays below segment 1 by each of the springs; the paper says 39.4 %."""

@@ -31,11 +31,12 @@ from annelid.experiment.attempt import (
     own_code,
     publish,
 )
-from annelid.experiment.case import PLANAR, Case
+from annelid.experiment.case import Case
 from annelid.experiment.cluster import SchedulerWorkers, slurm_cluster, workers_of
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.simulation.runfile import FILE_NAME
+from annelid_studies.worms import PLANAR
 
 
 def planar(seed: int = 0, duration_s: float = 0.1) -> Case:

@@ -11,7 +11,7 @@ import pytest
 from annelid.analysis import RhythmScore
 from annelid.body.assemble import build_spec
 from annelid.config import WormBody
-from annelid.experiment.case import Case, chain, fast, one_after_the_other, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome, outcome
 from annelid.experiment.store import case_key
 from annelid.simulation.loop import simulate
@@ -30,6 +30,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     span,
 )
 from annelid_studies.riddle2023.examinations.springs import SPRINGS
+from annelid_studies.worms import chain, fast, one_after_the_other, rods
 
 open_once = cache(open_run)
 

@@ -10,7 +10,7 @@ import pytest
 
 from annelid.analysis import RhythmScore
 from annelid.config import load_config
-from annelid.experiment.case import CHAIN, Case, chain, rods
+from annelid.experiment.case import Case
 from annelid.experiment.store import Store, case_key
 from annelid_studies.riddle2023.examination import Effort, Examination, Results
 from annelid_studies.riddle2023.examinations.discretization import DISCRETIZATION, convergence_order
@@ -26,6 +26,7 @@ from annelid_studies.riddle2023.examinations.noise import (
 )
 from annelid_studies.riddle2023.examinations.side_by_side import TIGHT
 from annelid_studies.riddle2023.examinations.timestep import EARLY_S, HARD, TIMESTEP, Start, read_start, velocity_limit
+from annelid_studies.worms import CHAIN, chain, rods
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from annelid.experiment import fingerprint
-from annelid.experiment.case import RODS, Case
+from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import PHYSICS, READERS, SOURCE, code_fingerprint, code_of, modules_behind
 from annelid.experiment.store import case_key
+from annelid_studies.worms import RODS
 
 COMPUTING = sorted(
     path

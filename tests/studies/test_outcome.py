@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from annelid.analysis import gait, rhythm_score, summary
-from annelid.experiment.case import FAST, PLANAR, RODS, Case, one_after_the_other
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import outcome, read_outcome, write_outcome
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
+from annelid_studies.worms import FAST, PLANAR, RODS, one_after_the_other
 
 HOLD_S, REST_S = 0.3, 0.2
 PROGRAM = one_after_the_other(hold_s=HOLD_S, rest_s=REST_S)

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from annelid.errors import ConfigError
-from annelid.experiment.case import PLANAR, RODS, Case, one_after_the_other
+from annelid.experiment.case import Case
 from annelid_studies.riddle2023 import paper
 from annelid_studies.riddle2023.claims import claim_cases
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
+from annelid_studies.worms import PLANAR, RODS, one_after_the_other
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

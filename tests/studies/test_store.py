@@ -15,10 +15,11 @@ from annelid.errors import ConfigError
 from annelid.experiment import store as module
 from annelid.experiment import workers
 from annelid.experiment.attempt import OUTCOME_NAME, compute_run, keep_outcome
-from annelid.experiment.case import PLANAR, RODS, Case
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store, case_key
 from annelid.simulation.runfile import FILE_NAME, open_run
+from annelid_studies.worms import PLANAR, RODS
 
 
 def planar(seed: int = 0, duration_s: float = 0.2) -> Case:
@@ -140,7 +141,8 @@ def test_a_workers_refusal_reaches_the_caller_and_keeps_what_is_done(tmp_path: P
 INTERRUPTED = """
 import sys
 from pathlib import Path
-from annelid.experiment.case import PLANAR, Case
+from annelid.experiment.case import Case
+from annelid_studies.worms import PLANAR
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store
 

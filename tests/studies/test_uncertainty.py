@@ -21,7 +21,6 @@ from annelid.experiment import store as store_module
 from annelid.experiment.calibration.fit import calibrate
 from annelid.experiment.calibration.loop import read_loop
 from annelid.experiment.calibration.report import EQUAL_STIFFNESS
-from annelid.experiment.case import RODS
 from annelid.experiment.store import case_key
 from annelid.experiment.uncertainty import Spread, Uncertainty, VariantRun, read_spread, study, uncertainty
 from annelid.experiment.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
@@ -41,6 +40,7 @@ from annelid.experiment.uncertainty.report import as_json, headline, remarks, wi
 from annelid.experiment.uncertainty.study import Variant, combine, finer_steps, more_elements, plan
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import open_run
+from annelid_studies.worms import RODS
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -465,7 +465,7 @@ def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> Non
     lines = csv_path.read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + len(content["quantities"])
     assert png_path.read_bytes().startswith(b"\x89PNG")
-    assert "0 of 2 drawn worms kept an ordered rhythm (2 too short to tell)" in headline(tiny)
+    assert "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)" in headline(tiny)
     words = "\n".join(remarks(tiny))
     assert "20 ms against 10 and 5 ms; elements a side: 3 against 4 and 5" in words
     assert f"dry_friction, spring_rest_length, viscous_friction ({ABSENT})" in words

@@ -51,7 +51,7 @@ def run_command(
             min=2,
             max=10_000,
             metavar="N",
-            help="Give the numbers error bars: from N worms drawn about this one, from finer steps and more elements.",
+            help="Give the numbers error bars: from N Monte Carlo samples, from finer steps and more elements.",
         ),
     ] = None,
     uncertainty_from: Annotated[

@@ -67,13 +67,12 @@ SUMMARY_ROWS: dict[str, Row] = {
 }
 """Field of the summary: what it is called, what it is multiplied by, digits, unit."""
 
-
 GAIT_ROWS: dict[str, Row] = {
     "slip_ratio": ("slip ratio", 100.0, 1, "%"),
     "backward_ratio": ("centre of mass, way back", 100.0, 1, "%"),
     "cost_of_transport": ("cost of transport, positive work", 1.0, 2, ""),
     "cost_of_transport_net": ("cost of transport, net work", 1.0, 2, ""),
-    "lateral_drift": ("drift to the left per way", 100.0, 1, "%"),
+    "lateral_drift": ("drift to the left per travel", 100.0, 1, "%"),
 }
 """The same of the gait."""
 

@@ -14,20 +14,8 @@ from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
 from annelid.errors import ConfigError
 from annelid.plausibility import refuse_nonsense
 
-CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
-"""The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
-PLANAR = "riddle2022-planar"
-PAPERS_MESH = {"body.mesh.elements_per_side": 3, "body.formulation.solver_tolerance": 1e-6}
-"""How the rods are compared with the chain; their preset has a coarser mesh and solves less sharply."""
-
-RODS_STEP_S = 0.01
-"""Step of the tight rods in the examinations, s."""
-
 SHEAR_OVER_YOUNG = 1.0 / 1.5
 """G/E of the paper's strands (0.2 and 0.3 GPa) and of the authors' later model's (1.33 and 2 GPa)."""
-
-HOLD_S, REST_S = 0.8, 0.4
-"""In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
 
 # Samples and postures of a study's runs: enough for its numbers and for a picture at 1.5 s, a tenth of the disk.
 _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
@@ -121,36 +109,3 @@ def run_command(preset: str, changes: Mapping[str, Any]) -> str:
     told = {path: value for path, value in changes.items() if not path.startswith("record.")}
     words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in told.items()]
     return " ".join(["annelid run", preset, *words])
-
-
-def chain(changes: Mapping[str, Any] | None = None) -> Case:
-    """The paper's worm at steps of 2 ms, at half the cost of the paper's 1 ms and with the same rhythm."""
-    return Case(CHAIN, {"clock.physics_timestep_s": 0.002, **(changes or {})})
-
-
-def rods(changes: Mapping[str, Any] | None = None) -> Case:
-    """The worm of tight rods with the paper's three elements a side, at steps of `RODS_STEP_S`."""
-    return Case(RODS, {**PAPERS_MESH, "clock.physics_timestep_s": RODS_STEP_S, **(changes or {})})
-
-
-def fast(changes: Mapping[str, Any] | None = None) -> Case:
-    """The worm of rods whose pins give as the paper's do."""
-    return Case(FAST, changes or {})
-
-
-def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: float = REST_S) -> dict[str, Any]:
-    """Returns the changes that make a run open-loop: each segment contracted in turn, the others at rest.
-
-    Args:
-        n_segments: Segments of the worm.
-        hold_s: How long each is contracted, s.
-        rest_s: How long all rest before the next, s.
-    """
-    starts = [round(i * (hold_s + rest_s), 9) for i in range(n_segments)]
-    contractions = [
-        {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
-    ]
-    return {
-        "controller": {"kind": "program", "contractions": contractions},
-        "duration_s": contractions[-1]["stop_s"],
-    }

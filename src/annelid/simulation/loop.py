@@ -215,8 +215,7 @@ class Loop:
     @property
     def simulated_s(self) -> float:
         """How far it has come, s; where all runs have ended it has come to the end."""
-        step = next((run.coupling.step for run in self.going.values()), self._schedule.end)
-        return step * self._schedule.timestep_s
+        return self._step() * self._schedule.timestep_s
 
     def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
         """Runs to the end; a run that fails ends with that error, and the others go on.

@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config import Chain
-from annelid.experiment.case import CHAIN, RODS
 from annelid.output import whole_file
 from annelid.simulation.lock import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
 from annelid_studies.bench.errors import errors, exponent, front
 from annelid_studies.bench.store import MeasurementFailed, Measurements
 from annelid_studies.riddle2023.examination import Effort
+from annelid_studies.worms import CHAIN, RODS
 
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"

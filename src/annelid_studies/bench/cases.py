@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 from annelid.config import LEVELS, RunConfig, WormBody, load_config
 from annelid.errors import ConfigError, suggest
-from annelid.experiment.case import CHAIN, RODS, Case
+from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort
+from annelid_studies.worms import CHAIN, RODS
 
 Kind = Literal["judged", "converged", "speed"]
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from annelid.config import Mesh, Strands, WormBody, load_config
-from annelid.experiment.case import CHAIN
+from annelid_studies.worms import CHAIN
 
 PACKAGE, INSTALL = "pyelastica", "pip install pyelastica"
 ELEMENTS = 48

@@ -13,7 +13,7 @@ from annelid.analysis.paper import published
 from annelid.config import WormBody
 from annelid.draw.markdown import Table
 from annelid.errors import ConfigError, suggest
-from annelid.experiment.case import CHAIN, FAST, RODS, RODS_STEP_S, Case, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Workers
@@ -26,6 +26,7 @@ from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report,
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.kept import kept
+from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, rods
 
 Progress = Callable[[str, int, int, float], object]
 """Called with what is being done, the number of runs (or pictures) done, their total, and the share of the work."""

@@ -10,9 +10,10 @@ from typing import Any
 from annelid.body.assemble import mesh_of
 from annelid.config import Rings, ServoRings, WormBody, load_config
 from annelid.errors import ConfigError
-from annelid.experiment.case import RODS, Case
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome
 from annelid_studies.riddle2023.figures.muscle_surface import closed_form_flv, scaled_length
+from annelid_studies.worms import RODS
 
 PRESET = "wang"
 AUTHORS_MESH: dict[str, Any] = {

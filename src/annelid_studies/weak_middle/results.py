@@ -11,13 +11,13 @@ from annelid.analysis.elongation import interior_deficit
 from annelid.analysis.paper import published
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.config import load_config
-from annelid.experiment.case import CHAIN
 from annelid.output import write_csv
 from annelid_studies.figures.weak_middle import Panel
 from annelid_studies.weak_middle.asymmetry import Asymmetry
 from annelid_studies.weak_middle.pulls import ACTUATORS
 from annelid_studies.weak_middle.settings import Key, Setting
 from annelid_studies.weak_middle.sweeps import BASE, QUANTITIES, Quantity, Reading, deficits
+from annelid_studies.worms import CHAIN
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -18,12 +18,12 @@ class Quantity(Reading):
     """A number of the run itself with its error bars, all in ``unit``; None for what cannot be told.
 
     Attributes:
-        parameters: Sample standard deviation over the drawn worms.
+        parameters: Sample standard deviation over the Monte Carlo samples.
         time_step: Largest difference between the run and one of finer steps.
         discretization: Largest difference between the run and one of more elements.
         order: Order in which the value converges with the step, from two halvings; None unless both change it the
             same way.
-        n_drawn: Number of drawn worms that it was read in.
+        n_drawn: Number of Monte Carlo samples that it was read in.
     """
 
     parameters: float | None

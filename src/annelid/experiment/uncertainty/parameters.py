@@ -1,4 +1,4 @@
-"""What is uncertain about a worm's body, by how much, and worms drawn from it.
+"""What is uncertain about a worm's body, by how much, and Monte Carlo samples of it.
 
 Errors and their correlations are those of a fit to the load frame (`annelid.experiment.calibration`); the one that lies
 beside this module is what ``annelid calibrate`` writes. They are relative and are laid about the run's own values.
@@ -182,7 +182,7 @@ def hypercube(n: int, p: int, rng: np.random.Generator) -> Array:
 
 
 def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any]:
-    """Returns the fields of one drawn worm by dotted path.
+    """Returns the fields of one Monte Carlo sample by dotted path.
 
     Args:
         config: The worm that is varied.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 UNKNOWN = "-"
 DEFINITIONS = {
-    "parameters": "sample standard deviation over the drawn worms",
+    "parameters": "sample standard deviation over the Monte Carlo samples",
     "time step": "largest difference between the run and one of finer physics steps",
     "elements": "largest difference between the run and one of more elements a side",
     "total": "root of the sum of the squares of those that are known",
@@ -67,7 +67,7 @@ def headline(result: Uncertainty) -> str:
     """Says how many worms were drawn, and how many of them kept an ordered rhythm."""
     drawn = result.of("drawn")
     untold = f" ({result.n_untold} too short to tell)" if result.n_untold else ""
-    return f"{result.n_ordered} of {len(drawn)} drawn worms kept an ordered rhythm{untold}"
+    return f"{result.n_ordered} of {len(drawn)} Monte Carlo samples kept an ordered rhythm{untold}"
 
 
 def remarks(result: Uncertainty) -> list[str]:

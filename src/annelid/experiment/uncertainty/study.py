@@ -1,4 +1,4 @@
-"""A run with error bars: the run itself, worms drawn about it, finer steps and more elements.
+"""A run with error bars: the run itself, Monte Carlo samples about it, finer steps and more elements.
 
 What the error bars are:
 
@@ -118,12 +118,12 @@ class Uncertainty:
 
     @property
     def n_ordered(self) -> int:
-        """How many of the drawn worms kept an ordered rhythm to the end."""
+        """How many of the Monte Carlo samples kept an ordered rhythm to the end."""
         return sum(run.verdict == "ordered" and not run.message for run in self.of("drawn"))
 
     @property
     def n_untold(self) -> int:
-        """How many of the drawn worms' rhythms are too short to tell."""
+        """How many of the Monte Carlo samples' rhythms are too short to tell."""
         return sum(run.verdict is None and not run.message for run in self.of("drawn"))
 
 

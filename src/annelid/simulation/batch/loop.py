@@ -22,11 +22,9 @@ from annelid.simulation.batch.structure import checked_configs
 from annelid.simulation.coupling import start
 from annelid.simulation.interruption import Interruption
 from annelid.simulation.lock import locks
-from annelid.simulation.loop import Loop, RecordedRun
+from annelid.simulation.loop import PROGRESS_INTERVAL_S, Loop, RecordedRun
 from annelid.simulation.progress import ProgressCallback, reporting
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
-
-PROGRESS_INTERVAL_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)

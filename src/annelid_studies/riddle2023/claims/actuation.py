@@ -7,7 +7,6 @@ from math import nan
 import numpy as np
 
 from annelid.config import SnsController, WormBody
-from annelid.experiment.case import fast, one_after_the_other, rods
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     EXACT,
@@ -19,6 +18,7 @@ from annelid_studies.riddle2023.claims.evidence import (
     near,
 )
 from annelid_studies.riddle2023.contents import Claim
+from annelid_studies.worms import fast, one_after_the_other, rods
 
 
 def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:

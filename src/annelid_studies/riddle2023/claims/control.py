@@ -6,7 +6,6 @@ from math import nan
 
 from annelid.analysis.rhythm import CONTRACTED
 from annelid.config import SnsController
-from annelid.experiment.case import fast, rods
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
@@ -17,6 +16,7 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.gate import VARIANTS, variant
+from annelid_studies.worms import fast, rods
 
 GATES = "the worm and how its gates start"
 

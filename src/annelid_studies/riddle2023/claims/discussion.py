@@ -10,7 +10,6 @@ from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
 from annelid.analysis.travel import way_ahead
 from annelid.config import Program
-from annelid.experiment.case import chain, fast, one_after_the_other, rods
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     LABELS,
@@ -25,6 +24,7 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY
+from annelid_studies.worms import chain, fast, one_after_the_other, rods
 
 SLIGHT_M = 0.001
 

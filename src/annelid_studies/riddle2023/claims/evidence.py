@@ -9,7 +9,7 @@ from math import nan
 
 import numpy as np
 
-from annelid.experiment.case import CHAIN, FAST, PLANAR, Case, chain, fast, one_after_the_other, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store
 from annelid.morphology import Array
@@ -18,6 +18,7 @@ from annelid_studies.riddle2023.contents import Verdict
 from annelid_studies.riddle2023.examination import Effort, Findings, Results
 from annelid_studies.riddle2023.examinations.side_by_side import WORMS
 from annelid_studies.slip import detection
+from annelid_studies.worms import CHAIN, FAST, PLANAR, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
 EQUAL_RANGES = {"body.rings.length_range_m": [0.566, 1.067]}

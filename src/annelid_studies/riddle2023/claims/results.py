@@ -7,7 +7,7 @@ from math import nan
 import numpy as np
 
 from annelid.analysis.elongation import end_difference, middle_deficit
-from annelid.experiment.case import FAST, Case
+from annelid.experiment.case import Case
 from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
     PAPER_STEPS,
@@ -20,6 +20,7 @@ from annelid_studies.riddle2023.claims.evidence import (
     readings_m,
 )
 from annelid_studies.riddle2023.contents import Claim
+from annelid_studies.worms import FAST
 
 SPRING = "how the elongation is read"
 

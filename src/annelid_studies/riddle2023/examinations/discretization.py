@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
-from annelid.experiment.case import Case, one_after_the_other
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations.side_by_side import (
@@ -35,6 +35,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     span,
     walked_elongation,
 )
+from annelid_studies.worms import one_after_the_other
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

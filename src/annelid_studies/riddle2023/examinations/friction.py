@@ -13,7 +13,7 @@ from annelid.analysis.elongation import middle_deficit
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
-from annelid.experiment.case import Case, one_after_the_other, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations.side_by_side import (
@@ -39,6 +39,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     span,
     walked_elongation,
 )
+from annelid_studies.worms import one_after_the_other, rods
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
 FEW = (0.05, 0.2, 0.4, 1.0, 1.5)

@@ -17,7 +17,7 @@ from annelid.config import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
-from annelid.experiment.case import CHAIN, Case
+from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations.side_by_side import (
     PAPERS,
@@ -31,6 +31,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     rhythm_words,
     span,
 )
+from annelid_studies.worms import CHAIN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

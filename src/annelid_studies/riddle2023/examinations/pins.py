@@ -15,7 +15,7 @@ from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title, segment_colors
 from annelid.errors import ConfigError
-from annelid.experiment.case import HOLD_S, Case, chain, fast, one_after_the_other, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
@@ -41,6 +41,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     rhythm_words,
     segment_handles,
 )
+from annelid_studies.worms import HOLD_S, chain, fast, one_after_the_other, rods
 
 STIFFNESSES_N_PER_M = (12.0, 21.5, 50.0, 100.0, 300.0, 1000.0)
 """Ties of the rods; 21.5 N/m are the preset's."""

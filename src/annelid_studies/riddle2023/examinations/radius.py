@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
-from annelid.experiment.case import Case, one_after_the_other
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations.side_by_side import (
@@ -39,6 +39,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     segment_handles,
     walked_elongation,
 )
+from annelid_studies.worms import one_after_the_other
 
 RADII_M = (0.002, 0.00233, 0.00299)
 """The paper's strands, and the two radii of the authors' later files."""

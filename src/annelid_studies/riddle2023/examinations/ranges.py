@@ -12,7 +12,7 @@ from annelid.config import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
-from annelid.experiment.case import Case, chain, one_after_the_other
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations.side_by_side import (
@@ -29,6 +29,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     rhythm_words,
     walked_elongation,
 )
+from annelid_studies.worms import chain, one_after_the_other
 
 EQUAL = (0.566, 1.067)
 """Mean of the three ranges that the engine of the paper's time compiled, m."""

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from annelid.analysis import RhythmScore
 from annelid.draw.style import segment_colors
-from annelid.experiment.case import Case, chain, fast, rods
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
+from annelid_studies.worms import chain, fast, rods
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +70,7 @@ def held_elongation(outcome: Outcome, *, first_helix: bool = False) -> NDArray[n
     """Elongation of each segment at the end of its own open-loop contraction, m; NaN where a run ended before.
 
     Args:
-        outcome: Outcome of a run of `annelid.experiment.case.one_after_the_other`.
+        outcome: Outcome of a run of `annelid_studies.worms.one_after_the_other`.
         first_helix: Reads the spring on the first helix in place of the mean of all.
 
     Returns:

@@ -14,7 +14,7 @@ from annelid.config import RunConfig, WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
-from annelid.experiment.case import CHAIN, FAST, PAPERS_MESH, RODS, Case, one_after_the_other
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.simulation.runfile import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
@@ -38,6 +38,7 @@ from annelid_studies.riddle2023.examinations.side_by_side import (
     rhythm_words,
     walked_elongation,
 )
+from annelid_studies.worms import CHAIN, FAST, PAPERS_MESH, RODS, one_after_the_other
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

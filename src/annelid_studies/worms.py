@@ -1,0 +1,53 @@
+"""The worms that the studies lay side by side, and their open-loop protocol."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from annelid.experiment.case import Case
+
+CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
+"""The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
+PLANAR = "riddle2022-planar"
+PAPERS_MESH = {"body.mesh.elements_per_side": 3, "body.formulation.solver_tolerance": 1e-6}
+"""How the rods are compared with the chain; their preset solves less sharply."""
+
+RODS_STEP_S = 0.01
+"""Step of the tight rods in the examinations, s."""
+
+HOLD_S, REST_S = 0.8, 0.4
+"""In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
+
+
+def chain(changes: Mapping[str, Any] | None = None) -> Case:
+    """The paper's worm at steps of 2 ms, at half the cost of the paper's 1 ms and with the same rhythm."""
+    return Case(CHAIN, {"clock.physics_timestep_s": 0.002, **(changes or {})})
+
+
+def rods(changes: Mapping[str, Any] | None = None) -> Case:
+    """The worm of tight rods with the paper's three elements a side, at steps of `RODS_STEP_S`."""
+    return Case(RODS, {**PAPERS_MESH, "clock.physics_timestep_s": RODS_STEP_S, **(changes or {})})
+
+
+def fast(changes: Mapping[str, Any] | None = None) -> Case:
+    """The worm of rods whose pins give as the paper's do."""
+    return Case(FAST, changes or {})
+
+
+def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: float = REST_S) -> dict[str, Any]:
+    """Returns the changes that make a run open-loop: each segment contracted in turn, the others at rest.
+
+    Args:
+        n_segments: Segments of the worm.
+        hold_s: How long each is contracted, s.
+        rest_s: How long all rest before the next, s.
+    """
+    starts = [round(i * (hold_s + rest_s), 9) for i in range(n_segments)]
+    contractions = [
+        {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
+    ]
+    return {
+        "controller": {"kind": "program", "contractions": contractions},
+        "duration_s": contractions[-1]["stop_s"],
+    }

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from annelid.config import Floor, Pipe, RunConfig, arena_names, arena_summary, arena_text, load_config
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe
+from annelid.config import RunConfig, arena_names, arena_summary, arena_text, load_config
 from annelid.config.arena import SHARED
 from annelid.config.checking import whole_path
 from annelid.errors import ConfigError

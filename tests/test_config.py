@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from annelid.config import (
-    PlanarWorm,
     RunConfig,
     WormBody,
     field_paths,
@@ -21,6 +20,7 @@ from annelid.config import (
 )
 from annelid.config.sections import Section
 from annelid.errors import ConfigError
+from annelid.planar.sections import PlanarWorm
 
 
 def leaves(tree: dict[str, Any], prefix: str = "") -> set[str]:

@@ -11,7 +11,8 @@ import pytest
 from bibtexparser.entrypoint import parse_string
 
 import annelid
-from annelid.config import PlanarWorm, RunConfig, load_config, preset_names
+from annelid.config import RunConfig, load_config, preset_names
+from annelid.planar.sections import PlanarWorm
 from annelid.references import ALWAYS, USES, bibtex, entries, references_of
 
 ROOT = Path(__file__).parent.parent

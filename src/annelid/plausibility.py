@@ -21,19 +21,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import cos, hypot, inf, log, pi, radians, sin, sqrt, tan
+from math import cos, degrees, hypot, inf, log, pi, radians, sin, sqrt, tan
 from typing import Literal
 
 from annelid.config import (
-    AdaptiveSns,
     Chain,
-    Floor,
-    PressureSns,
     Rings,
     Rods,
     RunConfig,
     ServoRings,
-    SnsController,
     WormBody,
 )
 from annelid.errors import ConfigError
@@ -407,16 +403,16 @@ def _steps(config: RunConfig) -> Iterator[Finding]:
     # At one step the engine's floor is twice as soft as asked, which has been measured; at less nothing has.
     if arena.contact_time_constant_s < 0.5 * step:
         yield _softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step)
-    if isinstance(arena, Floor):
+    if arena.slope_rad:
         # On ground that rises ahead the skin slides towards the rear.
-        rise = arena.slope_deg * cos(radians(body.heading_deg))
+        rise = arena.slope_rad * cos(radians(body.heading_deg))
         backward = rise > 1e-9 and arena.backward_friction is not None
         field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-        steepness = tan(radians(abs(arena.slope_deg)))
+        steepness = tan(abs(arena.slope_rad))
         if steepness >= (friction or 0.0):
             yield Finding(
                 "arena.slope_deg",
-                arena.slope_deg,
+                round(degrees(arena.slope_rad), 9),
                 f"with arena.{field} = {friction:g} the worm slides down",
                 f"set arena.{field} above {steepness:.2g}",
                 "warning",
@@ -490,7 +486,7 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
 
 def _senses(config: RunConfig) -> Iterator[Finding]:
     """The sensors' tolerance against what a segment can lengthen by, and its neighbours lift it by."""
-    if not isinstance(config.controller, SnsController | PressureSns | AdaptiveSns):
+    if "tolerance_m" not in config.controller.sensor_fields:
         return
     assert isinstance(config.body, WormBody)
     shape, tolerance = rhombus_of(config.body), config.sensor.tolerance_m

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from annelid.analysis.passage import Passage, passage_through, reach_of
 from annelid.analysis.track import Track
-from annelid.arena.course import course_of
+from annelid.arena.kinds.pipe import Pipe, course_of
 from annelid.body import mesh_of
-from annelid.config import Mesh, Pipe
+from annelid.config import Mesh
 
 GEOMETRY = mesh_of(Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2))
 SPACING_M, RADIUS_M = 0.11, 0.12

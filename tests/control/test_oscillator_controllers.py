@@ -12,16 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis import rhythm_score
-from annelid.config import AdaptiveSns as AdaptiveSection
-from annelid.config import (
-    HeteroclinicChannel,
-    PhaseChain,
-    RunConfig,
-    SineWave,
-    StretchSensor,
-    TimedWave,
-    load_config,
-)
+from annelid.config import RunConfig, StretchSensor, load_config
 from annelid.control import (
     AdaptiveController,
     HeteroclinicController,
@@ -29,7 +20,9 @@ from annelid.control import (
     SineController,
     TimedController,
 )
-from annelid.control.waves import sine_activation, timed_activation, timed_cycle_s
+from annelid.control.adaptive import AdaptiveSns as AdaptiveSection
+from annelid.control.oscillators import HeteroclinicChannel, PhaseChain
+from annelid.control.waves import SineWave, TimedWave, sine_activation, timed_activation, timed_cycle_s
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
 from annelid.simulation import Run, simulate

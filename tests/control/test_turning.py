@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from annelid.config.turning import TurningSection
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid import config
-from annelid.config import TimedWave, check_config, load_config
-from annelid.config.turning import TurningSection
+from annelid.config import check_config, load_config
 from annelid.control import SnsController, TimedController
 from annelid.control.steering import half_scales, heading_angle, wrapped
 from annelid.control.turning import TurningController, build_steering
+from annelid.control.waves import TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched
 

@@ -16,7 +16,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.config import Chain, Floor, Pipe, Rough, RunConfig, ServoRings, WormBody, load_config
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe
+from annelid.arena.kinds.relief import Rough
+from annelid.config import Chain, RunConfig, ServoRings, WormBody, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.simulation import open_run, simulate
 

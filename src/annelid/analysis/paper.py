@@ -10,7 +10,9 @@ from importlib import resources
 from annelid.analysis.comparison import differing_fields, relative_difference
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarBody, Rods, RunConfig, SnsController, WormBody, load_config, preset_names
+from annelid.config import Rods, RunConfig, WormBody, load_config, preset_names
+from annelid.control.sns import paper_controller
+from annelid.planar.riddle2022 import PlanarBody
 from annelid.textfiles import parse_json
 
 PAPER_2023 = "Riddle et al. 2023"
@@ -50,14 +52,15 @@ def published(config: RunConfig) -> dict[str, Published]:
     ``riddle2023`` and its rods, the four-segment robot ``wang``, and the planar worms of ``riddle2022`` with the gate
     time constants and gains that go together.
     """
-    if not isinstance(config.controller, SnsController):
+    network = paper_controller(config.controller)
+    if network is None:
         return {}
     if _is_of_2023(config):
         return dict(_RIDDLE_2023)
     if config.name == "wang" and config.body.n_segments == len(ROBOT_ELONGATION_M):
         return dict(_ROBOT)
     if config.name.startswith("riddle2022") and isinstance(config.body, PlanarBody):
-        key = (config.body.n_segments, config.controller.gate_time_constant_ms, config.body.gain)
+        key = (config.body.n_segments, network.gate_time_constant_ms, config.body.gain)
         if key in _PLANAR_PERIODS_S:
             return {
                 "period_s": Published(_PLANAR_PERIODS_S[key], PAPER_2022, "the authors' code"),
@@ -164,7 +167,7 @@ def agreement(numbers: Summary) -> Agreement:
 
 def _is_of_2023(config: RunConfig) -> bool:
     named = config.name.startswith(FORMULATION) and config.body.n_segments == 3
-    return named and isinstance(config.controller, SnsController)
+    return named and paper_controller(config.controller) is not None
 
 
 _RIDDLE_2023 = {

@@ -17,7 +17,7 @@ import numpy as np
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
-from annelid.config import Arena, Chain, Strands, WormBody
+from annelid.config import ArenaKind, Chain, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
 JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
@@ -28,7 +28,7 @@ def add_chains(
     geometry: MeshGeometry,
     body: WormBody,
     formulation: Chain,
-    arena: Arena,
+    arena: ArenaKind,
     *,
     vertices_touch: bool = False,
 ) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
-from annelid.config import Arena, Rods, Strands, WormBody
+from annelid.config import ArenaKind, Rods, Strands, WormBody
 from annelid.morphology import Array, MeshGeometry
 
 AXES = np.eye(3)
@@ -39,7 +39,7 @@ TWIST_MASS_KG = 1e-9
 
 
 def add_rods(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: Arena, *, dampers: bool
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: ArenaKind, *, dampers: bool
 ) -> None:
     """Adds the mesh as a net of rods, and the solver settings that it needs.
 

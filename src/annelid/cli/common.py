@@ -115,7 +115,8 @@ def config_of(
     Raises:
         ConfigError: There is no such preset, file, level of fidelity or arena, or a value is out of range.
     """
-    from annelid.config import PlanarWorm, load_config
+    from annelid.config import load_config
+    from annelid.planar.sections import PlanarWorm
 
     options = {"--segments": segments, "--fidelity": fidelity, "--uncertainty": uncertainty}
     refitting = [option for option, value in options.items() if value is not None]

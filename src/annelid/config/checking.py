@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from annelid.config.kinds import Kind, kinds_of
 from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import MOST_SHOWN, ConfigError, listed, shown
@@ -34,7 +35,7 @@ def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[st
     paths: dict[str, str] = {}
     for name, info in model.model_fields.items():
         if _is_branch(info.annotation):
-            for section in _sections_of(info.annotation):
+            for section in sections_in(info.annotation):
                 paths.update(field_paths(section, f"{prefix}{name}."))
         else:
             paths[f"{prefix}{name}"] = info.description or ""
@@ -67,15 +68,18 @@ def _fields_of_section(section: BaseModel, prefix: str) -> dict[str, str]:
 
 def _is_branch(annotation: Any) -> bool:
     """Tells a section from a field; a list of sections is one field, set as a whole."""
-    return get_origin(annotation) is not tuple and bool(_sections_of(annotation))
+    return get_origin(annotation) is not tuple and bool(sections_in(annotation))
 
 
-def _sections_of(annotation: Any) -> list[type[Section]]:
+def sections_in(annotation: Any) -> list[type[Section]]:
+    """Returns the sections that an annotation admits: every kind of a family, and those of a list of sections too."""
+    if isinstance(annotation, type) and issubclass(annotation, Kind):
+        return list(kinds_of(annotation).values())
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return [annotation]
     found: list[type[Section]] = []
     for argument in getattr(annotation, "__args__", ()):
-        found.extend(_sections_of(argument))
+        found.extend(sections_in(argument))
     return found
 
 
@@ -126,7 +130,7 @@ def unit_of(path: str) -> str:
 
 
 def _field_sections(section: type[BaseModel], field: str) -> list[type[Section]]:
-    return _sections_of(section.model_fields[field].annotation)
+    return sections_in(section.model_fields[field].annotation)
 
 
 def _kind_of(section: type[Section]) -> Any:

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from math import pi
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import Field, Tag, field_validator, model_validator
 
+from annelid.config.kinds import BodyKind
 from annelid.config.sections import Impedance, Length, Modulus, NonNegative, Positive, Range, Section, kind_or
 from annelid.errors import ConfigError
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+    from annelid.protocols import Plant
 
 JOINT_DAMPING = 0.12
 """The paper's, N m s/rad."""
@@ -315,7 +320,7 @@ class Chain(Section):
 Formulation = Annotated[Annotated[Rods, Tag("rods")] | Annotated[Chain, Tag("chain")], kind_or("rods")]
 
 
-class WormBody(Section):
+class WormBody(BodyKind):
     """The 3D worm."""
 
     kind: Literal["worm"] = "worm"
@@ -331,6 +336,12 @@ class WormBody(Section):
     springs: Springs = Springs()
     rings: RingsSection = Rings()
     formulation: Formulation = Rods()
+
+    def build(self, config: RunConfig) -> Plant:
+        """Builds the worm's plant in the engine, as `BodyKind.build`."""
+        from annelid.simulation.worm import WormPlant
+
+        return WormPlant(config)
 
     @property
     def n_segments(self) -> int:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Daltorio2013Body
 from annelid.draw.style import STYLE, activation_color
 from annelid.errors import RunFileError
+from annelid.planar.daltorio2013 import Daltorio2013Body
 
 if TYPE_CHECKING:
     from matplotlib.patches import Polygon

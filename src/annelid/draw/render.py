@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import PlanarWorm
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
+from annelid.planar.sections import PlanarWorm
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
-from annelid.config import Program
+from annelid.control.program import Program
 from annelid.simulation.runfile import Run
 
 

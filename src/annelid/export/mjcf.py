@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.body.mjcf import Keyframe, mjcf_text
-from annelid.config import PlanarWorm
 from annelid.errors import RunFileError
 from annelid.output import whole_file
+from annelid.planar.sections import PlanarWorm
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from annelid.analysis import gait, summary
-from annelid.config import PlanarWorm, RunConfig, field_value, fields_of, toml_value
+from annelid.config import RunConfig, field_value, fields_of, toml_value
 from annelid.draw.figures.track import track_figure
 from annelid.draw.markdown import anchors, code, emphasis, table, words
 from annelid.draw.page import page
@@ -17,6 +17,7 @@ from annelid.draw.render import Progress, render_frame
 from annelid.draw.table import COMPARED, closing_sentence, gait_rows, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.output import whole_file
+from annelid.planar.sections import PlanarWorm
 from annelid.references import bibtex, references_of
 
 if TYPE_CHECKING:

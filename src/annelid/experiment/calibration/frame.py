@@ -16,9 +16,10 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from annelid.arena.kinds.floor import Floor
 from annelid.body import build_spec, compile_spec, mesh_of
 from annelid.body.actuation import crossing_site, ring_names
-from annelid.config import Floor, Rods, RunConfig, WormBody
+from annelid.config import Rods, RunConfig, WormBody
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.calibration.loop import Loop
 

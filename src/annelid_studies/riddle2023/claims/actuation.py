@@ -6,7 +6,8 @@ from math import nan
 
 import numpy as np
 
-from annelid.config import SnsController, WormBody
+from annelid.config import WormBody
+from annelid.control.sns import Sns
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     EXACT,
@@ -27,7 +28,7 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
 
     body, controller = main.config.body, main.config.controller
     assert isinstance(body, WormBody)
-    assert isinstance(controller, SnsController)
+    assert isinstance(controller, Sns)
     difference = largest_difference(body.muscles)
     summaries = [one.summary for one, _ in evidence.runs]
     medians = [summary.contraction_force_median_N or nan for summary in summaries]

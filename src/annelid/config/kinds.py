@@ -1,0 +1,273 @@
+"""Kinds of controllers, bodies, their parts and arenas: what each kind offers, and how a configuration names one.
+
+A kind is a subclass of one of the families below in a module of its own: its fields, its checks, what it builds, its
+citations, and what can be turned while it runs. Defining the class registers it. annelid's own kinds lie in `HOMES`;
+an installed package adds kinds by an entry point of the group `GROUP` that names the module that defines them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
+
+from pydantic import SerializeAsAny, WrapValidator
+from pydantic_core import PydanticCustomError
+
+from annelid.config.sections import Section
+from annelid.errors import ConfigError, shown, suggest
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+    from annelid.control.steering import Steering
+    from annelid.protocols import Controller, Plant
+
+HOMES = ("annelid.arena.kinds", "annelid.control", "annelid.planar", "annelid.config.worm")
+"""Modules and packages of annelid that define kinds; none of them imports the engine."""
+
+GROUP = "annelid.kinds"
+"""Entry points of other packages: each names a module that defines kinds."""
+
+_KINDS: dict[str, dict[str, type[Kind]]] = {}
+
+
+@dataclass(frozen=True)
+class Knob:
+    """A field that can be changed while a worm runs, with the range of its slider.
+
+    Attributes:
+        field: Dotted path in the configuration.
+        label: What it is, with the unit that is shown.
+        scale: What is shown over the value in the field's own unit.
+        low: Least that is shown.
+        high: Most that is shown.
+        step: Between two values that are shown.
+        hint: What changing it does.
+    """
+
+    field: str
+    label: str
+    scale: float
+    low: float
+    high: float
+    step: float
+    hint: str
+
+    def shown(self, config: RunConfig) -> float:
+        """Returns the value that a configuration has, as it is shown."""
+        value: Any = config
+        for name in self.field.split("."):
+            value = getattr(value, name)
+        # Without the last bits, which a change of units adds and a slider would print.
+        return min(max(float(f"{self.scale * float(value):.10g}"), self.low), self.high)
+
+    def value(self, shown: float) -> float:
+        """Returns the field's value for a number that is shown."""
+        return float(f"{shown / self.scale:.10g}")
+
+
+class Kind(Section):
+    """Base of all families: sections of which a configuration chooses one by its field ``kind``.
+
+    Attributes:
+        family: What it is a kind of.
+        cites: Publications that it rests on: keys of ``annelid/data/references.bib`` or of `bibtex`, and what for.
+        bibtex: Entries of its own, BibTeX, separated by empty lines.
+
+    Raises:
+        ConfigError: On definition, where its family has another kind of that name.
+    """
+
+    family: ClassVar[str]
+    cites: ClassVar[tuple[tuple[str, str], ...]] = ()
+    bibtex: ClassVar[str] = ""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Registers a class that gives its field ``kind`` a value."""
+        field = cls.model_fields.get("kind")
+        if field is None or not isinstance(field.default, str):
+            return
+        kinds = _KINDS.setdefault(cls.family, {})
+        other = kinds.setdefault(field.default, cls)
+        # A module that is loaded anew defines the same class once more.
+        if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
+            raise ConfigError(
+                f"{cls.__module__}.{cls.__qualname__}: {cls.family}.kind = {field.default!r} is taken by "
+                f"{other.__module__}.{other.__qualname__}"
+            )
+        kinds[field.default] = cls
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks the section against the rest of a configuration.
+
+        Raises:
+            ValueError: They do not fit; the message names the fields, the value and what is valid.
+        """
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns the publications that this section rests on, as `cites`; depends on its fields where need be."""
+        return self.cites
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the section's fields that can be changed while a worm runs."""
+        return ()
+
+
+class ControllerKind(Kind):
+    """Base of the controllers' sections.
+
+    Attributes:
+        sensor_fields: Fields of the section ``sensor`` that it uses.
+    """
+
+    family: ClassVar[str] = "controller"
+    sensor_fields: ClassVar[frozenset[str]] = frozenset()
+    kind: str
+
+    @abstractmethod
+    def build(self, config: RunConfig, plant: Plant) -> Controller:
+        """Builds the controller in its initial state.
+
+        Args:
+            config: The configuration that the section is of.
+            plant: The body that it drives.
+
+        Raises:
+            ConfigError: It cannot be built with these values.
+        """
+
+
+class Goals(NamedTuple):
+    """Places on the ground that a worm is steered to.
+
+    Attributes:
+        points_m: x and y of each, m.
+        reach_m: Distance at which one counts as reached, m.
+    """
+
+    points_m: tuple[tuple[float, float], ...] = ()
+    reach_m: float = 0.0
+
+
+class TurningKind(Kind):
+    """Base of the sections that scale the two sides of a worm with half-rings."""
+
+    family: ClassVar[str] = "turning"
+    kind: str
+
+    @property
+    def goals(self) -> Goals:
+        """The places on the ground that the worm is steered to."""
+        return Goals()
+
+    @abstractmethod
+    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
+        """Builds the steering in its initial state.
+
+        Args:
+            n_segments: Segments of the worm.
+            control_timestep_s: Control step, s.
+        """
+
+
+class BodyKind(Kind):
+    """Base of the bodies' sections.
+
+    Attributes:
+        touches_ground: Whether anything of the body bears on a ground or a wall.
+        n_segments: Actuated segments.
+    """
+
+    family: ClassVar[str] = "body"
+    touches_ground: ClassVar[bool] = True
+    kind: str
+
+    @abstractmethod
+    def build(self, config: RunConfig) -> Plant:
+        """Builds the body at rest.
+
+        Args:
+            config: The configuration that the section is of.
+
+        Raises:
+            ConfigError: It cannot be built with these values.
+        """
+
+
+Family = TypeVar("Family", bound=Kind)
+
+
+@cache
+def _load() -> None:
+    """Imports every module that defines kinds."""
+    for home in HOMES:
+        package = import_module(home)
+        for module in iter_modules(getattr(package, "__path__", ()), f"{home}."):
+            import_module(module.name)
+    for entry in entry_points(group=GROUP):
+        try:
+            entry.load()
+        except Exception as error:
+            package = entry.dist.name if entry.dist is not None else "an installed package"
+            warnings.warn(f"the kinds of {package} ({entry.value}) cannot be loaded: {error}", stacklevel=2)
+
+
+def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
+    """Returns the kinds of a family by their names, those of other installed packages too."""
+    _load()
+    return {name: kind for name, kind in sorted(_KINDS.get(family.family, {}).items()) if issubclass(kind, family)}
+
+
+def kind_named(family: type[Family], name: str) -> type[Family]:
+    """Returns a kind by its name.
+
+    Raises:
+        ConfigError: The family has no kind of that name; the sentence suggests the nearest.
+    """
+    kinds = kinds_of(family)
+    if name not in kinds:
+        raise ConfigError(f"unknown {family.family}.kind = {shown(name)}: {suggest(name, kinds)}")
+    return kinds[name]
+
+
+def every_kind() -> list[type[Kind]]:
+    """Returns the kinds of all families."""
+    _load()
+    return [kind for family in _KINDS.values() for kind in family.values()]
+
+
+def class_named(name: str) -> type[Kind] | None:
+    """Returns the class of a kind, or one that kinds are derived from, by its own name; None where there is none."""
+    every = [known for kind in every_kind() for known in kind.__mro__]
+    return next((known for known in every if known.__name__ == name and issubclass(known, Kind)), None)
+
+
+class Choice:
+    """Annotation of a field that holds one kind of a family: ``Annotated[ControllerKind, Choice("sns")]``."""
+
+    def __init__(self, default: str) -> None:
+        """Takes the kind that is meant where none is named."""
+        self.default = default
+
+    def __get_pydantic_core_schema__(self, family: type[Kind], handler: Any) -> Any:
+        """Validates a mapping as the kind that it names."""
+
+        def choose(value: Any, validate: Any) -> Any:
+            if not isinstance(value, Mapping):
+                return validate(value)
+            name, kinds = value.get("kind", self.default), kinds_of(family)
+            if not isinstance(name, str) or name not in kinds:
+                tags = ", ".join(map(repr, kinds))
+                raise PydanticCustomError(
+                    "union_tag_invalid", "must be one of {expected_tags}", {"expected_tags": tags}
+                )
+            return kinds[name].model_validate(value)
+
+        return handler.generate_schema(SerializeAsAny[Annotated[family, WrapValidator(choose)]])

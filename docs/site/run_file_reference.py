@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from annelid.config import load_config
+from annelid.config import ControllerKind, kinds_of, load_config
 from annelid.protocols import Records, Signal
 from annelid.simulation import build_controller, build_plant
 from annelid.simulation.recorder import loop_signals

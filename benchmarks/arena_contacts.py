@@ -15,11 +15,10 @@ from time import perf_counter, process_time
 
 import mujoco
 import numpy as np
-from annelid.arena.panels import add_panels
 
 from annelid.arena.contact import contact_options, touching
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.shapes import shape_of
+from annelid.arena.kinds.pipe import Pipe, add_pipe_panels
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.config import ArenaKind, RunConfig, WormBody, load_config
@@ -81,12 +80,19 @@ def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
 
 def panels(around: int) -> Ground:
     """Returns what adds a pipe of so many panels round it, or a height field."""
-    return lambda spec, arena, length_m: add_panels(spec, arena, length_m, around)
+
+    def add(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
+        if isinstance(arena, Pipe):
+            add_pipe_panels(spec, arena, length_m, around)
+        else:
+            arena.add_panels(spec, length_m)
+
+    return add
 
 
 def mesh_field(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
     """Adds a pipe's wall, closed and 3 cm thick, as a mesh whose distance field the engine computes."""
-    inner = shape_of(arena, length_m)
+    inner = arena.shape(length_m)
     assert inner is not None
     surface = surface_of(arena)
     outer = inner.vertices_m - WALL_M * surface.normal(inner.vertices_m)

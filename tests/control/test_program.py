@@ -139,7 +139,7 @@ def test_a_bad_contraction_is_refused_in_one_sentence(contraction: dict[str, Any
         (programmed(ONE, ramp_s=-1.0), r"controller\.ramp_s = -1\.0: must be at least 0"),
         (programmed(ONE, gate_time_constant_ms=300.0), "belongs to another kind. Valid here: contractions, kind"),
         ({"controller.contractions": [ONE]}, "belongs to another kind"),
-        ({"controller.kind": "programme"}, "must be one of 'sns', 'program'"),
+        ({"controller.kind": "programme"}, "must be one of 'sns', 'adaptive', 'phase-chain', 'program'"),
         ({"controller.kind": "program", "controller.contractions": 3}, "must be a list"),
     ],
 )

@@ -43,8 +43,8 @@ class ArenaKind(Kind):
     """
 
     family: ClassVar[str] = "arena"
+    default: ClassVar[str] = "floor"
     is_closed: ClassVar[bool] = False
-    kind: str
 
     friction: Friction = Field(default=1.0, description="coefficient of sliding friction")
     backward_friction: Friction | None = Field(

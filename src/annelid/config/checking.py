@@ -27,7 +27,7 @@ def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
     try:
         return section.model_validate(tree)
     except ValidationError as error:
-        raise ConfigError(_explain_all(error, section)) from None
+        raise ConfigError(_explain_all(error, section, tree)) from None
 
 
 def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
@@ -170,19 +170,19 @@ MOST_SENTENCE = 450
 """Characters of what is wrong with a configuration; the first thing is told in any case."""
 
 
-def _explain_all(error: ValidationError, root: type[Section]) -> str:
+def _explain_all(error: ValidationError, root: type[Section], tree: Any) -> str:
     """Joins what is wrong, as much of it as a sentence can hold."""
     sentences: dict[str, None] = {}
     for count, detail in enumerate(error.errors()):
-        sentence = _explain(detail, root)
+        sentence = _explain(detail, root, tree)
         if sentences and sum(map(len, [*sentences, sentence])) > MOST_SENTENCE:
             return f"{'; '.join(sentences)}; and {error.error_count() - count:,} more"
         sentences[sentence] = None
     return "; ".join(sentences)
 
 
-def _explain(detail: ErrorDetails, root: type[Section]) -> str:
-    parts, section = _place(detail["loc"], root)
+def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
+    parts, section = _place(detail["loc"], root, tree)
     kind, given = detail["type"], detail["input"]
     if kind == "extra_forbidden":
         unknown = str(detail["loc"][-1])
@@ -200,8 +200,8 @@ def _explain(detail: ErrorDetails, root: type[Section]) -> str:
     return f"{path or 'the configuration'} = {shown(given)}: {words}"
 
 
-def _place(loc: tuple[int | str, ...], root: type[Section]) -> tuple[list[str], type[BaseModel]]:
-    """Follows an error's location, which names kinds and types too, through the sections.
+def _place(loc: tuple[int | str, ...], root: type[Section], tree: Any) -> tuple[list[str], type[BaseModel]]:
+    """Follows an error's location, which may name types too, through the sections.
 
     Returns:
         The parts of the dotted path, without a last part that is no field; the section that it leads to.
@@ -212,11 +212,16 @@ def _place(loc: tuple[int | str, ...], root: type[Section]) -> tuple[list[str], 
     for part in loc:
         names = {info.alias or name: name for name, info in section.model_fields.items()}
         if part in names and not members:
-            members = _field_sections(section, names[str(part)])
-        elif members and part in (tags := {_kind_of(member): member for member in members}):
-            section, members = tags[part], []
+            field = section.model_fields[names[str(part)]]
+            tree = tree.get(part) if isinstance(tree, Mapping) else getattr(tree, str(part), None)
+            members = sections_in(field.annotation)
+            kind = tree.get("kind", _kind_of(members[0])) if isinstance(tree, Mapping) and members else None
+            members = [member for member in members if kind is not None and _kind_of(member) == kind] or members
+        elif members and part in {_kind_of(member) for member in members}:
             continue
-        elif not isinstance(part, int):
+        elif isinstance(part, int):
+            tree = tree[part] if isinstance(tree, Sequence) and part < len(tree) else None
+        else:
             continue
         parts.append(str(part))
         if len(members) == 1:

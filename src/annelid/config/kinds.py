@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import get_annotations
 from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -77,32 +78,36 @@ class Kind(Section):
 
     Attributes:
         family: What it is a kind of.
+        default: Kind of the family that is meant where none is named.
         cites: Publications that it rests on: keys of ``annelid/data/references.bib`` or of `bibtex`, and what for.
         bibtex: Entries of its own, BibTeX, separated by empty lines.
+        kind: Its name: a subclass makes it ``Literal["name"] = "name"``.
 
     Raises:
         ConfigError: On definition, where its family has another kind of that name.
     """
 
     family: ClassVar[str]
+    default: ClassVar[str]
     cites: ClassVar[tuple[tuple[str, str], ...]] = ()
     bibtex: ClassVar[str] = ""
+    kind: Any
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """Registers a class that gives its field ``kind`` a value."""
-        field = cls.model_fields.get("kind")
-        if field is None or not isinstance(field.default, str):
+        """Registers a class that gives its own field ``kind`` a value."""
+        name = cls.model_fields["kind"].default if "kind" in get_annotations(cls) else None
+        if not isinstance(name, str):
             return
         kinds = _KINDS.setdefault(cls.family, {})
-        other = kinds.setdefault(field.default, cls)
+        other = kinds.setdefault(name, cls)
         # A module that is loaded anew defines the same class once more.
         if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ConfigError(
-                f"{cls.__module__}.{cls.__qualname__}: {cls.family}.kind = {field.default!r} is taken by "
+                f"{cls.__module__}.{cls.__qualname__}: {cls.family}.kind = {name!r} is taken by "
                 f"{other.__module__}.{other.__qualname__}"
             )
-        kinds[field.default] = cls
+        kinds[name] = cls
 
     def check_with(self, config: RunConfig) -> None:
         """Checks the section against the rest of a configuration.
@@ -128,8 +133,8 @@ class ControllerKind(Kind):
     """
 
     family: ClassVar[str] = "controller"
+    default: ClassVar[str] = "sns"
     sensor_fields: ClassVar[frozenset[str]] = frozenset()
-    kind: str
 
     @abstractmethod
     def build(self, config: RunConfig, plant: Plant) -> Controller:
@@ -160,7 +165,15 @@ class TurningKind(Kind):
     """Base of the sections that scale the two sides of a worm with half-rings."""
 
     family: ClassVar[str] = "turning"
-    kind: str
+    default: ClassVar[str] = "constant"
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has two sides."""
+        if not config.body.has_halves:
+            raise ValueError(
+                f"turning.kind = {self.kind!r} needs a left and a right half of every ring: body.kind = 'worm' with "
+                "body.rings.layout = 'halves'"
+            )
 
     @property
     def goals(self) -> Goals:
@@ -181,13 +194,29 @@ class BodyKind(Kind):
     """Base of the bodies' sections.
 
     Attributes:
+        needs_arena: Whether it stands on an arena, the default one where none is given.
+        has_skin: Whether the sides of its segments feel touch.
         touches_ground: Whether anything of the body bears on a ground or a wall.
         n_segments: Actuated segments.
     """
 
     family: ClassVar[str] = "body"
+    default: ClassVar[str] = "worm"
+    needs_arena: ClassVar[bool] = False
+    has_skin: ClassVar[bool] = False
     touches_ground: ClassVar[bool] = True
-    kind: str
+
+    if TYPE_CHECKING:
+
+        @property
+        def n_segments(self) -> int:
+            """A field of some bodies, and follows from other fields in others."""
+            ...
+
+    @property
+    def has_halves(self) -> bool:
+        """Whether each segment has a left and a right muscle."""
+        return False
 
     @abstractmethod
     def build(self, config: RunConfig) -> Plant:
@@ -220,9 +249,10 @@ def _load() -> None:
 
 
 def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
-    """Returns the kinds of a family by their names, those of other installed packages too."""
+    """Returns the kinds of a family by their names, those of other installed packages too; the default comes first."""
     _load()
-    return {name: kind for name, kind in sorted(_KINDS.get(family.family, {}).items()) if issubclass(kind, family)}
+    kinds = sorted(_KINDS.get(family.family, {}).items(), key=lambda known: (known[0] != family.default, known[0]))
+    return {name: kind for name, kind in kinds if issubclass(kind, family)}
 
 
 def kind_named(family: type[Family], name: str) -> type[Family]:
@@ -249,12 +279,13 @@ def class_named(name: str) -> type[Kind] | None:
     return next((known for known in every if known.__name__ == name and issubclass(known, Kind)), None)
 
 
-class Choice:
-    """Annotation of a field that holds one kind of a family: ``Annotated[ControllerKind, Choice("sns")]``."""
+def default_of(family: type[Family]) -> Family:
+    """Returns the kind of a family that is meant where none is named, with the defaults of all its fields."""
+    return kind_named(family, family.default).model_validate({})
 
-    def __init__(self, default: str) -> None:
-        """Takes the kind that is meant where none is named."""
-        self.default = default
+
+class Choice:
+    """Annotation of a field that holds any kind of a family: ``Annotated[ControllerKind, Choice()]``."""
 
     def __get_pydantic_core_schema__(self, family: type[Kind], handler: Any) -> Any:
         """Validates a mapping as the kind that it names."""
@@ -262,12 +293,10 @@ class Choice:
         def choose(value: Any, validate: Any) -> Any:
             if not isinstance(value, Mapping):
                 return validate(value)
-            name, kinds = value.get("kind", self.default), kinds_of(family)
+            name, kinds = value.get("kind", family.default), kinds_of(family)
             if not isinstance(name, str) or name not in kinds:
-                tags = ", ".join(map(repr, kinds))
-                raise PydanticCustomError(
-                    "union_tag_invalid", "must be one of {expected_tags}", {"expected_tags": tags}
-                )
+                valid = {"expected_tags": ", ".join(map(repr, kinds))}
+                raise PydanticCustomError("union_tag_invalid", "must be one of {expected_tags}", valid)
             return kinds[name].model_validate(value)
 
         return handler.generate_schema(SerializeAsAny[Annotated[family, WrapValidator(choose)]])

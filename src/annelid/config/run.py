@@ -8,14 +8,12 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from annelid.config.arena import ArenaKind
-from annelid.config.kinds import BodyKind, Choice, ControllerKind, TurningKind, kind_named
+from annelid.config.kinds import BodyKind, Choice, ControllerKind, TurningKind, default_of, kinds_of
 from annelid.config.sections import Line, NonNegative, Positive, Section, Seed
 from annelid.config.sensor import StretchSensor
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
 MOST_SAMPLES = 10_000_000
-BODY, ARENA, CONTROLLER, TURNING = "worm", "floor", "sns", "constant"
-"""Kinds that are meant where none is named."""
 
 
 def _is_multiple(large: float, small: float) -> bool:
@@ -73,14 +71,12 @@ class RunConfig(Section):
     summary: Line = Field(default="", max_length=1000, description="one line for the list of presets")
     duration_s: Positive = Field(default=5.0, description="simulated time")
     seed: Seed = Field(default=0, description="seed of every random draw")
-    body: Annotated[BodyKind, Choice(BODY)] = Field(default_factory=lambda: kind_named(BodyKind, BODY)())
-    arena: Annotated[ArenaKind, Choice(ARENA)] | None = Field(
+    body: Annotated[BodyKind, Choice()] = Field(default_factory=lambda: default_of(BodyKind))
+    arena: Annotated[ArenaKind, Choice()] | None = Field(
         default=None, description="the 3D worm's ground; planar worms have none"
     )
-    controller: Annotated[ControllerKind, Choice(CONTROLLER)] = Field(
-        default_factory=lambda: kind_named(ControllerKind, CONTROLLER)()
-    )
-    turning: Annotated[TurningKind, Choice(TURNING)] | None = Field(
+    controller: Annotated[ControllerKind, Choice()] = Field(default_factory=lambda: default_of(ControllerKind))
+    turning: Annotated[TurningKind, Choice()] | None = Field(
         default=None, description="what scales the two sides of a worm with half-rings"
     )
     sensor: StretchSensor = StretchSensor()
@@ -90,12 +86,13 @@ class RunConfig(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _ground_under_the_worm(cls, tree: Any) -> Any:
+    def _ground_under_the_body(cls, tree: Any) -> Any:
         if not isinstance(tree, Mapping) or tree.get("arena") is not None:
             return tree
         body = tree.get("body", {})
-        kind = body.get("kind", BODY) if isinstance(body, Mapping) else getattr(body, "kind", BODY)
-        return {**tree, "arena": {}} if kind == BODY else tree
+        kind = body.get("kind", BodyKind.default) if isinstance(body, Mapping) else getattr(body, "kind", None)
+        stands = kinds_of(BodyKind).get(kind) if isinstance(kind, str) else None
+        return {**tree, "arena": {}} if stands is not None and stands.needs_arena else tree
 
     @model_validator(mode="after")
     def _sections_fit_together(self) -> Self:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, Tag, field_validator, model_validator
 
@@ -323,6 +323,8 @@ Formulation = Annotated[Annotated[Rods, Tag("rods")] | Annotated[Chain, Tag("cha
 class WormBody(BodyKind):
     """The 3D worm."""
 
+    needs_arena: ClassVar[bool] = True
+    has_skin: ClassVar[bool] = True
     kind: Literal["worm"] = "worm"
     heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
         default=0.0,
@@ -342,6 +344,11 @@ class WormBody(BodyKind):
         from annelid.simulation.worm import WormPlant
 
         return WormPlant(config)
+
+    @property
+    def has_halves(self) -> bool:
+        """Whether its rings are halved."""
+        return self.rings.layout == "halves"
 
     @property
     def n_segments(self) -> int:

@@ -67,7 +67,7 @@ class PressureSns(ControllerKind):
 
     def check_with(self, config: RunConfig) -> None:
         """Checks that the body has a skin that feels pressure."""
-        if config.body.is_planar:
+        if not config.body.has_skin:
             raise ValueError(
                 f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {config.body.kind!r} "
                 "has not; only the 3D worm ('worm') has"

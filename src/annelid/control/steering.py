@@ -40,7 +40,8 @@ class Descending(TurningKind):
     )
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that each segment has its share."""
+        """Checks that the body has two sides, and that each segment has its share."""
+        super().check_with(config)
         n_segments = config.body.n_segments
         if self.shares is not None and len(self.shares) != n_segments:
             raise ValueError(f"turning.shares has {len(self.shares)} entries: must have {n_segments}, one a segment")

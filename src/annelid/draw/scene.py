@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import RunConfig, WormBody
-from annelid.config.kinds import Goals
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.gl import Canvas, find_backend
 from annelid.draw.style import CONTRACTED, activation_color
@@ -375,8 +374,10 @@ def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:
     """Lays a disc on the floor where each waypoint of a course counts as reached."""
     import mujoco
 
-    goals = config.turning.goals if config.turning is not None else Goals()
-    for x, y in goals.points_m if config.arena is not None else ():
+    if config.turning is None or config.arena is None:
+        return
+    goals = config.turning.goals
+    for x, y in goals.points_m:
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
             pos=[x, y, WAYPOINT_HALF_HEIGHT_M - config.arena.floor_depth_m],

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 class PlanarWorm(BodyKind):
     """What every planar worm has: its segments are rhombi in a row."""
 
-    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
+    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(  # pyright: ignore[reportIncompatibleMethodOverride]
+        default=3, description="actuated segments"
+    )
 
     def check_with(self, config: RunConfig) -> None:
         """Checks that no arena is given."""

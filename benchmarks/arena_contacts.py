@@ -21,7 +21,8 @@ from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe, add_pipe_panels
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
-from annelid.config import ArenaKind, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.worm import Worm, WormPlant

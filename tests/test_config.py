@@ -8,16 +8,8 @@ from typing import Any
 
 import pytest
 
-from annelid.config import (
-    RunConfig,
-    WormBody,
-    field_paths,
-    fields_of,
-    load_config,
-    parse_assignments,
-    preset_names,
-    preset_text,
-)
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, field_paths, fields_of, load_config, parse_assignments, preset_names, preset_text
 from annelid.config.sections import Section
 from annelid.errors import ConfigError
 from annelid.planar.sections import PlanarWorm

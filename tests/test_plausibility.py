@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 import annelid as package
 from annelid.analysis import rhythm_score
-from annelid.config import LEVELS, RunConfig, WormBody, arena_names, load_config, preset_names
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, RunConfig, arena_names, load_config, preset_names
 from annelid.errors import ConfigError
 from annelid.morphology import helical_mesh, rhombus
 from annelid.plausibility import (

@@ -3,57 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib import resources
 
-from annelid.config import Rods, RunConfig, ServoRings, WormBody
+from annelid.config import RunConfig
 from annelid.config.kinds import every_kind
 
 ALWAYS = {"annelid": "the simulator", "riddle2023": "the paper that it reproduces and builds on"}
 """Keys that every work with annelid cites, and what for."""
-
-EQUAL_STIFFNESS_RADIUS_M = 0.00299
-"""Radius of a solid strand that bends as the robot's tube: the authors' choice of 2025."""
-
-
-@dataclass(frozen=True, slots=True)
-class Use:
-    """A publication that configurations of some kind rest on.
-
-    Attributes:
-        key: Its key in the file.
-        reason: What it is cited for.
-        holds: Tells whether a configuration uses it.
-    """
-
-    key: str
-    reason: str
-    holds: Callable[[RunConfig], bool]
-
-
-def _rods(config: RunConfig) -> bool:
-    return isinstance(config.body, WormBody) and isinstance(config.body.formulation, Rods)
-
-
-def _six_segment_robot(config: RunConfig) -> bool:
-    return isinstance(config.body, WormBody) and config.body.strands.radius_m == EQUAL_STIFFNESS_RADIUS_M
-
-
-def _servos(config: RunConfig) -> bool:
-    return isinstance(config.body, WormBody) and isinstance(config.body.rings, ServoRings)
-
-
-USES = (
-    Use("todorov2012", "the physics engine", lambda config: isinstance(config.body, WormBody)),
-    Use("wang", "the robot that the 3D worm is a model of", lambda config: isinstance(config.body, WormBody)),
-    Use("bergou2008", "the rods of the mesh", _rods),
-    Use("riddle2025", "strands of the stiffness of the robot's tubes", _six_segment_robot),
-    Use("riddle2025models", "its model files", _six_segment_robot),
-    Use("riddle2025models", "the position servos", _servos),
-)
-"""What is cited when, in the order in which it is printed, before what the kinds cite themselves."""
 
 
 def references_of(config: RunConfig | None = None) -> dict[str, str]:
@@ -67,11 +25,9 @@ def references_of(config: RunConfig | None = None) -> dict[str, str]:
     """
     reasons = {key: [reason] for key, reason in ALWAYS.items()}
     if config is not None:
-        uses = [(use.key, use.reason) for use in USES if use.holds(config)]
-        for section in (config.arena, config.turning, config.body, config.controller):
-            uses.extend(section.cited() if section is not None else ())
-        for key, reason in uses:
-            reasons.setdefault(key, []).append(reason)
+        for section in (config.body, config.arena, config.turning, config.controller):
+            for key, reason in section.cited() if section is not None else ():
+                reasons.setdefault(key, []).append(reason)
     return {key: ", ".join(of_key) for key, of_key in reasons.items()}
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from annelid.config import ServoRings, WormBody, load_config
+from annelid.body.actuators.servo import ServoRings
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage

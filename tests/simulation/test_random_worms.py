@@ -19,7 +19,10 @@ import xarray as xr
 from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.kinds.relief import Rough
-from annelid.config import Chain, RunConfig, ServoRings, WormBody, load_config
+from annelid.body.actuators.servo import ServoRings
+from annelid.body.formulations.chain import Chain
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.simulation import open_run, simulate
 

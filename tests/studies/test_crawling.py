@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from annelid.analysis.gait import Gait
-from annelid.config import ServoRings, WormBody, load_config
+from annelid.body.actuators.servo import ServoRings
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.tune.judge import Judged

@@ -1,9 +1,9 @@
 """What a user may set: frozen models with the unit in every field's name, and the named presets.
 
-A configuration is a tree of sections (`run`, `sensor`, `worm`); which controllers, bodies, arenas and turnings there
-are, `kinds` finds. A preset is a commented TOML file in ``annelid/presets`` that states every field with its source; a
-user's own TOML file may start from one (``extends = "riddle2023"``), and any field can be overridden by its dotted path
-(``body.mesh.n_segments=4``). A level of `fidelity` sets how finely a 3D worm is resolved.
+A configuration is a tree of sections (`run`, `sensor`); which controllers, bodies, their parts, arenas and turnings
+there are, `kinds` finds. A preset is a commented TOML file in ``annelid/presets`` that states every field with its
+source; a user's own TOML file may start from one (``extends = "riddle2023"``), and any field can be overridden by its
+dotted path (``body.mesh.n_segments=4``). A level of `fidelity` sets how finely a 3D worm is resolved.
 
 The names below are loaded on first use: a kind's module imports what it needs of this package before there is a whole
 configuration.
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from annelid.config.sections import Section
     from annelid.config.sensor import StretchSensor
     from annelid.config.study import Study, Vary, load_study
-    from annelid.config.worm import Chain, Joints, Mesh, Pins, Rings, Rods, ServoRings, Springs, Strands, WormBody
     from annelid.textfiles import toml_value
 
 _HOME = {
@@ -58,11 +57,12 @@ _HOME = {
     "sections": ("Section",),
     "sensor": ("StretchSensor",),
     "study": ("Study", "Vary", "load_study"),
-    "worm": ("Chain", "Joints", "Mesh", "Pins", "Rings", "Rods", "ServoRings", "Springs", "Strands", "WormBody"),
 }
 _MODULE = {name: f"annelid.config.{module}" for module, names in _HOME.items() for name in names}
 _MODULE["toml_value"] = "annelid.textfiles"
 
+_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm")
+"""Parts of the worm's body, which the first edition had here."""
 _RENAMED = {"SnsController": "Sns", "Arena": "ArenaKind"}
 """Names of the first edition that differ from today's."""
 
@@ -70,29 +70,19 @@ __all__ = [
     "LEVELS",
     "ArenaKind",
     "BodyKind",
-    "Chain",
     "Clock",
     "Cluster",
     "ControllerKind",
     "Fidelity",
     "Guard",
-    "Joints",
     "Knob",
-    "Mesh",
-    "Pins",
     "Record",
-    "Rings",
-    "Rods",
     "RunConfig",
     "Section",
-    "ServoRings",
-    "Springs",
-    "Strands",
     "StretchSensor",
     "Study",
     "TurningKind",
     "Vary",
-    "WormBody",
     "arena_names",
     "arena_summary",
     "arena_text",
@@ -122,7 +112,10 @@ def __getattr__(name: str) -> Any:
     from annelid.config.kinds import class_named
 
     # Where the first edition had them; for one release.
-    found = class_named(_RENAMED.get(name, name)) if not name.startswith("_") else None
+    if name in _MOVED:
+        found = getattr(import_module(_MOVED[name]), name)
+    else:
+        found = class_named(_RENAMED.get(name, name)) if not name.startswith("_") else None
     if found is None:
         raise AttributeError(f"module 'annelid.config' has no attribute {name!r}")
     where = f"{found.__module__}.{found.__name__}"

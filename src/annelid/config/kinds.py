@@ -29,7 +29,14 @@ if TYPE_CHECKING:
     from annelid.control.steering import Steering
     from annelid.protocols import Controller, Plant
 
-HOMES = ("annelid.arena.kinds", "annelid.control", "annelid.planar", "annelid.config.worm")
+HOMES = (
+    "annelid.arena.kinds",
+    "annelid.body.actuators",
+    "annelid.body.formulations",
+    "annelid.body.worm",
+    "annelid.control",
+    "annelid.planar",
+)
 """Modules and packages of annelid that define kinds; none of them imports the engine."""
 
 GROUP = "annelid.kinds"
@@ -195,6 +202,7 @@ class BodyKind(Kind):
 
     Attributes:
         needs_arena: Whether it stands on an arena, the default one where none is given.
+        is_planar: Whether it is a planar worm: rhombi in a row.
         has_skin: Whether the sides of its segments feel touch.
         touches_ground: Whether anything of the body bears on a ground or a wall.
         n_segments: Actuated segments.
@@ -203,8 +211,18 @@ class BodyKind(Kind):
     family: ClassVar[str] = "body"
     default: ClassVar[str] = "worm"
     needs_arena: ClassVar[bool] = False
+    is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
     touches_ground: ClassVar[bool] = True
+
+    @property
+    def wall_distance_m(self) -> float | None:
+        """Distance of the walls that a planar worm crawls between; None where there are none."""
+        return None
+
+    def published_period_s(self, config: RunConfig) -> float | None:
+        """Returns the period that was published for this very worm, s; None where none was."""
+        return None
 
     if TYPE_CHECKING:
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.gl import Canvas, find_backend
 from annelid.draw.style import CONTRACTED, activation_color

@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from annelid.body import mesh_of
-from annelid.config import LEVELS, Clock, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, Clock, RunConfig, load_config
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 
 COARSE = "coarse"

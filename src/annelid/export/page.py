@@ -17,7 +17,6 @@ from annelid.draw.render import Progress, render_frame
 from annelid.draw.table import COMPARED, closing_sentence, gait_rows, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.output import whole_file
-from annelid.planar.sections import PlanarWorm
 from annelid.references import bibtex, references_of
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:
         ("frame.png", lambda run, path: render_frame(run, middle, path), f"The worm at {middle:g} s."),
         ("figure7.png", figure7, "Potentials of the half-centres, contractions, and lengths of the stretch sensors."),
     ]
-    if not isinstance(run.config.body, PlanarWorm):
+    if not run.config.body.is_planar:
         pictures.append(("track.png", track_figure, "Where it crawled, seen from above."))
     blocks = ["## Figures"]
     for done, (name, draw, caption) in enumerate(pictures, start=1):

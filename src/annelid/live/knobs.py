@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from annelid.config import Knob, RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import Knob, RunConfig
 
 _LEAST_FRICTION = 0.01
 

@@ -17,7 +17,8 @@ from annelid.arena.scenery import (
     RAIL_HALF_HEIGHT_M,
     RAIL_RGBA,
 )
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.config.arena import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.draw.scene import upright

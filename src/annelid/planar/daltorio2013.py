@@ -60,6 +60,11 @@ class Daltorio2013Body(DynamicPlanarWorm):
             )
         return self
 
+    @property
+    def wall_distance_m(self) -> float:
+        """As `pipe_diameter_m`."""
+        return self.pipe_diameter_m
+
     def build(self, config: RunConfig) -> Daltorio2013Plant:
         """Builds the worm, as `BodyKind.build`."""
         return Daltorio2013Plant(self, config.clock)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 class PlanarWorm(BodyKind):
     """What every planar worm has: its segments are rhombi in a row."""
 
+    is_planar: ClassVar[bool] = True
     n_segments: Annotated[int, Field(ge=3, le=200)] = Field(  # pyright: ignore[reportIncompatibleMethodOverride]
         default=3, description="actuated segments"
     )

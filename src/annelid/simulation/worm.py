@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from annelid.arena.contact import has_moving_planes
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
+from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
-from annelid.config import Rods, RunConfig, WormBody
+from annelid.config import RunConfig
 from annelid.errors import SimulationStopped
 from annelid.morphology import Array, MeshGeometry, heading_turn
 from annelid.plausibility import check, refuse_nonsense
@@ -81,7 +82,7 @@ def owns_model(config: RunConfig) -> bool:
 
 
 def _has_damper_rows(body: WormBody) -> bool:
-    return isinstance(body.formulation, Rods) and bool(body.strands.material_damping_s)
+    return body.formulation.damps_material and bool(body.strands.material_damping_s)
 
 
 class Worm(ABC):

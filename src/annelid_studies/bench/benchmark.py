@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.config import Chain
+from annelid.body.formulations.chain import Chain
 from annelid.output import whole_file
 from annelid.simulation.lock import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of

@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
+from annelid.body.actuators.muscle import Rings
+from annelid.body.actuators.servo import ServoRings
 from annelid.body.assemble import mesh_of
-from annelid.config import Rings, ServoRings, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome

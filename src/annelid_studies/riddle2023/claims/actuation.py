@@ -6,7 +6,7 @@ from math import nan
 
 import numpy as np
 
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.control.sns import Sns
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (

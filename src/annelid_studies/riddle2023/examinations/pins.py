@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.assemble import build_spec
-from annelid.config import Rods, WormBody
+from annelid.body.formulations.rods import Rods
+from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title, segment_colors

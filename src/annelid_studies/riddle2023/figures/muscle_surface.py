@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import Rings
+from annelid.body.actuators.muscle import Rings
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.style import panel_title, segment_colors
 

@@ -16,8 +16,10 @@ import numpy as np
 
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
-from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
-from annelid.config import ArenaKind, Chain, Strands, WormBody
+from annelid.body.formulations.chain import Chain
+from annelid.body.formulations.rods.net import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
+from annelid.body.worm import Strands, WormBody
+from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
 
 JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE

@@ -23,7 +23,9 @@ import numpy as np
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
-from annelid.config import ArenaKind, Rods, Strands, WormBody
+from annelid.body.formulations.rods import Rods
+from annelid.body.worm import Strands, WormBody
+from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
 
 AXES = np.eye(3)

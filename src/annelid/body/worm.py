@@ -162,7 +162,7 @@ class Springs(Section):
 
 
 class WormBody(BodyKind):
-    """The 3D worm."""
+    """Any 3D worm of helical strands, rings and springs on the ground; what the engine and the analysis are told."""
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (
         ("todorov2012", "the physics engine"),
@@ -170,7 +170,6 @@ class WormBody(BodyKind):
     )
     needs_arena: ClassVar[bool] = True
     has_skin: ClassVar[bool] = True
-    kind: Literal["worm"] = "worm"
     heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
         default=0.0,
         description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
@@ -263,3 +262,9 @@ class WormBody(BodyKind):
                 f"give one for each, or one for all, for example body.rings.{field}=13"
             )
         return self
+
+
+class HelicalWorm(WormBody):
+    """The 3D worm."""
+
+    kind: Literal["worm"] = "worm"

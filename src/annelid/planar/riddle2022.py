@@ -43,7 +43,7 @@ class PlanarBody(PlanarWorm):
 
     def published_period_s(self, config: RunConfig) -> float | None:
         """Returns the period that the authors' code gives for their time constants and gains, s."""
-        gate_ms = getattr(config.controller, "gate_time_constant_ms", None)
+        gate_ms = float(getattr(config.controller, "gate_time_constant_ms", 0.0))
         return _PUBLISHED_PERIODS_S.get((self.n_segments, gate_ms, self.gain))
 
     def build(self, config: RunConfig) -> Riddle2022Plant:

@@ -21,8 +21,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body.actuators.muscle import Rings
-from annelid.body.actuators.servo import ServoRings
+from annelid.body.actuators import ActuatorKind
 from annelid.morphology import Array
 
 Engine = Mapping[str, NDArray[Any]]
@@ -75,7 +74,7 @@ class Bookkeeper:
         "moment_rowadr",
     )
 
-    def __init__(self, model: mujoco.MjModel, rings: Rings | ServoRings) -> None:
+    def __init__(self, model: mujoco.MjModel, rings: ActuatorKind) -> None:
         """Notes the time step and what the actuators are."""
         self._n_muscles = model.nu
         self._timestep_s = float(model.opt.timestep)

@@ -139,7 +139,7 @@ def servo() -> Actuator:
     """The base worm's servo: its force limit, its speed limit and its range of lengths."""
     servos = base_servos()
     shortest = servos.length_ranges(1)[0][0]
-    return Actuator("servo", f"{servos.force_limits(1)[0]:.2f} N, {shortest:g} m", _QUICK_CABLE)
+    return Actuator("servo", f"{servos.forces(1)[0]:.2f} N, {shortest:g} m", _QUICK_CABLE)
 
 
 def muscle(activation: float) -> Actuator:
@@ -153,7 +153,7 @@ def muscle_activation(force_N: float, ring_length_m: float) -> float:
     """Activation at which the paper's muscle, standing still, pulls with a force at a length of its ring."""
     rings = papers_muscle()
     length = scaled_length(ring_length_m, rings.length_ranges(1)[0])
-    return float(force_N / (rings.peak_forces(1)[0] * closed_form_flv(length, 0.0, rings)))
+    return float(force_N / (rings.forces(1)[0] * closed_form_flv(length, 0.0, rings)))
 
 
 def rest_ring_m() -> float:

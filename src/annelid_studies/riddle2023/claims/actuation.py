@@ -76,7 +76,7 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
             "engine tells the force of the last of its four stages, which alternates from step to step: the largest is "
             "one of these, and depends on the time step. The muscle settles near its shortest length, where "
             "little is left of the "
-            f"{max(body.muscles.peak_forces(body.n_segments)):.0f} N that it could pull with: it limits length rather "
+            f"{max(body.muscles.forces(body.n_segments)):.0f} N that it could pull with: it limits length rather "
             "than force. The paper's number is nearer to that settled force.",
             MAIN.command,
             within,

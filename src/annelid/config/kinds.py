@@ -26,6 +26,7 @@ from annelid.errors import ConfigError, shown, suggest
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
+    from annelid.control.program import Contraction
     from annelid.control.steering import Steering
     from annelid.protocols import Controller, Plant
 
@@ -142,6 +143,11 @@ class ControllerKind(Kind):
     family: ClassVar[str] = "controller"
     default: ClassVar[str] = "sns"
     sensor_fields: ClassVar[frozenset[str]] = frozenset()
+
+    @property
+    def laid_down(self) -> tuple[Contraction, ...]:
+        """The contractions that are laid down beforehand, none for a controller that makes them itself."""
+        return ()
 
     @abstractmethod
     def build(self, config: RunConfig, plant: Plant) -> Controller:

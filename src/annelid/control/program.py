@@ -47,6 +47,11 @@ class Program(ControllerKind):
     contractions: tuple[Contraction, ...] = Field(description="segment, start_s, stop_s and activation of each")
     ramp_s: NonNegative = Field(default=0.0, description="time that a rise or fall between 0 and the full level takes")
 
+    @property
+    def laid_down(self) -> tuple[Contraction, ...]:
+        """As `contractions`."""
+        return self.contractions
+
     def check_with(self, config: RunConfig) -> None:
         """Checks that the body has the segments that contract."""
         n_segments = config.body.n_segments

@@ -6,6 +6,8 @@ import ast
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -98,6 +100,38 @@ def test_the_library_knows_nothing_of_the_studies(module: Path) -> None:
 def test_nervous_system_and_geometry_know_numpy_only(module: Path) -> None:
     packages = {name.split(".")[0] for name in imported(module)} - set(sys.stdlib_module_names) - {"annelid"}
     assert packages <= {"numpy"} | OPTIONAL.get(str(module.relative_to(SOURCE)), set())
+
+
+def modules_of(package: Path) -> dict[str, Path]:
+    """Every module of a package, by its full name."""
+    names = {path: path.relative_to(package.parent).with_suffix("").parts for path in package.rglob("*.py")}
+    return {".".join(parts[:-1] if parts[-1] == "__init__" else parts): path for path, parts in names.items()}
+
+
+def executed(node: ast.AST) -> Iterator[ast.AST]:
+    """All parts of a module that run some time, so not what stands there for type checkers only."""
+    for part in ast.iter_child_nodes(node):
+        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id == "TYPE_CHECKING":
+            continue
+        yield part
+        yield from executed(part)
+
+
+def test_no_circle_of_imports() -> None:
+    modules = modules_of(SOURCE) | modules_of(SOURCE.with_name("annelid_studies"))
+    needed: dict[str, set[str]] = {name: set() for name in modules}
+    for name, path in modules.items():
+        for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                needed[name] |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                below = {f"{node.module}.{alias.name}" for alias in node.names}
+                needed[name] |= {module if module in modules else str(node.module) for module in below}
+    order = TopologicalSorter({name: others & modules.keys() for name, others in needed.items()})
+    try:
+        order.prepare()
+    except CycleError as error:
+        pytest.fail(f"a circle of imports: {' <- '.join(error.args[1])}")
 
 
 def test_every_room_has_its_rule() -> None:

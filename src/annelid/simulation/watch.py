@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.body.estimates import COLLAPSED, HARDLY, rhombus_of, touching_ring_m
 from annelid.body.worm import WormBody
 from annelid.config import Guard
 from annelid.morphology import Array
-from annelid.plausibility import COLLAPSED, HARDLY, IDLE_SHARE, NUMERICAL_SHARE, rhombus_of, touching_ring_m
+from annelid.plausibility import IDLE_SHARE, NUMERICAL_SHARE
 from annelid.protocols import State
 
 ACTIVATED = 0.1

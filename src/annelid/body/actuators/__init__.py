@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import mujoco
 
     from annelid.body.actuators.muscle import Rings
+    from annelid.body.estimates import Finding
     from annelid.body.worm import WormBody
-    from annelid.plausibility import Finding
 
 
 class Slopes(Protocol):

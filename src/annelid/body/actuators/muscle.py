@@ -10,9 +10,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from annelid.body.actuators import ActuatorKind, Slopes, not_empty, one_a_segment
-from annelid.config.sections import Positive
-from annelid.morphology import Array
-from annelid.plausibility import (
+from annelid.body.estimates import (
     COLLAPSED,
     SHRUNK,
     UNSURE,
@@ -23,6 +21,8 @@ from annelid.plausibility import (
     strongest,
     weak,
 )
+from annelid.config.sections import Positive
+from annelid.morphology import Array
 
 if TYPE_CHECKING:
     import mujoco

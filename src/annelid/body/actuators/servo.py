@@ -9,9 +9,7 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from annelid.body.actuators import ActuatorKind, Slopes, not_empty, one_a_segment
-from annelid.config.sections import NonNegative, Positive, Range
-from annelid.morphology import Array
-from annelid.plausibility import (
+from annelid.body.estimates import (
     COLLAPSED,
     SHRUNK,
     UNSURE,
@@ -22,6 +20,8 @@ from annelid.plausibility import (
     strongest,
     weak,
 )
+from annelid.config.sections import NonNegative, Positive, Range
+from annelid.morphology import Array
 
 if TYPE_CHECKING:
     import mujoco

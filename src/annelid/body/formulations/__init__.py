@@ -12,10 +12,10 @@ from annelid.morphology import Array, MeshGeometry
 if TYPE_CHECKING:
     import mujoco
 
+    from annelid.body.estimates import Finding
     from annelid.body.worm import WormBody
     from annelid.config.arena import ArenaKind
     from annelid.config.run import RunConfig
-    from annelid.plausibility import Finding
 
 PinReader = Callable[[Mapping[str, Array]], Array]
 """Reads the largest gap at a pin, m, from the engine's arrays."""

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from annelid.body.estimates import Finding, rhombus_of, softened
 from annelid.body.formulations import FormulationKind, PinReader
 from annelid.config.sections import Impedance, NonNegative, Positive
 from annelid.morphology import Array, MeshGeometry, norm
-from annelid.plausibility import Finding, rhombus_of, softened
 
 if TYPE_CHECKING:
     import mujoco

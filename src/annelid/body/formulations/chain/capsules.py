@@ -9,18 +9,20 @@ tied by two `connect` constraints to its strands, or one constraint straight bet
 from __future__ import annotations
 
 from math import pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
 
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
-from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.rods.net import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
+
+if TYPE_CHECKING:
+    from annelid.body.formulations.chain import Chain
 
 JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from annelid.body.estimates import Finding
 from annelid.body.formulations import FormulationKind, PinReader
 from annelid.config.sections import NonNegative, Positive
 from annelid.morphology import Array, MeshGeometry, norm
-from annelid.plausibility import Finding
 
 if TYPE_CHECKING:
     import mujoco

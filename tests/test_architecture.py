@@ -17,7 +17,7 @@ import annelid
 from annelid.config.kinds import every_kind
 
 SOURCE = Path(annelid.__file__).parent
-BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles", "output"}
+BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
 MAY_IMPORT = {
     "errors": {"text"},
     "protocols": set(),
@@ -26,11 +26,12 @@ MAY_IMPORT = {
     "terminal": {"text"},
     "textfiles": {"errors", "text"},
     "output": {"errors", "text"},
+    "registry": {"errors"},
     "engine": {"errors"},
     "morphology": set(),
     "plausibility": {"config", "morphology", "body"} | BASE,
     "nervous": {"errors", "text", "textfiles"},
-    "config": {"errors", "text", "textfiles"},
+    "config": {"errors", "text", "textfiles", "registry"},
     "references": {"config"},
     "arena": {"config"} | BASE,
     "body": {"config", "morphology", "arena", "engine"} | BASE,

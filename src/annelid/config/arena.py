@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
 from annelid.config.kinds import Kind
 from annelid.config.sections import Impedance, NonNegative, Positive
+from annelid.registry import Registry
 
 if TYPE_CHECKING:
     import mujoco
@@ -42,7 +43,7 @@ class ArenaKind(Kind):
         is_closed: Whether its walls surround the worm; they are drawn so that one sees through them.
     """
 
-    family: ClassVar[str] = "arena"
+    registry: ClassVar[Registry[type[Any]]] = Registry("arena.kind", "annelid.arena.kinds")
     default: ClassVar[str] = "floor"
     is_closed: ClassVar[bool] = False
 

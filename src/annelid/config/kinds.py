@@ -1,49 +1,29 @@
 """Kinds of controllers, bodies, their parts and arenas: what each kind offers, and how a configuration names one.
 
 A kind is a subclass of one of the families below in a module of its own: its fields, its checks, what it builds, its
-citations, and what can be turned while it runs. Defining the class registers it. annelid's own kinds lie in `HOMES`;
-an installed package adds kinds by an entry point of the group `GROUP` that names the module that defines them.
+citations, and what can be turned while it runs. Defining the class registers it. an installed package
+adds kinds by an entry point of the group `annelid.registry.GROUP` that names the module that defines them.
 """
 
 from __future__ import annotations
 
-import warnings
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
-from importlib.metadata import entry_points
 from inspect import get_annotations
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 
 from pydantic import SerializeAsAny, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from annelid.config.sections import Section
-from annelid.errors import ConfigError, shown, suggest
+from annelid.registry import Registry
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
     from annelid.control.program import Contraction
     from annelid.control.steering import Steering
     from annelid.protocols import Controller, Plant
-
-HOMES = (
-    "annelid.arena.kinds",
-    "annelid.body.actuators",
-    "annelid.body.formulations",
-    "annelid.body.worm",
-    "annelid.control",
-    "annelid.planar",
-)
-"""Modules and packages of annelid that define kinds; none of them imports the engine."""
-
-GROUP = "annelid.kinds"
-"""Entry points of other packages: each names a module that defines kinds."""
-
-_KINDS: dict[str, dict[str, type[Kind]]] = {}
 
 
 @dataclass(frozen=True)
@@ -85,7 +65,7 @@ class Kind(Section):
     """Base of all families: sections of which a configuration chooses one by its field ``kind``.
 
     Attributes:
-        family: What it is a kind of.
+        registry: The kinds of its family.
         default: Kind of the family that is meant where none is named.
         cites: Publications that it rests on: keys of ``annelid/data/references.bib`` or of `bibtex`, and what for.
         bibtex: Entries of its own, BibTeX, separated by empty lines.
@@ -95,7 +75,7 @@ class Kind(Section):
         ConfigError: On definition, where its family has another kind of that name.
     """
 
-    family: ClassVar[str]
+    registry: ClassVar[Registry[type[Any]]]
     default: ClassVar[str]
     cites: ClassVar[tuple[tuple[str, str], ...]] = ()
     bibtex: ClassVar[str] = ""
@@ -105,17 +85,8 @@ class Kind(Section):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Registers a class that gives its own field ``kind`` a value."""
         name = cls.model_fields["kind"].default if "kind" in get_annotations(cls) else None
-        if not isinstance(name, str):
-            return
-        kinds = _KINDS.setdefault(cls.family, {})
-        other = kinds.setdefault(name, cls)
-        # A module that is loaded anew defines the same class once more.
-        if (other.__module__, other.__qualname__) != (cls.__module__, cls.__qualname__):
-            raise ConfigError(
-                f"{cls.__module__}.{cls.__qualname__}: {cls.family}.kind = {name!r} is taken by "
-                f"{other.__module__}.{other.__qualname__}"
-            )
-        kinds[name] = cls
+        if isinstance(name, str):
+            cls.registry.add(name, cls)
 
     def check_with(self, config: RunConfig) -> None:
         """Checks the section against the rest of a configuration.
@@ -140,7 +111,7 @@ class ControllerKind(Kind):
         sensor_fields: Fields of the section ``sensor`` that it uses.
     """
 
-    family: ClassVar[str] = "controller"
+    registry: ClassVar[Registry[type[Any]]] = Registry("controller.kind", "annelid.control")
     default: ClassVar[str] = "sns"
     sensor_fields: ClassVar[frozenset[str]] = frozenset()
 
@@ -177,7 +148,7 @@ class Goals(NamedTuple):
 class TurningKind(Kind):
     """Base of the sections that scale the two sides of a worm with half-rings."""
 
-    family: ClassVar[str] = "turning"
+    registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.steering")
     default: ClassVar[str] = "constant"
 
     def check_with(self, config: RunConfig) -> None:
@@ -214,7 +185,7 @@ class BodyKind(Kind):
         n_segments: Actuated segments.
     """
 
-    family: ClassVar[str] = "body"
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.kind", "annelid.body.worm", "annelid.planar")
     default: ClassVar[str] = "worm"
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
@@ -257,25 +228,10 @@ class BodyKind(Kind):
 Family = TypeVar("Family", bound=Kind)
 
 
-@cache
-def _load() -> None:
-    """Imports every module that defines kinds."""
-    for home in HOMES:
-        package = import_module(home)
-        for module in iter_modules(getattr(package, "__path__", ()), f"{home}."):
-            import_module(module.name)
-    for entry in entry_points(group=GROUP):
-        try:
-            entry.load()
-        except Exception as error:
-            package = entry.dist.name if entry.dist is not None else "an installed package"
-            warnings.warn(f"the kinds of {package} ({entry.value}) cannot be loaded: {error}", stacklevel=2)
-
-
 def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
     """Returns the kinds of a family by their names, those of other installed packages too; the default comes first."""
-    _load()
-    kinds = sorted(_KINDS.get(family.family, {}).items(), key=lambda known: (known[0] != family.default, known[0]))
+    kinds = sorted(family.registry.all().items(), key=lambda known: known[0] != family.default)
+    # A field may admit one kind alone.
     return {name: kind for name, kind in kinds if issubclass(kind, family)}
 
 
@@ -285,16 +241,14 @@ def kind_named(family: type[Family], name: str) -> type[Family]:
     Raises:
         ConfigError: The family has no kind of that name; the sentence suggests the nearest.
     """
-    kinds = kinds_of(family)
-    if name not in kinds:
-        raise ConfigError(f"unknown {family.family}.kind = {shown(name)}: {suggest(name, kinds)}")
-    return kinds[name]
+    return family.registry.find(name)
 
 
 def every_kind() -> list[type[Kind]]:
     """Returns the kinds of all families."""
-    _load()
-    return [kind for family in _KINDS.values() for kind in family.values()]
+    # The body's module defines the families of its parts.
+    BodyKind.registry.all()
+    return [kind for family in Kind.__subclasses__() for kind in family.registry.all().values()]
 
 
 def class_named(name: str) -> type[Kind] | None:

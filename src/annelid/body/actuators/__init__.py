@@ -12,6 +12,7 @@ from pydantic import Field, field_validator
 from annelid.config.kinds import Kind
 from annelid.config.sections import Range
 from annelid.morphology import Array
+from annelid.registry import Registry
 
 if TYPE_CHECKING:
     import mujoco
@@ -46,7 +47,7 @@ class ActuatorKind(Kind):
         force_field: The field of its greatest force.
     """
 
-    family: ClassVar[str] = "body.rings"
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.rings.kind", "annelid.body.actuators")
     default: ClassVar[str] = "muscle"
     force_field: ClassVar[str]
 

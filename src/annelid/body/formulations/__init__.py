@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from annelid.config.kinds import Kind
 from annelid.morphology import Array, MeshGeometry
+from annelid.registry import Registry
 
 if TYPE_CHECKING:
     import mujoco
@@ -29,7 +30,7 @@ class FormulationKind(Kind):
         damps_material: Whether its model has the rows of `annelid.simulation.damping`.
     """
 
-    family: ClassVar[str] = "body.formulation"
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.formulation.kind", "annelid.body.formulations")
     default: ClassVar[str] = "rods"
     is_papers: ClassVar[bool] = False
     damps_material: ClassVar[bool] = False

@@ -10,7 +10,7 @@ from importlib.metadata import entry_points
 from pkgutil import iter_modules
 from typing import Any, Generic, TypeVar
 
-from annelid.errors import ConfigError, shown, suggest
+from annelid.errors import AnnelidError, ConfigError, shown, suggest
 
 GROUP = "annelid.kinds"
 """Entry points of other packages: each names a module that registers something."""
@@ -40,14 +40,15 @@ def load_extensions() -> None:
 class Registry(Generic[Item]):
     """Things of one sort by their names."""
 
-    def __init__(self, what: str, *homes: str) -> None:
+    def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError) -> None:
         """Makes an empty one.
 
         Args:
             what: What the things are, for messages.
             homes: Modules and packages of annelid that register some; they are imported on first use.
+            error: What is raised for an unknown name.
         """
-        self._what, self._homes = what, homes
+        self._what, self._homes, self._error = what, homes, error
         self._known: dict[str, Item] = {}
 
     def add(self, name: str, item: Item) -> Item:
@@ -73,11 +74,11 @@ class Registry(Generic[Item]):
         """Returns the thing of a name.
 
         Raises:
-            ConfigError: There is none; the sentence suggests the nearest.
+            AnnelidError: There is none; the sentence suggests the nearest.
         """
         known = self.all()
         if name not in known:
-            raise ConfigError(f"unknown {self._what} {shown(name)}: {suggest(name, known)}")
+            raise self._error(f"unknown {self._what} {shown(name)}: {suggest(name, known)}")
         return known[name]
 
     def __iter__(self) -> Iterator[str]:

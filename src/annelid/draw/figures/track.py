@@ -11,6 +11,7 @@ from annelid.analysis.track import Track, track_of
 from annelid.config import RunConfig
 from annelid.config.kinds import Goals
 from annelid.draw.canvas import WIDTH_IN, canvas, save
+from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path
 from annelid.draw.style import panel_title
 
@@ -54,6 +55,9 @@ def track_figure(run: Run, path: str | Path) -> Path:
         panel_title(axes, f"{run.config.name}: track of {reached}, seen from above")
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
         return save(figure, path)
+
+
+RUN_FIGURES.add("track", track_figure)
 
 
 def draw_track(axes: Axes, track: Track, label: str = "middle of the body", color: str = LAST) -> None:

@@ -71,6 +71,21 @@ def test_a_package_adds_a_kind_by_its_entry_point(installed: Path, monkeypatch: 
     assert told.splitlines() == ["1.0 [1.0, 0.0, 1.0]", "True"]
 
 
+def test_the_code_of_another_package_s_kind_is_part_of_a_kept_run_s_key(installed: Path) -> None:
+    code = (
+        "from annelid.experiment.case import Case\n"
+        "from annelid.experiment.store import case_key\n"
+        "print(case_key(Case('riddle2022-planar', {'controller.kind': 'standing-wave'})))\n"
+    )
+    module = installed / "annelid_standing_wave.py"
+    text = module.read_text(encoding="utf-8")
+    keys = []
+    for changed in (text, text.replace("Contracts odd", "Draws in odd"), text.replace("0.5 * (1.0", "0.4 * (1.0")):
+        module.write_text(changed, encoding="utf-8")
+        keys.append(answer("-c", code, path=installed))
+    assert keys[0] == keys[1] != keys[2]
+
+
 def test_an_unknown_kind_is_refused_without_it() -> None:
     from annelid import load_config
     from annelid.errors import ConfigError

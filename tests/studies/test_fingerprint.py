@@ -105,8 +105,8 @@ def test_the_key_of_a_stored_run(copied: Path, monkeypatch: pytest.MonkeyPatch) 
     key = case_key(case)
     for place, old, new, counts in (
         ("simulation/progress.py", '"""How far a run', '""" How far a run', False),
-        ("config/worm.py", "default=117.57", "default=117.58", True),
-        ("body/rods.py", "0.5 * ", "0.25 * ", True),
+        ("body/actuators/muscle.py", "default=117.57", "default=117.58", True),
+        ("body/formulations/rods/net.py", "0.5 * ", "0.25 * ", True),
         ("errors.py", "class AnnelidError", "UNIT = 1.0\n\n\nclass AnnelidError", True),
     ):
         file = copied / place

@@ -251,6 +251,13 @@ def every_kind() -> list[type[Kind]]:
     return [kind for family in Kind.__subclasses__() for kind in family.registry.all().values()]
 
 
+def kinds_in(section: Section) -> set[type[Kind]]:
+    """Returns the kinds that a section and those within it are of."""
+    within = [value for name in type(section).model_fields if isinstance(value := getattr(section, name), Section)]
+    own = {type(section)} if isinstance(section, Kind) else set()
+    return own.union(*map(kinds_in, within))
+
+
 def class_named(name: str) -> type[Kind] | None:
     """Returns the class of a kind, or one that kinds are derived from, by its own name; None where there is none."""
     every = [known for kind in every_kind() for known in kind.__mro__]

@@ -61,8 +61,11 @@ _HOME = {
 _MODULE = {name: f"annelid.config.{module}" for module, names in _HOME.items() for name in names}
 _MODULE["toml_value"] = "annelid.textfiles"
 
-_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm")
-"""Parts of the worm's body, which the first edition had here."""
+_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
+    "Contraction": "annelid.control.program",
+    "DescendingDrive": "annelid.control.robust",
+}
+"""Sections that are no kinds, which the first edition had here."""
 _RENAMED = {"SnsController": "Sns", "Arena": "ArenaKind"}
 """Names of the first edition that differ from today's."""
 

@@ -1,8 +1,8 @@
 """Kinds of controllers, bodies, their parts and arenas: what each kind offers, and how a configuration names one.
 
 A kind is a subclass of one of the families below in a module of its own: its fields, its checks, what it builds, its
-citations, and what can be changed while it runs. Defining the class registers it. Another package adds kinds by an entry
-point of the group `annelid.registry.GROUP`, which names the module that defines them.
+citations, and what can be changed while it runs. Defining the class registers it. Another package adds kinds by an
+entry point of the group `annelid.registry.GROUP`, which names the module that defines them.
 """
 
 from __future__ import annotations

@@ -21,11 +21,11 @@ from annelid.analysis.gait import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
 from annelid.experiment.attempt import attempt
+from annelid.experiment.space import unit_samples
 from annelid.experiment.sweep import Sweep, sweeping, swept
-from annelid.experiment.sweep.dataset import dataset_of
-from annelid.experiment.sweep.design import Plan, flattened, plan_of, unit_samples
+from annelid.experiment.sweep.design import Plan, flattened, plan_of
 from annelid.experiment.sweep.numbers import NUMBERS
-from annelid.experiment.sweep.results import failures, results_table, told_numbers, write_results
+from annelid.experiment.sweep.results import dataset_of, failures, results_table, told_numbers, write_results
 from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
 
@@ -124,9 +124,10 @@ def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int
 
 
 @settings(deadline=None, max_examples=15)
-@given(n=st.integers(1, 50), seed=st.integers(0, 99))
-def test_a_latin_hypercube_has_one_sample_in_every_row_and_column(n: int, seed: int) -> None:
-    shares = unit_samples(study(RANGES, design="lhs", samples=n, seed=seed), 2)
+@given(n=st.integers(1, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
+def test_a_latin_hypercube_has_one_sample_in_every_stratum_of_every_variable(n: int, p: int, seed: int) -> None:
+    shares = unit_samples("lhs", n, p, seed)
+    assert shares.shape == (n, p)
     for column in shares.T:
         assert sorted(np.floor(column * n).astype(int).tolist()) == list(range(n))
 

@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `run`."""
 
 from __future__ import annotations
@@ -18,15 +17,17 @@ from annelid.cli.common import (
     Preset,
     Segments,
     config_of,
+    going_on,
     overrides_of,
+    print_results,
     print_table,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
-from annelid.cli.uncertainty import command_words, report_error_bars, run_with_error_bars
-from annelid.errors import SimulationStopped
+from annelid.errors import ConfigError, SimulationStopped
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
+    from annelid.experiment.uncertainty import Uncertainty
 
 
 def run_command(
@@ -119,22 +120,14 @@ def run_command(
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
     folder = _locked_folder(out, config.name)
+    result = None
     try:
         if uncertainty is None:
-            result = None
             done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
         else:
-            result = run_with_error_bars(
-                config,
-                uncertainty,
-                folder,
-                source=uncertainty_from,
-                vary=vary,
-                jobs=jobs,
-                overwrite=force,
-                quiet=quiet,
-                given=command_words(preset, assignments, segments, fidelity, arena, duration, seed),
-            )
+            errors = _errors(vary)
+            with going_on(folder, *(["--out", str(folder)] if out is None else [])):
+                result = _run_with_error_bars(config, uncertainty, folder, uncertainty_from, errors, jobs, force, quiet)
             done = open_run(folder)
     except SimulationStopped as stop:
         raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
@@ -145,12 +138,50 @@ def run_command(
         raise typer.Exit(EXIT_INTERRUPTED)
     typer.echo(done.path)
     if result is not None:
-        report_error_bars(result, quiet=quiet)
+        from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
+
+        print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
     for path in draw_all(done, folder, video=video, quiet=quiet, complain=complain):
         typer.echo(path)
     if result is not None:
         stopped = sum(bool(run.message) for run in result.runs)
         end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
+
+
+def _run_with_error_bars(
+    config: RunConfig,
+    n: int,
+    folder: Path,
+    source: Path | None,
+    errors: dict[str, float],
+    jobs: int | None,
+    overwrite: bool,
+    quiet: bool,
+) -> Uncertainty:
+    """Runs a worm and its variants behind one progress bar, as `annelid.experiment.uncertainty.uncertainty` does."""
+    from annelid.experiment.progress import in_stage, study_progress
+    from annelid.experiment.uncertainty import read_spread, uncertainty
+
+    spread = read_spread(source).but(errors)
+    with study_progress(quiet=quiet) as progress:
+        told = in_stage(progress, "error bars")
+        return uncertainty(config, n, folder, spread=spread, jobs=jobs, overwrite=overwrite, progress=told)
+
+
+def _errors(vary: list[str] | None) -> dict[str, float]:
+    """Reads relative errors, each ``PARAMETER=ERROR``.
+
+    Raises:
+        ConfigError: One is no number.
+    """
+    from annelid.config import parse_assignments
+
+    errors: dict[str, float] = {}
+    for name, value in parse_assignments(vary or []).items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ConfigError(f"--vary {name}={value}: the relative error must be a number, for example {name}=0.1")
+        errors[name] = float(value)
+    return errors
 
 
 def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:

@@ -10,8 +10,8 @@ import platform
 import shutil
 import tempfile
 import uuid
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -86,16 +86,13 @@ def attempt(task: Task) -> Files | None:
         with tempfile.TemporaryDirectory(prefix="annelid-") as away:
             compute_run(RunConfig.model_validate_json(task.config), Path(away), task.keep)
             return {SENT[task.keep]: (Path(away) / SENT[task.keep]).read_bytes()}
-    draft = new_draft(folder)
     try:
-        compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
-        publish(draft, folder, task.keep)
+        with _draft_of(folder, task.keep) as draft:
+            compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
     except OSError:
         # Where another attempt has won, this one's folder may have been cleared away under it.
         if stored_outcome(folder, task.keep) is None:
             raise
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return None
 
 
@@ -120,8 +117,7 @@ def fetch_results(files: Files, folder: Path, config: RunConfig, keep: Keep) -> 
     content = files[name]
     if not isinstance(content, bytes) or len(content) > MOST_BYTES[name]:
         raise ClusterError(f"a worker sent a {name} that is no file of at most {MOST_BYTES[name]:,} bytes")
-    draft = new_draft(folder)
-    try:
+    with _draft_of(folder, keep) as draft:
         draft.mkdir()
         (draft / name).write_bytes(content)
         try:
@@ -138,9 +134,6 @@ def fetch_results(files: Files, folder: Path, config: RunConfig, keep: Keep) -> 
             raise ClusterError(
                 f"a worker sent a damaged {name} of the run {folder.name}: {shortened(str(error), MOST_LISTED)}"
             ) from None
-        publish(draft, folder, keep)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def compute_run(config: RunConfig, folder: Path, keep: Keep = "runs") -> None:
@@ -185,6 +178,17 @@ def stored_outcome(folder: Path, keep: Keep = "runs") -> Outcome | None:
         with suppress(RunFileError):
             return keep_outcome(open_run(folder))
         return None
+
+
+@contextmanager
+def _draft_of(folder: Path, keep: Keep) -> Iterator[Path]:
+    """Gives an attempt's own folder, which is published if the block ends well and is gone in any case."""
+    draft = new_draft(folder)
+    try:
+        yield draft
+        publish(draft, folder, keep)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
 
 
 def publish(draft: Path, folder: Path, keep: Keep) -> None:

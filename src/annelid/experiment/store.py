@@ -14,7 +14,7 @@ import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, wait
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 
 from annelid.errors import ClusterError, RunFileError
@@ -28,7 +28,7 @@ from annelid.experiment.attempt import (
     run_of_draft,
     stored_outcome,
 )
-from annelid.experiment.case import Work
+from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import physics_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.workers import Processes, Result, Workers
@@ -56,21 +56,21 @@ class Store:
         self._workers = workers
         self._keep: Keep = keep
 
-    def path(self, case: Work) -> Path:
+    def path(self, case: Case) -> Path:
         """Folder of a case's run."""
         return self.folder / f"{case.stem}-{case_key(case)}"
 
-    def __contains__(self, case: Work) -> bool:
+    def __contains__(self, case: Case) -> bool:
         return self._stored(case) is not None
 
-    def __getitem__(self, case: Work) -> Outcome:
+    def __getitem__(self, case: Case) -> Outcome:
         """Outcome of a case that has been computed; KeyError if it has not."""
         found = self._stored(case)
         if found is None:
             raise KeyError(case.command)
         return found
 
-    def run(self, case: Work) -> Run:
+    def run(self, case: Case) -> Run:
         """Opens the run of a case that has been computed.
 
         Raises:
@@ -78,12 +78,12 @@ class Store:
         """
         return open_run(self.path(case))
 
-    def _stored(self, case: Work) -> Outcome | None:
+    def _stored(self, case: Case) -> Outcome | None:
         return stored_outcome(self.path(case), self._keep)
 
     def compute(
         self,
-        cases: Iterable[Work],
+        cases: Iterable[Case],
         *,
         jobs: int | None = None,
         progress: Progress | None = None,
@@ -121,7 +121,9 @@ class Store:
         if not missing:
             return found
         mark = self._mark()
-        with self._opened(min(jobs or os.cpu_count() or 1, len(missing))) as workers:
+        given = self._workers
+        cores = min(jobs or os.cpu_count() or 1, len(missing))
+        with Processes(cores) if given is None else nullcontext(given) as workers:
             for case, error in self._computed(workers, missing, mark):
                 left_s, done = left_s - case.cost_s, done + 1
                 if error is None:
@@ -135,12 +137,12 @@ class Store:
         return found
 
     def _computed(
-        self, workers: Workers, missing: Sequence[Work], mark: str
-    ) -> Iterator[tuple[Work, Exception | None]]:
+        self, workers: Workers, missing: Sequence[Case], mark: str
+    ) -> Iterator[tuple[Case, Exception | None]]:
         """Has runs computed, and hands each over as it is there or has failed."""
         # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
         # dies would be counted against the runs behind the one that killed it.
-        waiting, running, tries = deque(missing), dict[Result, Work](), Counter[str]()
+        waiting, running, tries = deque(missing), dict[Result, Case](), Counter[str]()
         while waiting or running:
             while waiting and len(running) < workers.slots():
                 case = waiting.popleft()
@@ -170,7 +172,7 @@ class Store:
                 else:
                     yield case, None
 
-    def _task(self, case: Work, mark: str) -> Task:
+    def _task(self, case: Case, mark: str) -> Task:
         config = case.config.model_dump_json()
         return Task(self.path(case).name, config, own_code(), str(self.folder.resolve()), mark, self._keep)
 
@@ -188,17 +190,8 @@ class Store:
             if stored_outcome(run_of_draft(draft), self._keep) is not None:
                 shutil.rmtree(draft, ignore_errors=True)
 
-    @contextmanager
-    def _opened(self, jobs: int) -> Iterator[Workers]:
-        """Gives the store's own workers, or as many processes as are asked for."""
-        if self._workers is not None:
-            yield self._workers
-        else:
-            with Processes(jobs) as processes:
-                yield processes
 
-
-def case_key(case: Work) -> str:
+def case_key(case: Case) -> str:
     """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
     text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -98,8 +98,7 @@ def sweep(
         RunFileError: A file cannot be written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    from annelid.experiment.sweep.dataset import dataset_of
-    from annelid.experiment.sweep.results import write_results
+    from annelid.experiment.sweep.results import dataset_of, write_results
 
     to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
     done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)

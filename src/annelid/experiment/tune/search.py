@@ -126,8 +126,7 @@ def search(
 def best(trials: Sequence[Trial], objective: Objective) -> Trial | None:
     """Returns the best of those that walk; None if none does."""
     walking = [trial for trial in trials if not trial.judged.problem]
-    sign = 1.0 if objective.better == "more" else -1.0
-    return max(walking, key=lambda trial: sign * trial.judged.value(objective), default=None)
+    return min(walking, key=lambda trial: trial.judged.score(objective), default=None)
 
 
 def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Trial]:
@@ -160,9 +159,7 @@ def compromise(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Tria
 
 def scores(trial: Trial, objectives: Sequence[Objective]) -> tuple[float, ...]:
     """Values of the objectives, signed so that less is better."""
-    return tuple(
-        (-1.0 if objective.better == "more" else 1.0) * trial.judged.value(objective) for objective in objectives
-    )
+    return tuple(trial.judged.score(objective) for objective in objectives)
 
 
 def _dominates(one: tuple[float, ...], other: tuple[float, ...]) -> bool:

@@ -82,9 +82,10 @@ def remarks(result: Uncertainty) -> list[str]:
         lines.append(f"not varied: {', '.join(names)} ({reason}{remedy})")
     steps = [1e3 * run.changes["clock.physics_timestep_s"] for run in result.of("time step")]
     counts = [run.changes["body.mesh.elements_per_side"] for run in result.of("elements")]
+    n_elements = field_value(result.config, "body.mesh.elements_per_side")
     lines.append(
         f"time step: {1e3 * result.config.clock.physics_timestep_s:g} ms against {_listed(steps)} ms; "
-        f"elements a side: {field_value(result.config, 'body.mesh.elements_per_side')} against {_listed(counts)}"
+        f"elements a side: {n_elements} against {_listed(counts)}"
     )
     for run in result.runs:
         name = f"{run.kind} {_change(run)}".rstrip()

@@ -154,5 +154,6 @@ def bench_command(
     with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
         path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
     report = json.loads(path.read_text(encoding="utf-8"))
-    print_results((path, bench_figure(report, output / "bench")), bench_table(report), quiet=quiet)
+    tables = [] if quiet else [bench_table(report)]
+    print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
     end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)

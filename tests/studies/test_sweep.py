@@ -23,9 +23,10 @@ from annelid.errors import ConfigError
 from annelid.experiment.attempt import attempt
 from annelid.experiment.space import unit_samples
 from annelid.experiment.sweep import Sweep, sweeping, swept
+from annelid.experiment.sweep.dataset import dataset_of
 from annelid.experiment.sweep.design import Plan, flattened, plan_of
 from annelid.experiment.sweep.numbers import NUMBERS
-from annelid.experiment.sweep.results import dataset_of, failures, results_table, told_numbers, write_results
+from annelid.experiment.sweep.results import failures, results_table, told_numbers, write_results
 from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
 

@@ -54,7 +54,8 @@ def sweep_command(
     from annelid.config import load_study
     from annelid.experiment.progress import study_progress
     from annelid.experiment.sweep import swept
-    from annelid.experiment.sweep.results import dataset_of, results_table, write_results
+    from annelid.experiment.sweep.dataset import dataset_of
+    from annelid.experiment.sweep.results import results_table, write_results
 
     loaded = load_study(study)
     if samples is not None:

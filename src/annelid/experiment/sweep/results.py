@@ -1,18 +1,17 @@
-"""What a sweep leaves behind: one labelled dataset, CSV, a figure, a table of the highest, lowest and failed runs."""
+"""What a sweep leaves behind: netCDF, CSV, a figure, a table of the highest, lowest and failed runs."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.config import field_paths, unit_of
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.experiment.sweep.design import REPEAT, SAMPLE, label
-from annelid.experiment.sweep.numbers import PREFERRED, Number
-from annelid.experiment.sweep.sweeping import Sweep, SweepRun
+from annelid.experiment.sweep.dataset import SEGMENT, Sweep, SweepRun
+from annelid.experiment.sweep.design import REPEAT, label
+from annelid.experiment.sweep.numbers import PREFERRED
 from annelid.output import whole_file, write_csv
 
 if TYPE_CHECKING:
@@ -20,58 +19,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 DATASET, ROWS, FIGURE = "sweep.nc", "sweep.csv", "sweep"
-SEGMENT = "segment"
-_TEXT = {
-    "status": "complete, stopped by a guard, or failed",
-    "reason": "why a run is not complete",
-    "run": "folder of the run",
-    "rhythm": "verdict on the rhythm",
-    "warnings": "what is doubtful about a run, a sentence a line",
-}
 N_TOLD = 4
 """Numbers in the table and panels in the figure."""
 N_ENDS, N_FAILED = 3, 8
 """Rows of the table: from either end, and of reasons."""
-
-
-def dataset_of(sweep: Sweep) -> xr.Dataset:
-    """Lays out the results of a sweep as one labelled dataset.
-
-    Returns:
-        Along every varied field of a grid, by dotted path, or along ``sample``; ``repeat`` has the seeds of repeats and
-        ``segment`` counts from 1. What cannot be told of a run is NaN. Every variable has ``units`` and ``long_name``.
-    """
-    import xarray as xr
-
-    import annelid
-
-    plan = sweep.plan
-    dims = tuple(plan.levels)
-    variables: dict[str, Any] = {
-        name: (dims, np.array(texts, dtype=object).reshape(plan.shape), {"units": "1", "long_name": _TEXT[name]})
-        for name, texts in _texts(sweep.runs).items()
-    }
-    per_segment = [number for number in sweep.numbers if number.per_segment]
-    outcomes = [run.outcome for run in sweep.runs if run.outcome is not None]
-    n_segments = max((len(number.read(of) or ()) for number in per_segment for of in outcomes), default=0)
-    for number in sweep.numbers:
-        more = ((SEGMENT, n_segments),) if number.per_segment else ()
-        values = _values(number, sweep.runs, n_segments if number.per_segment else 1)
-        shape = (*plan.shape, *(length for _, length in more))
-        told = {"units": number.unit, "long_name": number.text}
-        variables[number.name] = ((*dims, *(dim for dim, _ in more)), values.reshape(shape), told)
-    return xr.Dataset(
-        variables,
-        coords=_coordinates(sweep, n_segments),
-        attrs={
-            "title": plan.study.name,
-            "study": plan.study.model_dump_json(by_alias=True),
-            "base_config": plan.base.model_dump_json(),
-            "annelid_version": annelid.__version__,
-            "n_failed": sum(run.status == "failed" for run in sweep.runs),
-            "n_warned": sum(bool(run.warnings) for run in sweep.runs),
-        },
-    )
 
 
 def write_results(sweep: Sweep, data: xr.Dataset) -> list[Path]:
@@ -170,53 +121,6 @@ def failures(sweep: Sweep) -> list[tuple[str, list[int]]]:
         if run.status != "complete":
             by_reason.setdefault(f"{run.status}: {run.reason}", []).append(i)
     return sorted(by_reason.items(), key=lambda item: -len(item[1]))
-
-
-def _coordinates(sweep: Sweep, n_segments: int) -> dict[str, Any]:
-    plan = sweep.plan
-    words = field_paths()
-    coords: dict[str, Any] = {}
-    for place, field in enumerate(plan.fields):
-        told = {"units": unit_of(field) or "1", "long_name": words[field] or field}
-        if field in plan.levels:
-            coords[field] = (field, column(plan.levels[field]), told)
-        else:
-            coords[field] = (SAMPLE, column([sample[place] for sample in plan.samples]), told)
-    for name, text in ((SAMPLE, "number of the sample"), (REPEAT, "seed of the run")):
-        if name in plan.levels:
-            coords[name] = (name, np.array(plan.levels[name]), {"units": "1", "long_name": text})
-    if any(number.per_segment for number in sweep.numbers):
-        told = {"units": "1", "long_name": "segment, from the front"}
-        coords[SEGMENT] = (SEGMENT, np.arange(1, n_segments + 1), told)
-    return coords
-
-
-def column(values: Sequence[Any]) -> np.ndarray:
-    """Returns values of a field as numbers where all are, else as words."""
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values)
-    return np.array([label(value) for value in values], dtype=object)
-
-
-def _texts(runs: Sequence[SweepRun]) -> dict[str, list[str]]:
-    return {
-        "status": [run.status for run in runs],
-        "reason": [run.reason for run in runs],
-        "run": ["" if run.outcome is None else run.outcome.path.name for run in runs],
-        "rhythm": ["" if run.outcome is None else run.outcome.rhythm.verdict or "" for run in runs],
-        "warnings": ["\n".join(run.warnings) for run in runs],
-    }
-
-
-def _values(number: Number, runs: Sequence[SweepRun], length: int) -> np.ndarray:
-    """Reads a number of every run, ``(n_runs, length)``; NaN where it cannot be told."""
-    values = np.full((len(runs), length), np.nan)
-    for row, run in zip(values, runs, strict=True):
-        told = None if run.outcome is None else number.read(run.outcome)
-        if told is not None:
-            several = np.atleast_1d(np.array(told, dtype=float))
-            row[: len(several)] = several
-    return values
 
 
 def _title(sweep: Sweep, told: Sequence[str]) -> str:

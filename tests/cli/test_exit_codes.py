@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,11 +74,13 @@ def test_a_sweep_that_says_nothing_else_says_what_happened_to_its_runs(
 
 
 def test_a_sweep_tells_of_runs_that_a_guard_stopped(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    from annelid.experiment.sweep import SweepRun, swept
+    from annelid.experiment.store import Done
+    from annelid.experiment.sweep import swept
 
     def stopped(*words: object, **options: object) -> Sweep:
         done = swept(*words, **options)  # type: ignore[arg-type]
-        runs = tuple(SweepRun(run.point, "stopped", "too fast", run.outcome) for run in done.runs)
+        outcomes = [run.outcome for run in done.runs if run.outcome is not None]
+        runs = tuple(Done(replace(outcome, message="too fast")) for outcome in outcomes)
         return Sweep(done.plan, done.numbers, runs, done.folder)
 
     monkeypatch.setattr("annelid.experiment.sweep.swept", stopped)

@@ -252,9 +252,9 @@ def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
     good = data.sel({"body.gain": 1.31})
     assert set(good.status.values.ravel()) == {"complete"}
     assert len(set(good.run.values.ravel())) == good.run.size
-    for run in done.runs:
+    for point, run in zip(done.plan.points, done.runs, strict=True):
         if run.outcome is not None:
-            here = data.isel(dict(zip(done.plan.levels, run.point.place, strict=True)))
+            here = data.isel(dict(zip(done.plan.levels, point.place, strict=True)))
             assert here.ring_length_min_m == run.outcome.summary.ring_length_min_m
             told = here.elongation_mean_max_m.values
             assert told[~np.isnan(told)].tolist() == run.outcome.summary.elongation_mean_max_m

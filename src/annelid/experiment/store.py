@@ -15,9 +15,11 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, wait
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-from annelid.errors import ClusterError, RunFileError
+from annelid.errors import AnnelidError, ClusterError, ConfigError, RunFileError
 from annelid.experiment.attempt import (
     DRAFTS,
     MARK_NAME,
@@ -28,9 +30,10 @@ from annelid.experiment.attempt import (
     run_of_draft,
     stored_outcome,
 )
-from annelid.experiment.case import Case
+from annelid.experiment.case import Case, refusal
 from annelid.experiment.fingerprint import physics_fingerprint
 from annelid.experiment.outcome import Outcome
+from annelid.experiment.progress import StudyProgress
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.simulation.runfile import Run, open_run
 
@@ -39,6 +42,41 @@ Progress = Callable[[int, int, float], object]
 
 POLL_S = 0.5
 """How often workers are looked for that have come or gone, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What became of a case.
+
+    Attributes:
+        outcome: What is kept of its run; None where there is none.
+        error: Why there is none.
+        refused: Whether that was known before anything ran.
+    """
+
+    outcome: Outcome | None
+    error: Exception | None = None
+    refused: bool = False
+
+    @property
+    def status(self) -> Literal["complete", "stopped", "failed"]:
+        """How it went: "stopped" is ended by a guard before its time, "failed" could not be computed."""
+        if self.outcome is None:
+            return "failed"
+        return "stopped" if self.outcome.message else "complete"
+
+    @property
+    def reason(self) -> str:
+        """Why it is not complete, in a sentence; empty if it is."""
+        if self.outcome is not None:
+            return self.outcome.message
+        text = " ".join(str(self.error).split())
+        return text if isinstance(self.error, AnnelidError) and text else f"{type(self.error).__name__}: {text}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about its run, a sentence each."""
+        return () if self.outcome is None else self.outcome.summary.warnings
 
 
 class Store:
@@ -135,6 +173,42 @@ class Store:
                 report()
         self._clear_drafts()
         return found
+
+    def finish(
+        self, cases: Sequence[Case], stage: str, *, jobs: int | None = None, progress: StudyProgress | None = None
+    ) -> list[Done]:
+        """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
+
+        Args:
+            cases: The cases.
+            stage: What is told as they are run.
+            jobs: As of `compute`.
+            progress: Called as cases are checked and run.
+
+        Returns:
+            What became of every case, in their order.
+        """
+
+        def told(text: str, done: int, total: int, share: float) -> None:
+            if progress is not None:
+                progress(text, done, total, share)
+
+        failed: dict[str, Exception] = {}
+        refused: list[ConfigError | None] = []
+        for i, case in enumerate(cases):
+            told("checking the runs", i, len(cases), i / len(cases))
+            refused.append(refusal(case))
+        built = [case for case, error in zip(cases, refused, strict=True) if error is None]
+        outcomes = self.compute(
+            built,
+            jobs=jobs,
+            progress=lambda *state: told(f"{stage}, {len(failed)} failed" if failed else stage, *state),
+            failed=failed,
+        )
+        return [
+            Done(outcomes.get(case_key(case)), failed.get(case_key(case))) if error is None else Done(None, error, True)
+            for case, error in zip(cases, refused, strict=True)
+        ]
 
     def _computed(
         self, workers: Workers, missing: Sequence[Case], mark: str

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from annelid.config import field_paths, unit_of
-from annelid.experiment.outcome import Outcome
-from annelid.experiment.sweep.design import REPEAT, SAMPLE, Plan, Point, label
+from annelid.experiment.store import Done
+from annelid.experiment.sweep.design import REPEAT, SAMPLE, Plan, label
 from annelid.experiment.sweep.numbers import Number
 
 if TYPE_CHECKING:
@@ -28,41 +28,19 @@ _TEXT = {
 
 
 @dataclass(frozen=True)
-class SweepRun:
-    """One run of a sweep, done.
-
-    Attributes:
-        point: The run.
-        status: "stopped" where a guard ended it before its time, "failed" where it could not be computed.
-        reason: Why; empty for a complete run.
-        outcome: What is kept of it; None where it failed.
-    """
-
-    point: Point
-    status: Literal["complete", "stopped", "failed"]
-    reason: str
-    outcome: Outcome | None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is doubtful about it, a sentence each."""
-        return () if self.outcome is None else self.outcome.summary.warnings
-
-
-@dataclass(frozen=True)
 class Sweep:
     """All runs of a study.
 
     Attributes:
         plan: The design.
         numbers: What is told of every run.
-        runs: The runs, in the order of the plan's points.
+        runs: What became of the plan's points, in their order.
         folder: Folder of the results.
     """
 
     plan: Plan
     numbers: tuple[Number, ...]
-    runs: tuple[SweepRun, ...]
+    runs: tuple[Done, ...]
     folder: Path
 
 
@@ -132,7 +110,7 @@ def column(values: Sequence[Any]) -> np.ndarray:
     return np.array([label(value) for value in values], dtype=object)
 
 
-def _texts(runs: Sequence[SweepRun]) -> dict[str, list[str]]:
+def _texts(runs: Sequence[Done]) -> dict[str, list[str]]:
     return {
         "status": [run.status for run in runs],
         "reason": [run.reason for run in runs],
@@ -142,7 +120,7 @@ def _texts(runs: Sequence[SweepRun]) -> dict[str, list[str]]:
     }
 
 
-def _values(number: Number, runs: Sequence[SweepRun], length: int) -> np.ndarray:
+def _values(number: Number, runs: Sequence[Done], length: int) -> np.ndarray:
     """Reads a number of every run, ``(n_runs, length)``; NaN where it cannot be told."""
     values = np.full((len(runs), length), np.nan)
     for row, run in zip(values, runs, strict=True):

@@ -6,7 +6,7 @@ import os
 import re
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -100,6 +100,7 @@ def run_command(
     annelid run riddle2023-rods --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
     annelid run riddle2023-rods --uncertainty 8 --uncertainty-from calibration/calibration.json
     """
+    from annelid.config import load_config
     from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
@@ -114,7 +115,7 @@ def run_command(
     if resume is None:
         config = config_of(preset, overrides, segments, fidelity, arena, uncertainty)
     elif (preset, segments, fidelity, arena) == (None, None, None, None):
-        config = _config_to_continue(resume, overrides)
+        config = load_config(open_run(resume).config.model_dump(), overrides)
     else:
         raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments, --fidelity or --arena")
     for doubt in refuse_nonsense(config):
@@ -182,13 +183,6 @@ def _errors(vary: list[str] | None) -> dict[str, float]:
             raise ConfigError(f"--vary {name}={value}: the relative error must be a number, for example {name}=0.1")
         errors[name] = float(value)
     return errors
-
-
-def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
-    from annelid.config import load_config
-    from annelid.simulation.runfile import open_run
-
-    return load_config(open_run(path).config.model_dump(), overrides)
 
 
 def _locked_folder(out: Path | None, name: str) -> Path:

@@ -75,13 +75,12 @@ def tune_command(
     from annelid.experiment.tune.space import variables_of
     from annelid.plausibility import refuse_nonsense
 
-    source, changes = preset, overrides_of(assignments, duration_s=duration)
-    objectives = objectives_of(objective or ["speed"])
-    base = Case(source, changes).config
+    changes, objectives = overrides_of(assignments, duration_s=duration), objectives_of(objective or ["speed"])
+    base = Case(preset, changes).config
     for doubt in refuse_nonsense(base):
         complain(f"warning: {doubt}")
     variables = variables_of(vary or [], base)
-    task = Task(source, changes, variables, objectives, trials, seed)
+    task = Task(preset, changes, variables, objectives, trials, seed)
     found: list[Trial] = []
     written: list[Path] = []
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):

@@ -188,6 +188,17 @@ def test_failures_are_told_and_the_others_computed(tmp_path: Path) -> None:
     assert "overshoot" in str(failed[case_key(IMPOSSIBLE)])
 
 
+def test_what_became_of_every_case_is_told_in_their_order(tmp_path: Path) -> None:
+    told: list[str] = []
+    cases = [Case(PLANAR, {"body.gain": -1.0}), IMPOSSIBLE, planar()]
+    done = Store(tmp_path, Here([])).finish(cases, "runs", progress=lambda stage, *_: told.append(stage))
+    assert [(one.status, one.refused) for one in done] == [("failed", True), ("failed", False), ("complete", False)]
+    assert "body.gain = -1.0" in done[0].reason
+    assert "overshoot" in done[1].reason
+    assert done[2].reason == ""
+    assert told[-1] == "runs, 1 failed"
+
+
 def die_at_seed_5(task: Task) -> Files | None:
     """Attempts a run, but is killed by that of seed 5."""
     if json.loads(task.config)["seed"] == 5:

@@ -15,7 +15,7 @@ from outcome import Command
 
 from annelid.cli import entry
 from annelid.errors import ConfigError, RunKilled
-from annelid.experiment.attempt import Files, Task, attempt
+from annelid.experiment.attempt import Task, attempt
 from annelid.experiment.sweep import Sweep
 from annelid.experiment.workers import Result, Workers
 
@@ -37,7 +37,7 @@ def _computed_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs are computed in this process, and results get no figure."""
 
     def submit(_: Workers, task: Task) -> Result:
-        future = Future[Files | None]()
+        future = Future[bytes | None]()
         try:
             future.set_result(attempt(task))
         except ConfigError as error:

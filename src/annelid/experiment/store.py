@@ -228,9 +228,9 @@ class Store:
                 case = running.pop(future)
                 key = case_key(case)
                 try:
-                    files = future.result()
-                    if files is not None:
-                        fetch_results(files, self.path(case), case.config, self._keep)
+                    content = future.result()
+                    if content is not None:
+                        fetch_results(content, self.path(case), case.config, self._keep)
                 except CancelledError:
                     waiting.append(case)
                 except ClusterError:

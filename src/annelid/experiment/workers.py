@@ -15,11 +15,11 @@ from types import TracebackType
 from typing import Self
 
 from annelid.errors import ClusterError, RunKilled
-from annelid.experiment.attempt import Files, Task, attempt
+from annelid.experiment.attempt import Task, attempt
 from annelid.experiment.lifeline import end_with_parent
 from annelid.simulation.interruption import Interruption
 
-Result = Future[Files | None]
+Result = Future[bytes | None]
 
 STARTS = 5
 """Processes that are tried for one run before they count as unable to start."""

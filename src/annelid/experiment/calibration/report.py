@@ -12,7 +12,7 @@ import numpy as np
 from annelid.experiment.calibration.fit import PARAMETERS, Calibration
 from annelid.experiment.calibration.loop import MM, Loop
 from annelid.experiment.case import absolute, extend
-from annelid.output import whole_file, write_json
+from annelid.output import write_csv, write_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -81,10 +81,9 @@ def write_loop(loop: Loop, tension: Loop, path: Path) -> None:
     Raises:
         RunFileError: The file cannot be written.
     """
-    rows = np.stack([loop.displacement_m / MM, loop.force_N, tension.force_N], axis=-1)
-    with whole_file(path) as draft:
-        header = "displacement_mm,force_N,tension_N"
-        np.savetxt(draft, rows, fmt="%.6g", delimiter=",", header=header, comments="")
+    rows = zip(loop.displacement_m / MM, loop.force_N, tension.force_N, strict=True)
+    columns = ["displacement_mm", "force_N", "tension_N"]
+    write_csv(path, columns, ([f"{value:.6g}" for value in row] for row in rows))
 
 
 def write_calibration(fit: Calibration, source: str, changes: Mapping[str, Any], path: Path) -> tuple[Path, Path]:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from annelid.config.kinds import kinds_in
 from annelid.errors import AnnelidError, ClusterError, ConfigError, RunFileError
 from annelid.experiment.attempt import (
     DRAFTS,
@@ -31,7 +32,7 @@ from annelid.experiment.attempt import (
     stored_outcome,
 )
 from annelid.experiment.case import Case, refusal
-from annelid.experiment.fingerprint import physics_fingerprint
+from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.workers import Processes, Result, Workers
@@ -266,6 +267,7 @@ class Store:
 
 
 def case_key(case: Case) -> str:
-    """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
-    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
+    """Digest of all that a run depends on: its configuration, the code that computes it, and the engine."""
+    foreign = "".join(sorted(foreign_code(kind) for kind in kinds_in(case.config)))
+    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint() + foreign
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,8 +1,8 @@
 """Kinds of controllers, bodies, their parts and arenas: what each kind offers, and how a configuration names one.
 
 A kind is a subclass of one of the families below in a module of its own: its fields, its checks, what it builds, its
-citations, and what can be turned while it runs. Defining the class registers it. an installed package
-adds kinds by an entry point of the group `annelid.registry.GROUP` that names the module that defines them.
+citations, and what can be changed while it runs. Defining the class registers it. Another package adds kinds by an
+entry point of the group `annelid.registry.GROUP`, which names the module that defines them.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from inspect import get_annotations
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -246,7 +247,8 @@ def kind_named(family: type[Family], name: str) -> type[Family]:
 
 def every_kind() -> list[type[Kind]]:
     """Returns the kinds of all families."""
-    # The body's module defines the families of its parts.
+    # The families of arenas and of the body's parts are defined beside them.
+    import_module("annelid.config.run")
     BodyKind.registry.all()
     return [kind for family in Kind.__subclasses__() for kind in family.registry.all().values()]
 

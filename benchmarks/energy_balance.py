@@ -23,7 +23,7 @@ from rich.table import Table
 from annelid.config import RunConfig, load_config
 from annelid.morphology import Array
 from annelid.simulation import build_controller
-from annelid.simulation.books import Engine
+from annelid.simulation.energies import Engine
 from annelid.simulation.worm import WormPlant
 
 HELD = ("kinetic_energy", "elastic_energy", "potential_energy")

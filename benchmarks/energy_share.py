@@ -41,7 +41,7 @@ def main() -> None:
         for _ in range(30 * per_step):
             worm.step(pull)
         whole = seconds(lambda worm=worm, pull=pull, n=per_step: [worm.step(pull) for _ in range(n)], 30)
-        keeper = worm.anatomy.bookkeeper
+        keeper = worm.anatomy.energy_meter
         engine = {name: getattr(worm.data, name) for name in keeper.outputs}
         parts = (
             seconds(lambda keeper=keeper, engine=engine, pull=pull: keeper.step(engine, pull), 200),

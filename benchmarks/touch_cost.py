@@ -20,7 +20,7 @@ MOVEMENTS = 100
 
 
 def main() -> None:
-    felt, spent = Skin.felt, list[float]()
+    felt, spent = Skin.touch, list[float]()
 
     def timed(*arguments: Any) -> Any:
         began = process_time()

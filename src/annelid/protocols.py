@@ -90,7 +90,7 @@ class Controller(Protocol):
 
 
 @runtime_checkable
-class SlowPlant(Protocol):
+class MultiRatePlant(Protocol):
     """The capability of a plant that may be slower than the control clock of telling when it moves next."""
 
     def steps_to_move(self) -> int:

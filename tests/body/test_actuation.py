@@ -108,7 +108,7 @@ def test_against_a_stiff_ring_a_servo_stalls_at_its_force_limit(timestep_s: floa
     plant = worm(**changes, **{f"clock.{name}_timestep_s": timestep_s for name in ("control", "physics")})
     rate = STIFFNESS_N_PER_M * SPEED_M_PER_S
     errors = []
-    felt = plant.feel()
+    felt = plant.observe()
     for step in range(1, round(0.6 / timestep_s) + 1):
         felt = plant.step(np.ones(plant.n_muscles))
         assert np.ptp(felt.ring_length_m) < 1e-3

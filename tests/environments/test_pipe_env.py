@@ -75,7 +75,7 @@ def test_passing_is_success_and_ends_the_episode() -> None:
     while not told or not (told[-1].terminated or told[-1].truncated):
         action = (np.arange(3) == (k // 3) % 3).astype(float)
         for activation in episode.activations(action):
-            episode.felt(worm.step(activation))
+            episode.observe(worm.step(activation))
         told.append(episode.outcome(action, random))
         k += 1
     assert told[-1].terminated

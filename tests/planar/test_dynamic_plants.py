@@ -1,4 +1,4 @@
-"""The planar worms with masses and forces: energy, momentum, friction, equilibrium, coupling, and their face."""
+"""The planar worms with masses and forces: energy, momentum, friction, equilibrium, simulation, and their face."""
 
 from __future__ import annotations
 

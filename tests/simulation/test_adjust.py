@@ -14,22 +14,22 @@ from annelid.errors import ConfigError
 from annelid.protocols import Stateful
 from annelid.simulation.adjust import adjusted
 from annelid.simulation.assemble import build_controller, build_plant
-from annelid.simulation.coupling import Coupling, start
+from annelid.simulation.stepping import Simulation, start
 from annelid.simulation.worm import WormPlant
 
 BEFORE_S, AFTER_STEPS = 0.5, 5
 
 
-def running(config: RunConfig) -> Coupling:
+def running(config: RunConfig) -> Simulation:
     """A worm that has gone for half a second."""
     plant = build_plant(config)
-    coupling = start(config, plant, build_controller(config, plant), None)
-    while coupling.step * config.clock.control_timestep_s < BEFORE_S:
-        coupling.advance()
-    return coupling
+    simulation = start(config, plant, build_controller(config, plant), None)
+    while simulation.step * config.clock.control_timestep_s < BEFORE_S:
+        simulation.advance()
+    return simulation
 
 
-def built_with(config: RunConfig, state_of: Coupling) -> Coupling:
+def built_with(config: RunConfig, state_of: Simulation) -> Simulation:
     """A worm built with a configuration and brought into the state of another."""
     checkpoint = state_of.checkpoint()
     assert checkpoint is not None
@@ -39,14 +39,14 @@ def built_with(config: RunConfig, state_of: Coupling) -> Coupling:
     assert isinstance(controller, Stateful)
     plant.set_state(checkpoint.plant)
     controller.set_state(checkpoint.controller)
-    return Coupling(config, plant, controller, state_of.sensation, np.random.default_rng(0), state_of.step)
+    return Simulation(config, plant, controller, state_of.sensation, np.random.default_rng(0), state_of.step)
 
 
-def posture_after(coupling: Coupling) -> np.ndarray:
+def posture_after(simulation: Simulation) -> np.ndarray:
     for _ in range(AFTER_STEPS):
-        coupling.advance()
-    assert isinstance(coupling.plant, WormPlant)
-    return coupling.plant.qpos().copy()
+        simulation.advance()
+    assert isinstance(simulation.plant, WormPlant)
+    return simulation.plant.qpos().copy()
 
 
 @settings(max_examples=3, deadline=None)
@@ -54,10 +54,10 @@ def posture_after(coupling: Coupling) -> np.ndarray:
 def test_friction_changed_live_is_friction_built_in(friction: float) -> None:
     before = load_config("riddle2023-rods")
     after = load_config("riddle2023-rods", {"arena.friction": friction})
-    coupling = running(before)
-    twin = built_with(after, coupling)
-    live = adjusted(coupling, before, after)
-    assert live.plant is coupling.plant
+    simulation = running(before)
+    twin = built_with(after, simulation)
+    live = adjusted(simulation, before, after)
+    assert live.plant is simulation.plant
     np.testing.assert_array_equal(posture_after(live), posture_after(twin))
 
 
@@ -68,9 +68,9 @@ def test_friction_changed_live_is_friction_built_in(friction: float) -> None:
 def test_friction_changes_on_every_ground(arena: str, overrides: dict[str, Any]) -> None:
     before = load_config("riddle2023-rods", arena=arena)
     after = load_config("riddle2023-rods", overrides, arena=arena)
-    coupling = running(before)
-    twin, unchanged = built_with(after, coupling), built_with(before, coupling)
-    moved = posture_after(adjusted(coupling, before, after))
+    simulation = running(before)
+    twin, unchanged = built_with(after, simulation), built_with(before, simulation)
+    moved = posture_after(adjusted(simulation, before, after))
     np.testing.assert_array_equal(moved, posture_after(twin))
     assert np.abs(moved - posture_after(unchanged)).max() > 0
 
@@ -88,9 +88,9 @@ def test_friction_changes_on_every_ground(arena: str, overrides: dict[str, Any])
 def test_other_values_changed_live_are_values_built_in(change: dict[str, Any]) -> None:
     before = load_config("riddle2023-rods")
     after = load_config("riddle2023-rods", change)
-    coupling = running(before)
-    time_before, twin = coupling.step, built_with(after, coupling)
-    live = adjusted(coupling, before, after)
+    simulation = running(before)
+    time_before, twin = simulation.step, built_with(after, simulation)
+    live = adjusted(simulation, before, after)
     assert live.step == time_before
     np.testing.assert_array_equal(posture_after(live), posture_after(twin))
 
@@ -99,18 +99,18 @@ def test_noise_changed_live_reaches_the_controller() -> None:
     before = load_config("riddle2023-rods")
     after = load_config("riddle2023-rods", {"sensor.noise_m": 0.005})
     live = adjusted(running(before), before, after)
-    noise = live.felt().stretch_m - live.sensation.stretch_m
+    noise = live.observed().stretch_m - live.sensation.stretch_m
     assert 0.001 < noise.std() < 0.02
 
 
 def test_another_body_is_refused_and_nothing_changes() -> None:
     before = load_config("riddle2023-rods")
-    coupling = running(before)
-    plant = coupling.plant
+    simulation = running(before)
+    plant = simulation.plant
     assert isinstance(plant, WormPlant)
     state = plant.get_state()
     with pytest.raises(ConfigError, match="other states"):
-        adjusted(coupling, before, load_config("riddle2023-rods", {"body.mesh.n_segments": 4}))
+        adjusted(simulation, before, load_config("riddle2023-rods", {"body.mesh.n_segments": 4}))
     np.testing.assert_array_equal(plant.get_state()["engine"], state["engine"])
 
 

@@ -60,7 +60,7 @@ def test_a_worm_at_rest_is_carried_by_its_arena(arena: str) -> None:
     made = config(arena, **QUICK)
     plant = settled(reset(made), 1.2)
     assert plant.alarm() is None
-    total = plant.feel().contact_force_N.sum(axis=0)
+    total = plant.observe().contact_force_N.sum(axis=0)
     weight = -plant.total_mass_kg * plant.model.opt.gravity
     assert total == pytest.approx(weight, abs=0.05 * float(np.linalg.norm(weight)))
 
@@ -80,8 +80,8 @@ def test_planes_that_move_act_on_a_level_floor_as_the_engine_s_own_plane_does() 
     assert still.ground is None
     assert moving.ground is not None
     weight = still.total_mass_kg * 9.81
-    assert moving.feel().center_of_mass_m == pytest.approx(still.feel().center_of_mass_m, abs=5e-4)
-    assert moving.feel().contact_force_N == pytest.approx(still.feel().contact_force_N, abs=0.02 * weight)
+    assert moving.observe().center_of_mass_m == pytest.approx(still.observe().center_of_mass_m, abs=5e-4)
+    assert moving.observe().contact_force_N == pytest.approx(still.observe().contact_force_N, abs=0.02 * weight)
 
 
 def test_the_chain_touches_a_pipe_with_its_vertices() -> None:
@@ -117,7 +117,7 @@ def sliding(slope_deg: float) -> tuple[Array, WormPlant]:
     places = []
     for _ in range(9):
         settled(plant, 0.1)
-        places.append(-plant.feel().center_of_mass_m[0])
+        places.append(-plant.observe().center_of_mass_m[0])
     return np.diff(places) / 0.1, plant
 
 
@@ -138,7 +138,7 @@ def breathing(arena: str, **changes: object) -> float:
     for _ in range(4):
         for activation in (0.6, 0.0):
             settled(plant, 0.4, np.full(plant.n_muscles, activation))
-        places.append(-plant.feel().center_of_mass_m[0])
+        places.append(-plant.observe().center_of_mass_m[0])
     return places[-1] - places[0]
 
 
@@ -248,7 +248,7 @@ def leak_m(arena: str, duration_s: float) -> tuple[float, float]:
     plant = reset(made)
     controller = build_controller(made, plant)
     controller.reset(0)
-    surface, sensation, leak = surface_of(made.arena), plant.feel(), -1.0  # type: ignore[arg-type]
+    surface, sensation, leak = surface_of(made.arena), plant.observe(), -1.0  # type: ignore[arg-type]
     every = plant.steps_to_move()
     for step in range(round(duration_s / made.clock.control_timestep_s)):
         sensation = plant.step(controller.step(sensation))

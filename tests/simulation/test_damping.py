@@ -128,7 +128,7 @@ def test_what_the_material_takes_is_damping_not_constraints() -> None:
     """Weightless and away from the ground, only the edges' constraints are left to take something."""
     afloat = {"arena.gravity_m_per_s2": 0.0, "arena.floor_gap_m": 1.0, "clock.physics_timestep_s": 0.001}
     plant = pulled({**afloat, "body.formulation.solver_tolerance": 1e-10}, 0.1)
-    assert float(plant.books.damping_loss) > 50 * abs(float(plant.books.constraint_loss))
+    assert float(plant.energies.damping_loss) > 50 * abs(float(plant.energies.constraint_loss))
 
 
 def test_the_dof_that_is_held_stays_where_it_is() -> None:

@@ -83,7 +83,7 @@ def test_a_turned_worm_moves_and_feels_as_one_that_is_not(heading: float, near: 
     The engine's rods do not quite: how hard it holds the length of an edge depends on where that points.
     """
     (straight, touched), (leading, touched_so) = worm(0.0, **changes), worm(heading, **changes)
-    first, other, turn = straight.feel(), leading.feel(), heading_turn(heading)
+    first, other, turn = straight.observe(), leading.observe(), heading_turn(heading)
     assert np.ptp(first.ring_length_m) > 0.05, "it must have moved"
     assert touched[:, SIDES.index("right")].any(), "it must have felt the post"
     assert touched_so == pytest.approx(touched, abs=20.0 * near)

@@ -159,13 +159,13 @@ def test_on_any_plane_only_the_way_along_it_costs(seed: int) -> None:
     ground = pressure[:, None] * (normal - pull * along)
     axis = np.tile(along, (n_segments, 1))
 
-    pressed = skin.felt(Touch.none(n_segments), ground, rest, rest + 0.02 * normal, axis, 0.1)
+    pressed = skin.touch(Touch.none(n_segments), ground, rest, rest + 0.02 * normal, axis, 0.1)
     load = np.array([pressure[segment == i].sum() for i in range(n_segments)])
     assert pressed.normal.sum(axis=1) == pytest.approx(load)
     assert pressed.slip_loss == pytest.approx(np.zeros(n_segments), abs=1e-12)
     assert pressed.slip_distance == pytest.approx(np.zeros(n_segments), abs=1e-12)
 
-    slid = skin.felt(pressed, ground, rest, rest + 0.02 * normal + way * along, axis, 0.1)
+    slid = skin.touch(pressed, ground, rest, rest + 0.02 * normal + way * along, axis, 0.1)
     assert slid.slip_loss == pytest.approx(pull * load * way)
     assert slid.slip_distance == pytest.approx(np.where(load > 0, way, 0.0))
     assert slid.slip_speed == pytest.approx(np.where(load > 0, way / 0.1, 0.0))

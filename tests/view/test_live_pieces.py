@@ -207,7 +207,7 @@ def test_a_poke_pushes_and_ends() -> None:
     worm.poke(place, np.array([0.0, 4.0, 0.0]))
     for each in (worm, left_alone):
         each.advance(0.1, math.inf)
-    shift = worm.coupling.sensation.center_of_mass_m - left_alone.coupling.sensation.center_of_mass_m
+    shift = worm.simulation.sensation.center_of_mass_m - left_alone.simulation.sensation.center_of_mass_m
     assert shift[1] > 0.002
     worm.advance(0.5, math.inf)
     assert not worm.plant.data.xfrc_applied.any()

@@ -74,7 +74,7 @@ class AdaptiveController(PeristalsisController[AdaptiveSns]):
         self._every_step_differs = config.drive_slope_per_s != 0.0
         return adaptive_peristalsis_network(n_segments, self._parameters, 1e3 * config.drive_time_constant_s)
 
-    def _feel(self, sensation: Sensation, time_s: float) -> None:
+    def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
         manual = self._config.drive + self._config.drive_slope_per_s * self._n_steps * self._timestep_s
         longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         drive = manual + self._config.stretch_gain_per_m * float(longer_m.mean())

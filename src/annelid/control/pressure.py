@@ -101,7 +101,7 @@ class PressureController(PeristalsisController[PressureSns]):
         design = PressureParameters(self._parameters, *strengths, 1e3 * config.pressure_time_constant_s)
         return pressure_network(n_segments, design)
 
-    def _feel(self, sensation: Sensation, time_s: float) -> None:
+    def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
         config, further = self._config, self._inputs_nA[self._n_segments + 1 :]
         load_N = sensation.touch_N.sum(axis=1)
         longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)

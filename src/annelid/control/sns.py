@@ -148,7 +148,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
     def _network(self, n_segments: int, control_timestep_s: float) -> Network:
         """Returns the paper's network, with any further neurons and inputs behind its own."""
 
-    def _feel(self, sensation: Sensation, time_s: float) -> None:
+    def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
         """Writes the currents of the further inputs behind those of the sensors and the kick."""
 
     def reset(self, seed: int) -> None:
@@ -164,7 +164,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
             on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, time_s)
             np.multiply(on, self._sns.sensor_current_nA, out=inputs[:n_segments])
             inputs[n_segments] = self._sns.kick_nA if self._n_steps == 0 else 0.0
-            self._feel(sensation, time_s)
+            self._set_inputs(sensation, time_s)
             self._stepper.advance(self._state, inputs, n)
             self._n_steps += n
         return self._activation(self._state.potential[0])

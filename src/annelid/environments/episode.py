@@ -108,7 +108,7 @@ class Episode:
         share = np.arange(1, self.task.moves_per_step + 1)[:, np.newaxis] / self.task.moves_per_step
         return (1.0 - share) * self._activation + share * np.clip(wanted, 0.0, 1.0)
 
-    def felt(self, sensation: Sensation) -> None:
+    def observe(self, sensation: Sensation) -> None:
         """Takes note of a physics step, and of whether the numbers have run away."""
         whole = (sensation.stretch_m, sensation.ring_length_m, sensation.center_of_mass_m, sensation.contact_force_N)
         finite = all(np.isfinite(part).all() for part in whole)
@@ -169,7 +169,11 @@ class Episode:
     def _spent(self) -> tuple[float, float, float]:
         """Mean way slid so far, m, work lost to friction so far, and work of the muscles so far, J."""
         touch = self.worm.touch
-        return float(touch.slip_distance.mean()), float(touch.slip_loss.sum()), float(self.worm.books.muscle_work.sum())
+        return (
+            float(touch.slip_distance.mean()),
+            float(touch.slip_loss.sum()),
+            float(self.worm.energies.muscle_work.sum()),
+        )
 
     def _observed(self, random: np.random.Generator, before_m: Array, moved_m: Array) -> Observation:
         felt, noise_m = self._sensation, self.task.config.sensor.noise_m

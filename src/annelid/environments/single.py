@@ -137,7 +137,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         episode = self._episode
         for activation in episode.activations(action):
             try:
-                episode.felt(self.worm.step(activation))
+                episode.observe(self.worm.step(activation))
             except SimulationStopped as stop:
                 episode.stop(str(stop))
             if episode.stopped:

@@ -269,4 +269,4 @@ class _Team:
                 self.episodes[row].stop(reason)
             going = [row for row in rows if row not in reasons]
             for row, moved in zip(going, self._bodies.moved(going) if going else (), strict=True):
-                self.episodes[row].felt(self._bodies.worms[row].strode(1, moved))
+                self.episodes[row].observe(self._bodies.worms[row].strode(1, moved))

@@ -16,7 +16,7 @@ from annelid.morphology import Array
 from annelid.protocols import Records
 from annelid.simulation.adjust import adjusted
 from annelid.simulation.assemble import build_controller
-from annelid.simulation.coupling import Coupling, start
+from annelid.simulation.stepping import Simulation, start
 from annelid.simulation.worm import WormPlant
 
 ENDLESS_S = 1e7
@@ -34,7 +34,7 @@ class LivingWorm:
 
     Attributes:
         config: What it runs under now.
-        coupling: Plant and controller.
+        simulation: Plant and controller.
         reel: What is remembered, up to the present.
     """
 
@@ -51,19 +51,19 @@ class LivingWorm:
     @property
     def plant(self) -> WormPlant:
         """The body."""
-        plant = self.coupling.plant
+        plant = self.simulation.plant
         assert isinstance(plant, WormPlant)
         return plant
 
     @property
     def time_s(self) -> float:
         """Simulated time, s."""
-        return self.coupling.step * self.config.clock.control_timestep_s
+        return self.simulation.step * self.config.clock.control_timestep_s
 
     def restart(self) -> None:
         """Begins anew at time zero under the present configuration, and forgets what was."""
         plant = WormPlant(self.config)
-        self.coupling: Coupling = start(_endless(self.config), plant, build_controller(self.config, plant), None)
+        self.simulation: Simulation = start(_endless(self.config), plant, build_controller(self.config, plant), None)
         self._poke_ends_s = -1.0
         self._next_sample_s = 0.0
         self.reel = Reel(signal_names(self._neurons(), plant.n_muscles))
@@ -86,7 +86,7 @@ class LivingWorm:
         self._take(load_config(self.config.model_dump(), values))
 
     def _take(self, config: RunConfig) -> None:
-        self.coupling = adjusted(self.coupling, _endless(self.config), _endless(config))
+        self.simulation = adjusted(self.simulation, _endless(self.config), _endless(config))
         self.config = config
 
     def advance(self, until_s: float, deadline: float) -> None:
@@ -95,15 +95,15 @@ class LivingWorm:
         Raises:
             SimulationStopped: A guard stopped it; what is remembered stays.
         """
-        begun = self.coupling.step
-        while self.time_s < until_s - 1e-9 and (self.coupling.step == begun or perf_counter() < deadline):
+        begun = self.simulation.step
+        while self.time_s < until_s - 1e-9 and (self.simulation.step == begun or perf_counter() < deadline):
             if self._poke_ends_s >= 0 and self.time_s >= self._poke_ends_s:
                 self._poke_ends_s = -1.0
                 self.plant.push(np.zeros((self.plant.geometry.n_crossings, 3)))
-            self.coupling.advance()
+            self.simulation.advance()
             if self.time_s >= self._next_sample_s:
                 self._remember_signals()
-        if self.coupling.step > begun:
+        if self.simulation.step > begun:
             self.remember()
 
     def poke(self, place_m: Array, force_N: Array) -> None:
@@ -124,21 +124,21 @@ class LivingWorm:
             Moment(
                 self.time_s,
                 self.plant.qpos().astype(np.float32),
-                self.coupling.activation.astype(np.float32),
-                self.coupling.sensation.contact_force_N.astype(np.float32),
+                self.simulation.activation.astype(np.float32),
+                self.simulation.sensation.contact_force_N.astype(np.float32),
             )
         )
         self.reel.forget()
 
     def _neurons(self) -> list[str]:
-        controller = self.coupling.controller
+        controller = self.simulation.controller
         coords = controller.recordable().coords if isinstance(controller, Records) else {}
         return [str(name) for name in coords.get("neuron", ())]
 
     def _remember_signals(self) -> None:
-        controller = self.coupling.controller
+        controller = self.simulation.controller
         potential = controller.read(False).get("potential", ()) if isinstance(controller, Records) else ()
-        self.reel.add_sample(self.time_s, np.concatenate([np.asarray(potential), self.coupling.activation]))
+        self.reel.add_sample(self.time_s, np.concatenate([np.asarray(potential), self.simulation.activation]))
         self._next_sample_s = self.time_s + SAMPLE_S
 
 

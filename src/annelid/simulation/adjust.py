@@ -9,14 +9,14 @@ from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import State, Stateful
 from annelid.simulation.assemble import build_controller, build_plant
-from annelid.simulation.coupling import Coupling
+from annelid.simulation.stepping import Simulation
 from annelid.simulation.worm import WormPlant
 
 Part = TypeVar("Part")
 
 
-def adjusted(running: Coupling, before: RunConfig, after: RunConfig) -> Coupling:
-    """Returns a coupling under another configuration, in the state of a running one that is not to be used any more.
+def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simulation:
+    """Returns a simulation under another configuration, in the state of a running one that is not to be used any more.
 
     Friction is changed in the compiled model, which takes microseconds. For anything else in the body, its ground or
     the clock the body is built anew and takes over the old one's state; so does the controller. Either way the worm
@@ -39,9 +39,9 @@ def adjusted(running: Coupling, before: RunConfig, after: RunConfig) -> Coupling
             plant = _taking_over(build_plant(after), plant, "body")
     if any(getattr(before, part) != getattr(after, part) for part in ("controller", "turning", "sensor", "clock")):
         controller = _taking_over(build_controller(after, plant), controller, "controller")
-    coupling = Coupling(after, plant, controller, running.sensation, running.noise, running.step)
-    coupling.activation = running.activation
-    return coupling
+    simulation = Simulation(after, plant, controller, running.sensation, running.noise, running.step)
+    simulation.activation = running.activation
+    return simulation
 
 
 def _differ_in_friction_only(before: RunConfig, after: RunConfig) -> bool:

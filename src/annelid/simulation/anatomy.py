@@ -20,8 +20,8 @@ from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
 from annelid.body.worm import WormBody
 from annelid.morphology import Array, MeshGeometry, norm
-from annelid.simulation.books import Bookkeeper
 from annelid.simulation.elasticity import Elasticity
+from annelid.simulation.energies import EnergyMeter
 from annelid.simulation.skin import Skin
 
 _NET_FORCE = 3
@@ -133,7 +133,7 @@ class Anatomy:
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
         elasticity: The energy that strands, joints and springs hold.
-        bookkeeper: What a physics step does, in work.
+        energy_meter: What a physics step does, in work.
         outputs: Names of the engine's arrays that `forces` and `ground` need.
         skin: The geoms that can touch the ground.
     """
@@ -162,7 +162,7 @@ class Anatomy:
         self.pins_can_part = self._pin_gap is not None
         edges = ("flexedge_length",) if self.has_edges else ()
         self.elasticity = Elasticity(model, body)
-        self.bookkeeper = Bookkeeper(model, body.rings)
+        self.energy_meter = EnergyMeter(model, body.rings)
         self.outputs: tuple[str, ...] = ("sensordata", *edges, *pin_outputs)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
@@ -233,7 +233,7 @@ class Anatomy:
         return by_geom.reshape(*by_geom.shape[:-1], -1, 3)
 
     def forces(self, engine: Mapping[str, Array]) -> Forces:
-        """Reads what acted during the last physics step, but for the muscles' pull, which the books tell.
+        """Reads what acted during the last physics step, but for the muscles' pull, which the energy totals tell.
 
         Args:
             engine: The engine's arrays named in `outputs`.

@@ -14,7 +14,6 @@ from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
 from annelid.protocols import Controller, Plant, Records, Sensation
 from annelid.simulation.assemble import as_controller, build_plant
-from annelid.simulation.coupling import Coupling, start
 from annelid.simulation.interruption import Interruption
 from annelid.simulation.lock import locks
 from annelid.simulation.progress import ProgressCallback, reporting
@@ -30,6 +29,7 @@ from annelid.simulation.recorder import (
 )
 from annelid.simulation.resume import Origin, continued_config, origin_of
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
+from annelid.simulation.stepping import Simulation, start
 
 PROGRESS_INTERVAL_S = 0.2
 
@@ -101,34 +101,34 @@ class RecordedRun:
     """A worm with its controller and its run file, which says how the run ended, however it ends.
 
     Attributes:
-        coupling: Plant and controller.
+        simulation: Plant and controller.
         status: How it ended, one of `annelid.simulation.runfile.STATUSES`.
         message: Why it ended before its time; empty if it did not.
         error: What ended it; None if nothing did.
     """
 
-    def __init__(self, config: RunConfig, coupling: Coupling, path: Path, origin: Origin | None = None) -> None:
+    def __init__(self, config: RunConfig, simulation: Simulation, path: Path, origin: Origin | None = None) -> None:
         """Lays out the run file of a simulation that is about to begin.
 
         Args:
             config: The configuration, which the file carries whole.
-            coupling: Plant and controller at their start.
+            simulation: Plant and controller at their start.
             path: The run file.
             origin: The run that it continues, or None.
 
         Raises:
             RunFileError: The file cannot be made.
         """
-        self.coupling = coupling
+        self.simulation = simulation
         self.status = "running_or_killed"
         self.message = ""
         self.error: BaseException | None = None
-        plant, controller = coupling.plant, coupling.controller
-        of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(coupling.sensation)
+        plant, controller = simulation.plant, simulation.controller
+        of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(simulation.sensation)
         parts = [of_plant, recordable_of(controller), loop_signals(plant.n_muscles)]
-        first = coupling.checkpoint()
+        first = simulation.checkpoint()
         packed = None if first is None else first.to_bytes()
-        plan = layout(coupling.schedule, parts, coupling.sensation.rest_stretch_m, packed)
+        plan = layout(simulation.schedule, parts, simulation.sensation.rest_stretch_m, packed)
         # The configured controller overrides this with its own attribute; without it the file would name that one.
         attrs: dict[str, Any] = {"controller": getattr(controller, "name", type(controller).__name__)}
         attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
@@ -140,11 +140,11 @@ class RecordedRun:
 
     def record(self, wall_time_s: float) -> None:
         """Records a sample and a frame, where one is due."""
-        coupling, schedule = self.coupling, self.coupling.schedule
-        if coupling.step % schedule.sample_every == 0:
-            own: Values = {"activation": coupling.activation, "wall_time": wall_time_s}
+        simulation, schedule = self.simulation, self.simulation.schedule
+        if simulation.step % schedule.sample_every == 0:
+            own: Values = {"activation": simulation.activation, "wall_time": wall_time_s}
             self._recorder.sample(self._read_plant(False), self._read_controller(False), own)
-        if coupling.step % schedule.frame_every == 0:
+        if simulation.step % schedule.frame_every == 0:
             self._recorder.frame(self._read_plant(True), self._read_controller(True))
 
     def flush(self) -> None:
@@ -153,10 +153,10 @@ class RecordedRun:
 
     def checkpoint(self) -> None:
         """Writes the state, so that the run can be continued from here, and what is doubtful so far."""
-        state = self.coupling.checkpoint()
+        state = self.simulation.checkpoint()
         if state is not None:
             self._recorder.checkpoint(state.to_bytes())
-        self._recorder.warn(self.coupling.doubts())
+        self._recorder.warn(self.simulation.doubts())
 
     def finish(self, interrupted_by: str | None) -> None:
         """Writes all that is left and closes the file: the run is complete, or a signal of that name ended it."""
@@ -164,7 +164,7 @@ class RecordedRun:
         if interrupted_by is None:
             self._end("complete")
         else:
-            self._end("interrupted", self.coupling.at(f"{interrupted_by} ended the run"))
+            self._end("interrupted", self.simulation.at(f"{interrupted_by} ended the run"))
 
     def end_with(self, error: BaseException) -> None:
         """Ends the run because of an error; a file that is closed stays as it is."""
@@ -173,22 +173,22 @@ class RecordedRun:
             return
         with suppress(RunFileError):
             if isinstance(error, SimulationStopped):
-                self._recorder.warn(self.coupling.doubts())
+                self._recorder.warn(self.simulation.doubts())
                 self._end("stopped_by_guard", str(error))
             elif isinstance(error, RunFileError):
                 self._end("disk_failure", str(error), whole=False)
             elif isinstance(error, KeyboardInterrupt):
                 # A second one asks to leave now; it may also have come in the middle of a write.
-                self._end("interrupted", self.coupling.at("interrupted"), whole=False)
+                self._end("interrupted", self.simulation.at("interrupted"), whole=False)
             else:
-                self._end("failed", self.coupling.at(f"{type(error).__name__}: {error}"))
+                self._end("failed", self.simulation.at(f"{type(error).__name__}: {error}"))
 
     def _end(self, status: str, message: str = "", whole: bool = True) -> None:
         self.status, self.message = status, message
         (self._recorder.finish if whole else self._recorder.close)(status, message)
 
     def _read_sensation(self, frame: bool) -> Values:
-        return {} if frame else sensation_values(self.coupling.sensation)
+        return {} if frame else sensation_values(self.simulation.sensation)
 
 
 def _nothing(frame: bool) -> Values:
@@ -210,7 +210,7 @@ class Loop:
         """Takes runs that are at the same step, of the same schedule."""
         self.runs = runs
         self.going = dict(enumerate(runs))
-        self._schedule = runs[0].coupling.schedule
+        self._schedule = runs[0].simulation.schedule
 
     @property
     def simulated_s(self) -> float:
@@ -257,7 +257,7 @@ class Loop:
 
     def advance(self, step: int) -> None:
         """Takes control steps up to the next event, from ``step`` on."""
-        self.each(lambda run: run.coupling.advance())
+        self.each(lambda run: run.simulation.advance())
 
     def settle(self) -> None:
         """Brings all controllers up to the step that was reached, where something of them is read."""
@@ -283,4 +283,4 @@ class Loop:
         self.going.pop(number).end_with(error)
 
     def _step(self) -> int:
-        return next((run.coupling.step for run in self.going.values()), self._schedule.end)
+        return next((run.simulation.step for run in self.going.values()), self._schedule.end)

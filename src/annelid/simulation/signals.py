@@ -43,7 +43,7 @@ def worm_signals(anatomy: Anatomy) -> tuple[Signal, ...]:
 
 
 def _energies(n_muscles: int) -> tuple[Signal, ...]:
-    """Energies that the worm holds, and the books of what its muscles have done and where it went."""
+    """Energies that the worm holds, and the totals of what its muscles have done and where it went."""
     return (
         Signal("kinetic_energy", (), (), "J", "kinetic energy"),
         Signal("elastic_energy", (), (), "J", "energy of strands and springs"),

@@ -82,13 +82,13 @@ class Skin:
         self._member = np.eye(n_segments)[segment]
         self._quarter = len(SIDES) * segment + self.side
 
-    def felt(
+    def touch(
         self, so_far: Touch, ground_N: Array, before_m: Array, after_m: Array, axis: Array, time_s: float
     ) -> Touch:
-        """Adds a movement of the body to what was felt so far.
+        """Adds a movement of the body to what was sensed so far.
 
         Args:
-            so_far: What was felt before the movement.
+            so_far: What was sensed before the movement.
             ground_N: Force of the ground on each geom during the movement's last physics step, N, ``(n_geoms, 3)``.
             before_m: Centres of the geoms before the movement, m, ``(n_geoms, 3)``.
             after_m: The same after it.

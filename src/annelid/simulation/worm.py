@@ -23,8 +23,8 @@ from annelid.morphology import Array, MeshGeometry, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
-from annelid.simulation.books import Books, Engine
 from annelid.simulation.damping import MaterialDamping, add_damper_rows
+from annelid.simulation.energies import EnergyTotals, Engine
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.placing import at_rest, turned
 from annelid.simulation.signals import worm_signals
@@ -96,7 +96,7 @@ class Worm(ABC):
     """
 
     def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
-        """Makes a worm that has felt nothing yet.
+        """Makes a worm that has sensed nothing yet.
 
         Args:
             config: The run's configuration.
@@ -119,7 +119,7 @@ class Worm(ABC):
         self._control_step = 0
         self._posture: Posture
         self._forces: Forces = anatomy.no_forces()
-        self._books: Books = anatomy.bookkeeper.opened()
+        self._energies: EnergyTotals = anatomy.energy_meter.opened()
         self._tension_N = np.zeros(anatomy.n_muscles)
         self._touch = Touch.none(anatomy.n_segments)
         self._activation: Array = np.zeros(anatomy.n_muscles)
@@ -163,9 +163,9 @@ class Worm(ABC):
         return self._touch
 
     @property
-    def books(self) -> Books:
+    def energies(self) -> EnergyTotals:
         """What the muscles have done so far, and where it went."""
-        return self._books
+        return self._energies
 
     @property
     def total_mass_kg(self) -> float:
@@ -225,33 +225,33 @@ class Worm(ABC):
         return actuator_state.copy() if self.model.na else activation
 
     def book(self, engine: Engine, drive: Array) -> None:
-        """Enters one physics step in the books, and notes what the actuators pulled with.
+        """Adds one physics step to the energy totals, and notes what the actuators pulled with.
 
         Args:
-            engine: The engine's arrays named in the bookkeeper's `outputs`, after the step.
+            engine: The engine's arrays named in the energy_meter's `outputs`, after the step.
             drive: What `drive` returned before it.
         """
-        self._tension_N, entries = self.anatomy.bookkeeper.step(engine, drive)
+        self._tension_N, entries = self.anatomy.energy_meter.step(engine, drive)
         if self.damping is not None:
             # The engine counts the rows among its constraints.
             loss = self._config.clock.physics_timestep_s * self.damping.loss_W(engine["qvel"])
             entries = replace(
                 entries, damping_loss=entries.damping_loss + loss, constraint_loss=entries.constraint_loss - loss
             )
-        self._books += entries
+        self._energies += entries
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
         self.reset_engine()
         self._control_step = 0
         self._forces = self.anatomy.no_forces()
-        self._books = self.anatomy.bookkeeper.opened()
+        self._energies = self.anatomy.energy_meter.opened()
         self._tension_N = np.zeros(self.n_muscles)
         self._touch = Touch.none(self.n_segments)
         self._posture = self.locate()
         self._watch = self._new_watch()
         self._elastic_at_start_J, self._potential_at_start_J = self.elastic_energy_J(), self.potential_energy_J()
-        return self.feel()
+        return self.observe()
 
     def step(self, activation: Array) -> Sensation:
         """Advances by one control step.
@@ -312,7 +312,7 @@ class Worm(ABC):
         self._control_step += n_steps
         if moved is not None:
             before, (self._posture, self._forces, ground) = self._posture, moved
-            self._touch = self.anatomy.skin.felt(
+            self._touch = self.anatomy.skin.touch(
                 self._touch,
                 ground,
                 before.skin,
@@ -320,9 +320,9 @@ class Worm(ABC):
                 self._posture.axis,
                 due * self._config.clock.physics_timestep_s,
             )
-        return self.feel()
+        return self.observe()
 
-    def feel(self) -> Sensation:
+    def observe(self) -> Sensation:
         """Tells the present lengths and forces, in arrays that nobody writes to again."""
         posture, forces = self._posture, self._forces
         return Sensation(
@@ -394,15 +394,15 @@ class Worm(ABC):
     def doubts(self) -> tuple[str, ...]:
         """Tells what is doubtful about the configuration, and about what has happened since time zero."""
         time_s = self._control_step * self._config.clock.control_timestep_s
-        return *map(str, check(self._config)), *self._watch.warnings(time_s, self._energies())
+        return *map(str, check(self._config)), *self._watch.warnings(time_s, self._energies_by_cause())
 
-    def _energies(self) -> Energies:
-        """Tells what has driven the worm and what the integrator took of it; nothing where the books do not close."""
+    def _energies_by_cause(self) -> Energies:
+        """Tells what has driven the worm and what the integrator took of it; nothing where they do not add up."""
         # The engine tells the forces of the last of RK4's four stages only.
         if self.model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
             return Energies(0.0, 0.0)
-        work = float(self._books.muscle_work.sum())
-        lost = float(self._books.damping_loss + self._books.constraint_loss)
+        work = float(self._energies.muscle_work.sum())
+        lost = float(self._energies.damping_loss + self._energies.constraint_loss)
         # A worm that slides down is driven by its weight as well.
         sunk = self._potential_at_start_J - self.potential_energy_J()
         held = self.elastic_energy_J() - self._elastic_at_start_J + self.kinetic_energy_J()
@@ -437,7 +437,7 @@ class Worm(ABC):
             "kinetic_energy": self.kinetic_energy_J(),
             "elastic_energy": self.elastic_energy_J(),
             "potential_energy": self.potential_energy_J(),
-            **asdict(self._books),
+            **asdict(self._energies),
         }
         if self.anatomy.has_edges:
             values["edge_strain"] = forces.edge_strain
@@ -446,7 +446,7 @@ class Worm(ABC):
         return values
 
     def get_state(self) -> State:
-        """Returns the engine's whole state and what was felt last."""
+        """Returns the engine's whole state and what was sensed last."""
         forces = self._forces
         return {
             "engine": self.engine_state(),
@@ -454,7 +454,7 @@ class Worm(ABC):
             "muscle_force": self._tension_N.copy(),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
-            **asdict(self._books),
+            **asdict(self._energies),
             **self._touch.state(),
             **self._watch.get_state(),
         }
@@ -466,7 +466,7 @@ class Worm(ABC):
         strain, gap = np.asarray(state["extremes"], dtype=float)
         self._tension_N = np.array(state["muscle_force"], dtype=float)
         self._forces = Forces(np.array(state["contact_force"], dtype=float), strain, gap)
-        self._books = Books(*(np.array(state[field.name], dtype=float) for field in fields(Books)))
+        self._energies = EnergyTotals(*(np.array(state[field.name], dtype=float) for field in fields(EnergyTotals)))
         self._touch = Touch.of_state(state)
         self._watch.set_state(state)
         self._posture = self.locate()
@@ -488,7 +488,7 @@ class WormPlant(Worm):
         self.data = mujoco.MjData(self.model)
         data = self.data
         self._outputs: dict[str, Array] = {name: getattr(data, name) for name in self.anatomy.outputs}
-        self._work: dict[str, NDArray[Any]] = {name: getattr(data, name) for name in self.anatomy.bookkeeper.outputs}
+        self._work: dict[str, NDArray[Any]] = {name: getattr(data, name) for name in self.anatomy.energy_meter.outputs}
 
     def reset_engine(self, state: Array | None = None) -> None:
         """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
@@ -523,7 +523,7 @@ class WormPlant(Worm):
         return Movement(self.locate(), forces, ground)
 
     def push(self, force_N: Array) -> None:
-        """Lets outside forces act on the crossings from the next step on; the books know nothing of their work.
+        """Lets outside forces act on the crossings from the next step on; the energy totals know nothing of their work.
 
         Args:
             force_N: In the model's axes, N, ``(n_crossings, 3)``; zeros end it.

@@ -15,7 +15,7 @@ from annelid.errors import SimulationStopped
 if TYPE_CHECKING:
     import mujoco
 
-    from annelid.simulation.coupling import Coupling
+    from annelid.simulation.stepping import Simulation
     from annelid.simulation.worm import WormPlant
 
 ENGINE_PHASES = ("position", "velocity", "actuation", "constraint", "advance")
@@ -108,7 +108,7 @@ class EngineTimes:
 
 
 def engine_times(
-    simulation: Coupling, plant: WormPlant, stepping: Stopwatch, simulated_s: float, longest_s: float
+    simulation: Simulation, plant: WormPlant, stepping: Stopwatch, simulated_s: float, longest_s: float
 ) -> EngineTimes:
     """Runs a closed loop with the engine's timers on, which by default stand still.
 

@@ -60,7 +60,7 @@ class BodyBatch:
         self._mass_matrix = bind("M")
         self._mocap = (bind("mocap_pos"), bind("mocap_quat")) if models[0].nmocap else None
         self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
-        self._work: dict[str, NDArray[Any]] = {name: bind(name) for name in self._anatomy.bookkeeper.outputs}
+        self._work: dict[str, NDArray[Any]] = {name: bind(name) for name in self._anatomy.energy_meter.outputs}
         self._scratch = mujoco.MjData(models[0])
         self.worms = [
             BatchWorm(config, anatomy, self, row)
@@ -100,7 +100,7 @@ class BodyBatch:
         return reasons
 
     def _step(self, drives: Mapping[int, Array]) -> dict[int, str]:
-        """Takes one physics step with the bodies that are driven, and has their worms enter it in their books."""
+        """Takes one physics step with the bodies that are driven, and has their worms add it to their energy totals."""
         if not drives:
             return {}
         reasons: dict[int, str] = {}

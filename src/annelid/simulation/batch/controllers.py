@@ -11,7 +11,7 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.control import CopySettings
 from annelid.protocols import Array, Sensation, State, StridingController
-from annelid.simulation.coupling import Coupling
+from annelid.simulation.stepping import Simulation
 
 Outcome = tuple[dict[int, Array], dict[int, Exception]]
 """Activation of every worm, and the errors of those that failed, by number of the worm."""
@@ -47,20 +47,20 @@ class CopiedController(Protocol):
 class ControllerBatch:
     """Controllers of many worms between two events of the run."""
 
-    def __init__(self, configs: Sequence[RunConfig], couplings: Sequence[Coupling]) -> None:
+    def __init__(self, configs: Sequence[RunConfig], simulations: Sequence[Simulation]) -> None:
         """Groups controllers that can step together.
 
         Args:
             configs: The worms' configurations.
-            couplings: The worms, each with its controller in its initial state.
+            simulations: The worms, each with its controller in its initial state.
         """
         alike: dict[Hashable, list[int]] = {}
         for row, config in enumerate(configs):
-            alike.setdefault(_group(couplings[row], config, row), []).append(row)
+            alike.setdefault(_group(simulations[row], config, row), []).append(row)
         self._groups = [
-            _Networks(rows, [couplings[row] for row in rows], noisy=configs[rows[0]].sensor.noise_m > 0)
-            if isinstance(couplings[rows[0]].controller, CopiedController)
-            else _Single(rows[0], couplings[rows[0]], noisy=configs[rows[0]].sensor.noise_m > 0)
+            _Networks(rows, [simulations[row] for row in rows], noisy=configs[rows[0]].sensor.noise_m > 0)
+            if isinstance(simulations[rows[0]].controller, CopiedController)
+            else _Single(rows[0], simulations[rows[0]], noisy=configs[rows[0]].sensor.noise_m > 0)
             for rows in alike.values()
         ]
 
@@ -90,32 +90,34 @@ class ControllerBatch:
         self._groups = [group for group in self._groups if group.rows]
 
 
-def _group(coupling: Coupling, config: RunConfig, row: int) -> Hashable:
+def _group(simulation: Simulation, config: RunConfig, row: int) -> Hashable:
     """Tells which controllers may step together: copies that are alike, noisy or not."""
-    controller = coupling.controller
+    controller = simulation.controller
     if not isinstance(controller, CopiedController):
         return row
     return type(controller), controller.alike, config.sensor.noise_m > 0
 
 
-def _advance_with_time(couplings: Sequence[Coupling], later: int) -> list[Sensation]:
+def _advance_with_time(simulations: Sequence[Simulation], later: int) -> list[Sensation]:
     """What worms are told at the beginning of a control step, ``later`` steps after their bodies' last event."""
     if later:
-        for coupling in couplings:
-            coupling.step += 1
+        for simulation in simulations:
+            simulation.step += 1
     return [
-        replace(coupling.felt(), time_s=coupling.step * coupling.schedule.timestep_s) if later else coupling.felt()
-        for coupling in couplings
+        replace(simulation.observed(), time_s=simulation.step * simulation.schedule.timestep_s)
+        if later
+        else simulation.observed()
+        for simulation in simulations
     ]
 
 
 class _Networks:
     """Synthetic nervous systems, as copies of one that differ in their sensors and currents only."""
 
-    def __init__(self, rows: Sequence[int], couplings: Sequence[Coupling], noisy: bool) -> None:
+    def __init__(self, rows: Sequence[int], simulations: Sequence[Simulation], noisy: bool) -> None:
         self.rows = list(rows)
-        self._couplings = list(couplings)
-        self._controllers = [c.controller for c in couplings if isinstance(c.controller, CopiedController)]
+        self._simulations = list(simulations)
+        self._controllers = [c.controller for c in simulations if isinstance(c.controller, CopiedController)]
         self._first = self._controllers[0]
         states = [controller.get_state() for controller in self._controllers]
         self._states: State = {name: np.stack([state[name] for state in states]) for name in states[0]}
@@ -126,14 +128,14 @@ class _Networks:
     def advance(self, n_steps: int) -> Outcome:
         """Takes control steps with the bodies at rest."""
         if not self._noisy:
-            return self._take([coupling.sensation for coupling in self._couplings], n_steps), {}
+            return self._take([simulation.sensation for simulation in self._simulations], n_steps), {}
         activation: dict[int, Array] = {}
         errors: dict[int, Exception] = {}
         for later in range(n_steps):
-            activation = self._take(_advance_with_time(self._couplings, later), 1)
-            for row, coupling in zip(self.rows, self._couplings, strict=True):
+            activation = self._take(_advance_with_time(self._simulations, later), 1)
+            for row, simulation in zip(self.rows, self._simulations, strict=True):
                 try:
-                    coupling.check_activation(activation[row])
+                    simulation.check_activation(activation[row])
                 except Exception as error:
                     errors.setdefault(row, error)
         return activation, errors
@@ -157,7 +159,7 @@ class _Networks:
             return
         place = self.rows.index(row)
         self._controllers[place].set_state(self._state_of(place))
-        for members in (self.rows, self._couplings, self._controllers):
+        for members in (self.rows, self._simulations, self._controllers):
             del members[place]
         self._each = CopySettings.of(controller.own for controller in self._controllers)
         self._states = {
@@ -168,23 +170,23 @@ class _Networks:
 class _Single:
     """One controller of any kind."""
 
-    def __init__(self, row: int, coupling: Coupling, noisy: bool) -> None:
+    def __init__(self, row: int, simulation: Simulation, noisy: bool) -> None:
         self.rows = [row]
-        self._coupling = coupling
-        controller = coupling.controller
+        self._simulation = simulation
+        controller = simulation.controller
         self._strider = controller if isinstance(controller, StridingController) and not noisy else None
 
     def advance(self, n_steps: int) -> Outcome:
         """Takes control steps with the body at rest."""
-        coupling, activation = self._coupling, np.empty(0)
+        simulation, activation = self._simulation, np.empty(0)
         try:
             if self._strider is not None:
-                activation = np.asarray(self._strider.stride(coupling.sensation, n_steps), dtype=np.float64)
+                activation = np.asarray(self._strider.stride(simulation.sensation, n_steps), dtype=np.float64)
                 n_steps = 0
             for later in range(n_steps):
-                (felt,) = _advance_with_time([coupling], later)
-                activation = np.asarray(coupling.controller.step(felt), dtype=np.float64)
-                coupling.check_activation(activation)
+                (felt,) = _advance_with_time([simulation], later)
+                activation = np.asarray(simulation.controller.step(felt), dtype=np.float64)
+                simulation.check_activation(activation)
         except Exception as error:
             return {}, dict.fromkeys(self.rows, error)
         return dict.fromkeys(self.rows, activation), {}

@@ -19,12 +19,12 @@ from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BodyBatch, compile_worms
 from annelid.simulation.batch.controllers import ControllerBatch
 from annelid.simulation.batch.structure import checked_configs
-from annelid.simulation.coupling import start
 from annelid.simulation.interruption import Interruption
 from annelid.simulation.lock import locks
 from annelid.simulation.loop import PROGRESS_INTERVAL_S, Loop, RecordedRun
 from annelid.simulation.progress import ProgressCallback, reporting
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
+from annelid.simulation.stepping import start
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,14 +175,14 @@ class Team(Loop):
         """
         self._bodies = BodyBatch(configs, anatomies)
         self._worms = self._bodies.worms
-        couplings = [
+        simulations = [
             start(config, worm, build_controller(config, worm), None)
             for config, worm in zip(configs, self._worms, strict=True)
         ]
-        self._controllers = ControllerBatch(configs, couplings)
+        self._controllers = ControllerBatch(configs, simulations)
         first = len(all_runs)
-        for config, coupling, folder in zip(configs, couplings, folders, strict=True):
-            all_runs.append(RecordedRun(config, coupling, folder / FILE_NAME))
+        for config, simulation, folder in zip(configs, simulations, folders, strict=True):
+            all_runs.append(RecordedRun(config, simulation, folder / FILE_NAME))
         super().__init__(all_runs[first:])
 
     def advance(self, step: int) -> None:
@@ -192,13 +192,13 @@ class Team(Loop):
         activation, errors = self._controllers.advance(n_steps)
         for number, error in errors.items():
             self.drop(number, error)
-        self.each_numbered(lambda number, run: run.coupling.check_activation(activation[number]))
+        self.each_numbered(lambda number, run: run.simulation.check_activation(activation[number]))
         moved = self._move(n_steps, activation)
         step += n_steps
         if moved or step % schedule.sample_every == 0 or step % schedule.frame_every == 0:
             self.settle()
         self.each_numbered(
-            lambda number, run: run.coupling.advanced(
+            lambda number, run: run.simulation.advanced(
                 self._worms[number].strode(n_steps, moved.get(number)), activation[number], step, number in moved
             )
         )

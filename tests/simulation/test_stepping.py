@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from annelid.config import RunConfig, load_config
 from annelid.control import SnsController
 from annelid.errors import SimulationStopped
-from annelid.protocols import Array, Plant, Sensation, SlowPlant
+from annelid.protocols import Array, MultiRatePlant, Plant, Sensation
 from annelid.simulation import build_controller, build_plant, simulate
-from annelid.simulation.coupling import Coupling, start
+from annelid.simulation.stepping import Simulation, start
 
 N, REST_M = 3, 0.1
 
@@ -69,7 +69,7 @@ def toy_config(move_every: int, **changes: object) -> RunConfig:
     return load_config({}, base | {key.replace("__", "."): value for key, value in changes.items()})
 
 
-def coupled(config: RunConfig, plant: Plant) -> Coupling:
+def coupled(config: RunConfig, plant: Plant) -> Simulation:
     return start(config, plant, SnsController(config.controller, config.sensor, N, N, 0.001), None)  # type: ignore[arg-type]
 
 
@@ -165,10 +165,10 @@ def test_runs_of_the_worm_with_and_without_strides_are_identical(tmp_path: Path)
         "record.frames_interval_s": 0.05,
     }
     config = load_config("riddle2023-rods", changes)
-    assert isinstance(build_plant(config), SlowPlant)
+    assert isinstance(build_plant(config), MultiRatePlant)
     whole = simulate(config, tmp_path / "strides", progress=False).data
     plain: Plant = OneAtATime(build_plant(config))  # type: ignore[assignment]
-    assert not isinstance(plain, SlowPlant)
+    assert not isinstance(plain, MultiRatePlant)
     single = simulate(config, tmp_path / "single", plant=plain, controller=build_controller(config, plain)).data
     assert whole.sizes == single.sizes
     for name in whole.data_vars:

@@ -14,9 +14,9 @@ from annelid.protocols import (
     Array,
     Controller,
     Doubtful,
+    MultiRatePlant,
     Plant,
     Sensation,
-    SlowPlant,
     Stateful,
     StridingController,
     Watched,
@@ -29,7 +29,7 @@ _ACTIVATION_SLACK = 1e-9
 _OPTIONAL_FIELDS = ("ring_length_m", "muscle_force_N", "contact_force_N", "center_of_mass_m")
 
 
-class Coupling:
+class Simulation:
     """Plant, controller and sensor noise between two control steps.
 
     Attributes:
@@ -68,7 +68,7 @@ class Coupling:
         ).control_steps_per_move
         # Noise is drawn at every control step.
         self._striders = None
-        if not self._noise_m and isinstance(plant, SlowPlant) and isinstance(controller, StridingController):
+        if not self._noise_m and isinstance(plant, MultiRatePlant) and isinstance(controller, StridingController):
             self._striders = plant, controller
         self._alarms = [part.alarm for part in (plant, controller) if isinstance(part, Watched)]
 
@@ -80,7 +80,7 @@ class Coupling:
         """
         if self._striders is None:
             n_steps = 1
-            activation = np.asarray(self.controller.step(self.felt()), dtype=np.float64)
+            activation = np.asarray(self.controller.step(self.observed()), dtype=np.float64)
             self.check_activation(activation)
             self.sensation = self.plant.step(activation)
         else:
@@ -125,7 +125,7 @@ class Coupling:
         parts = (self.plant, self.controller)
         return tuple(doubt for part in parts if isinstance(part, Doubtful) for doubt in part.doubts())
 
-    def felt(self) -> Sensation:
+    def observed(self) -> Sensation:
         """Returns what the controller is told: the sensation with noise on the stretch sensors."""
         true = self.sensation
         if not self._noise_m:
@@ -175,7 +175,7 @@ class Coupling:
         return f"at {self.step * self.schedule.timestep_s:.6g} s of simulated time: {reason}"
 
 
-def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origin | None) -> Coupling:
+def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origin | None) -> Simulation:
     """Resets plant and controller, each with a seed of its own, or takes up a checkpoint.
 
     Args:
@@ -190,7 +190,7 @@ def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origi
     noise, plant_seed, controller_seed = np.random.SeedSequence(config.seed).spawn(3)
     sensation = plant.reset(int(plant_seed.generate_state(1)[0]))
     controller.reset(int(controller_seed.generate_state(1)[0]))
-    beginning = Coupling(config, plant, controller, sensation, np.random.Generator(np.random.PCG64(noise)))
+    beginning = Simulation(config, plant, controller, sensation, np.random.Generator(np.random.PCG64(noise)))
     if origin is None:
         return beginning
     fresh, saved = beginning.checkpoint(), origin.checkpoint
@@ -203,7 +203,7 @@ def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origi
             generator = restore_generator(saved.noise)
             plant.set_state(saved.plant)
             controller.set_state(saved.controller)
-            return Coupling(config, plant, controller, saved.sensation, generator, saved.step)
+            return Simulation(config, plant, controller, saved.sensation, generator, saved.step)
     # What a plant or a controller says to a state that none of its own runs has come to.
     except Exception as error:
         misfit = str(error) or type(error).__name__

@@ -1,4 +1,4 @@
-"""The 3D worm's books: what muscles have done, and where it went, physics step by physics step.
+"""The 3D worm's energy totals: what muscles have done, and where it went, physics step by physics step.
 
 The engine moves the body by the step h times the new velocity v', and the work of a generalised force f in a step is
 ``h f . v'``. With the mass matrix M constant, as it is for point masses on slides,
@@ -29,7 +29,7 @@ Engine = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True)
-class Books:
+class EnergyTotals:
     """Work done and energy lost since the start, J.
 
     Attributes:
@@ -44,9 +44,9 @@ class Books:
     damping_loss: Array
     constraint_loss: Array
 
-    def __add__(self, step: Books) -> Books:
-        """Returns the books after one more step."""
-        return Books(
+    def __add__(self, step: EnergyTotals) -> EnergyTotals:
+        """Returns the totals after one more step."""
+        return EnergyTotals(
             self.muscle_work + step.muscle_work,
             self.positive_work + step.positive_work,
             self.damping_loss + step.damping_loss,
@@ -54,7 +54,7 @@ class Books:
         )
 
 
-class Bookkeeper:
+class EnergyMeter:
     """Reads from the engine's arrays what one physics step did.
 
     Attributes:
@@ -82,11 +82,11 @@ class Bookkeeper:
         implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
         self.slopes = rings.slopes(model) if implicit else None
 
-    def opened(self) -> Books:
-        """Returns the books before the first step."""
-        return Books(np.zeros(self._n_muscles), np.zeros(self._n_muscles), np.zeros(()), np.zeros(()))
+    def opened(self) -> EnergyTotals:
+        """Returns the totals before the first step."""
+        return EnergyTotals(np.zeros(self._n_muscles), np.zeros(self._n_muscles), np.zeros(()), np.zeros(()))
 
-    def step(self, engine: Engine, drive: Array) -> tuple[Array, Books]:
+    def step(self, engine: Engine, drive: Array) -> tuple[Array, EnergyTotals]:
         """Tells what the actuators pulled with in one step, and what the step did.
 
         Args:
@@ -105,7 +105,7 @@ class Bookkeeper:
             per_length, per_rate = self.slopes(engine["actuator_length"], earlier, drive, tension)
             tension = tension + per_length * (h * rate) + per_rate * (rate - earlier)
         work = -h * tension * rate
-        entries = Books(
+        entries = EnergyTotals(
             work,
             np.maximum(work, 0.0),
             np.asarray(-h * (engine["qfrc_damper"] @ velocity)),

@@ -13,7 +13,7 @@ import pytest
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
 from annelid.config import load_config
-from annelid.simulation.books import Bookkeeper
+from annelid.simulation.energies import EnergyMeter
 from annelid.simulation.worm import WormPlant
 
 FREE = {"arena.floor_gap_m": 30.0, "body.rings.passive_peak": 1e-12}
@@ -90,8 +90,8 @@ def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float
 def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(rings: dict[str, Any]) -> None:
     plant = worm(0.005, **rings)
     data, n = plant.data, plant.n_muscles
-    bookkeeper = plant.anatomy.bookkeeper
-    assert bookkeeper.slopes is not None
+    energy_meter = plant.anatomy.energy_meter
+    assert energy_meter.slopes is not None
     activation = np.resize([1.0, 0.0, 0.3], n)
     met = set()
     for _ in range(80):
@@ -100,7 +100,7 @@ def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(ri
         stiffness, metric = np.zeros(n), np.zeros(n)
         stiffness[ids] = data.efm_ak[: data.nefmA]
         metric[ids] = data.efm_as[: data.nefmA]
-        per_length, per_rate = bookkeeper.slopes(
+        per_length, per_rate = energy_meter.slopes(
             data.actuator_length, data.actuator_velocity, activation, -data.actuator_force
         )
         assert h * per_length == pytest.approx(stiffness, abs=1e-9)
@@ -163,14 +163,14 @@ def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
     model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=0.01, actuator=SERVO))
     data = mujoco.MjData(model)
     data.act[:] = 1.0
-    bookkeeper = Bookkeeper(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
+    energy_meter = EnergyMeter(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
     mass, rate, damping = 2.0, 80.0, 1.5
-    books, expected = bookkeeper.opened(), 0.0
+    books, expected = energy_meter.opened(), 0.0
     data.ctrl[:] = -0.3
     for _ in range(80):
         x, v = float(data.qpos[0]), float(data.qvel[0])
         mujoco.mj_step(model, data)
-        tension, entries = bookkeeper.step({name: getattr(data, name) for name in bookkeeper.outputs}, data.ctrl)
+        tension, entries = energy_meter.step({name: getattr(data, name) for name in energy_meter.outputs}, data.ctrl)
         books += entries
         assert tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
         dx, dv = float(data.qpos[0]) - x, float(data.qvel[0]) - v
@@ -192,13 +192,13 @@ def pulled(data: mujoco.MjData, before_m_per_s: float) -> float:
 @pytest.mark.parametrize("step_s", [0.02, 0.005, 0.0005])
 def test_the_tension_of_a_muscle_that_sets_in_at_once_is_what_draws_its_load(step_s: float) -> None:
     model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=step_s, actuator=MUSCLE))
-    data, bookkeeper = mujoco.MjData(model), Bookkeeper(model, RINGS)
+    data, energy_meter = mujoco.MjData(model), EnergyMeter(model, RINGS)
     data.ctrl[:] = 1.0
     for step in range(round(0.2 / step_s)):
         before = float(data.qvel[0])
         mujoco.mj_step(model, data)
-        engine = {name: getattr(data, name) for name in bookkeeper.outputs}
-        tension, _ = bookkeeper.step(engine, data.ctrl)
+        engine = {name: getattr(data, name) for name in energy_meter.outputs}
+        tension, _ = energy_meter.step(engine, data.ctrl)
         assert tension[0] == pytest.approx(pulled(data, before), rel=1e-6)
         if step == 0:
             assert 0.0 < tension[0] < -data.actuator_force[0], "the load yields within the step"
@@ -220,20 +220,20 @@ def test_what_pulls_at_the_start_of_a_contraction_is_the_same_at_long_and_short_
             before = felt.ring_length_m
         assert max(engine) > 110.0
         peaks.append(max(recorded))
-        assert work == pytest.approx(plant.books.muscle_work[0], rel=2e-3)
-        assert np.array_equal(plant.read(False)["muscle_force"], plant.feel().muscle_force_N)
+        assert work == pytest.approx(plant.energies.muscle_work[0], rel=2e-3)
+        assert np.array_equal(plant.read(False)["muscle_force"], plant.observe().muscle_force_N)
     assert all(4.0 < peak < 10.0 for peak in peaks), peaks
 
 
 def test_positive_work_is_that_of_the_steps_in_which_a_muscle_shortens() -> None:
     plant = worm(0.005)
-    expected, last = np.zeros(3), plant.books.muscle_work
+    expected, last = np.zeros(3), plant.energies.muscle_work
     for step in range(80):
         plant.step(np.array([1.0, 0.0, 0.3]) if step < 40 else np.array([0.3, 1.0, 0.0]))
-        expected += np.maximum(plant.books.muscle_work - last, 0.0)
-        last = plant.books.muscle_work
-    assert plant.books.positive_work == pytest.approx(expected, abs=1e-12)
-    assert (plant.books.positive_work - last).max() > 1e-3, "a muscle must have been lengthened while it pulled"
+        expected += np.maximum(plant.energies.muscle_work - last, 0.0)
+        last = plant.energies.muscle_work
+    assert plant.energies.positive_work == pytest.approx(expected, abs=1e-12)
+    assert (plant.energies.positive_work - last).max() > 1e-3, "a muscle must have been lengthened while it pulled"
 
 
 def test_a_chain_under_euler_lacks_only_the_square_of_its_changes_of_velocity() -> None:

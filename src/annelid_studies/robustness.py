@@ -13,7 +13,7 @@ import csv
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.resources import files
 from math import sqrt
@@ -24,7 +24,7 @@ import numpy as np
 
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
-from annelid.draw.markdown import table
+from annelid.draw.markdown import plain_table
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
 from annelid.experiment.fingerprint import code_fingerprint
@@ -34,6 +34,7 @@ from annelid.output import whole_file
 from annelid.plausibility import tolerance_window_m
 from annelid.simulation.lock import locks
 from annelid.textfiles import read_json
+from annelid_studies.tables import tabulated
 from annelid_studies.worms import RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
@@ -168,28 +169,15 @@ def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
     ]
 
 
-def write_points(points: Sequence[Point], path: Path) -> None:
-    """Writes a sample as CSV with a header."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(point) for point in points)
-
-
 def points() -> tuple[Point, ...]:
     """Returns the sample as it was drawn once."""
     text = files("annelid_studies").joinpath(TABLE).read_text(encoding="utf-8")
-    return tuple(
-        Point(
-            noise_m=float(row["noise_m"]),
-            friction=float(row["friction"]),
-            physics_timestep_ms=int(row["physics_timestep_ms"]),
-            n_segments=int(row["n_segments"]),
-            young_modulus_Pa=float(row["young_modulus_Pa"]),
-            seed=int(row["seed"]),
-        )
+    whole = {"physics_timestep_ms", "n_segments", "seed"}
+    rows: list[dict[str, Any]] = [
+        {name: int(value) if name in whole else float(value) for name, value in row.items()}
         for row in csv.DictReader(text.splitlines())
-    )
+    ]
+    return tuple(Point(**row) for row in rows)
 
 
 def judge(
@@ -352,19 +340,17 @@ def wilson(successes: int, n: int, z: float = 1.959964) -> tuple[float, float]:
 
 def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
     """Returns what `shares` counted as a Markdown table."""
-    rows = [
-        [
-            f"`{controller}`",
-            str(of["points"]),
-            str(of["walked"]),
-            str(of["in_time"]),
-            str(of["lengthened"]),
-            f"{100 * of['share']:.0f} ({100 * of['interval'][0]:.0f} .. {100 * of['interval'][1]:.0f})",
-        ]
-        for controller, of in found.items()
-    ]
-    head = ["controller", "points", "walked 1-2-..-N", "in time: within 10 % of the period", "and so lengthened"]
-    return table([*head, "share in time (%)"], rows)
+    columns: Mapping[str, Callable[[tuple[str, Mapping[str, Any]]], str]] = {
+        "controller": lambda row: f"`{row[0]}`",
+        "points": lambda row: str(row[1]["points"]),
+        "walked 1-2-..-N": lambda row: str(row[1]["walked"]),
+        "in time: within 10 % of the period": lambda row: str(row[1]["in_time"]),
+        "and so lengthened": lambda row: str(row[1]["lengthened"]),
+        "share in time (%)": lambda row: "{:.0f} ({:.0f} .. {:.0f})".format(
+            *(100 * share for share in (row[1]["share"], *row[1]["interval"]))
+        ),
+    }
+    return plain_table(tabulated(found.items(), columns))
 
 
 def _sorted(judged: Mapping[tuple[str, int], Judged]) -> list[Judged]:

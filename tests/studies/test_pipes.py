@@ -12,7 +12,6 @@ from annelid import load_config, open_run, simulate
 from annelid.analysis.passage import Passage, passage_of
 from annelid.config import Pipe, RobustSns
 from annelid.errors import RunFileError
-from annelid_studies.figures.pipes import Way
 from annelid_studies.pipes import (
     ADAPTIVE,
     BEND_GAITS,
@@ -22,6 +21,7 @@ from annelid_studies.pipes import (
     RADII_M,
     Passages,
     Reading,
+    Way,
     pipes_picture,
     pipes_table,
     trials,

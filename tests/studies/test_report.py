@@ -68,11 +68,11 @@ def claim(number: int) -> Claim:
         topic,
         f"Claim {number} of the paper",
         f"Sect. {number}",
-        verdict,
         paper=f"{number}.25 cm",
         ours=f"{number}.26 cm",
         evidence=f"Evidence {number}: {SPECIAL}",
         command="" if verdict == "not testable here" else f"{COMMAND} --set seed={number}",
+        verdict=verdict,
         within={"holds within": "4.5 %", "rests on": "the run"}.get(verdict, ""),
     )
 

@@ -29,22 +29,22 @@ class Claim:
         topic: Structure, sensing, actuation, results, discussion, future work.
         claim: What the paper says, in our words.
         place: Where it says so.
-        verdict: Whether it holds.
-        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
         paper: The paper's number or words.
         ours: Our number or words.
         evidence: Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it.
         command: The command that makes our number.
+        verdict: Whether it holds.
+        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
     """
 
     topic: str
     claim: str
     place: str
-    verdict: Verdict
     paper: str
     ours: str
     evidence: str
     command: str
+    verdict: Verdict
     within: str = ""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite
 from typing import Any
 
@@ -35,8 +36,6 @@ ROUNDS = 5
 STEP_BACK = 0.015
 SLOPE_M = 0.2
 """A force is raised by its share of this that the end is to elongate further, before there are two readings, m."""
-STAGE = "setting the actuators"
-
 Key = tuple[str, float]
 """Names a worm: the quantity in which it differs from the base worm, and its value."""
 
@@ -90,60 +89,62 @@ def settings(
         AnnelidError: A run cannot be built or written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    tried: dict[Key, dict[float, Pulled]] = {key: {} for key in worms}
-    wanted = {key: list(guesses_m[key]) for key in worms}
-    report = in_stage(progress, STAGE)
-    for _ in range(ROUNDS):
-        cases = {
-            (key, length): pull(1, length_limited(length), worms[key])
-            for key, lengths in wanted.items()
-            for length in lengths
-        }
-        found = store.compute(cases.values(), jobs=jobs, progress=report)
-        for (key, length), case in cases.items():
-            tried[key][length] = read_pull(1, found[case_key(case)])
-        wanted = {
-            key: [next_length(readings)] if len(readings) > 1 else list(GUESSES_M)
-            for key, readings in tried.items()
-            if _error(*nearest(readings)) > LARGEST_ERROR_M
-        }
-        if not wanted:
-            found_settings = {key: _setting(*nearest(readings)) for key, readings in tried.items()}
-            return _with_forces(store, worms, found_settings, jobs, report)
-    changes = ", ".join(f"{field} = {value:g}" for field, value in worms[next(iter(wanted))].items())
-    raise ConfigError(
-        f"with {changes or 'the base worm'} no cable length was found at which an end elongates by {100 * END_M:.2f} cm"
-    )
+    search = partial(_search, store, worms, jobs, in_stage(progress, "setting the actuators"))
+    lengths = search(length_limited, guesses_m, _next_lengths)
+    for key, readings in lengths.items():
+        if _next_lengths(readings):
+            changes = ", ".join(f"{field} = {value:g}" for field, value in worms[key].items())
+            raise ConfigError(
+                f"with {changes or 'the base worm'} no cable length was found at which an end elongates by "
+                f"{100 * END_M:.2f} cm"
+            )
+    found = {key: _setting(*nearest(readings)) for key, readings in lengths.items()}
+    # An end near `END_M` is close to where a constant force collapses it, and friction holds it differently on the two
+    # ways there, so that the tension of the wound cable may be a percent too high. Where the search does not end, the
+    # force counts that comes nearest.
+    forces = search(force_limited, {key: [one.force_N] for key, one in found.items()}, _next_forces)
+    return {key: replace(one, force_N=nearest(forces[key])[0]) for key, one in found.items()}
 
 
-def _with_forces(
+Readings = dict[float, Pulled]
+"""What was read of an end by the length (m) or the force (N) that was set."""
+
+
+def _search(
     store: Store,
     worms: Mapping[Key, Mapping[str, Any]],
-    found: Mapping[Key, Setting],
     jobs: int | None,
     report: Callable[[int, int, float], object] | None,
-) -> dict[Key, Setting]:
-    """Corrects force limits, from the tension of the wound cable on, until an end elongates alike under them.
-
-    An end near `END_M` is close to where a constant force collapses it, and friction holds it differently on the two
-    ways there, so that the tension alone may be a percent too high. Where the search does not end, the force counts
-    that comes nearest.
-    """
-    tried: dict[Key, dict[float, Pulled]] = {key: {} for key in found}
-    wanted = {key: one.force_N for key, one in found.items()}
+    actuator: Callable[[float], Actuator],
+    first: Mapping[Key, Sequence[float]],
+    following: Callable[[Readings], Sequence[float]],
+) -> dict[Key, Readings]:
+    """Pulls an end of every worm, from first values on, until nothing follows from what was read, or `ROUNDS` times."""
+    tried: dict[Key, Readings] = {key: {} for key in worms}
+    wanted = dict(first)
     for _ in range(ROUNDS):
-        cases = {key: pull(1, force_limited(force), worms[key]) for key, force in wanted.items()}
-        outcomes = store.compute(cases.values(), jobs=jobs, progress=report)
-        for key, case in cases.items():
-            tried[key][wanted[key]] = read_pull(1, outcomes[case_key(case)])
-        wanted = {
-            key: next_force(readings)
-            for key, readings in tried.items()
-            if _error(*nearest(readings)) > FORCE_ERROR_M and next_force(readings) not in readings
+        cases = {
+            (key, value): pull(1, actuator(value), worms[key]) for key, values in wanted.items() for value in values
         }
+        outcomes = store.compute(cases.values(), jobs=jobs, progress=report)
+        for (key, value), case in cases.items():
+            tried[key][value] = read_pull(1, outcomes[case_key(case)])
+        wanted = {key: values for key, readings in tried.items() if (values := following(readings))}
         if not wanted:
             break
-    return {key: replace(one, force_N=nearest(tried[key])[0]) for key, one in found.items()}
+    return tried
+
+
+def _next_lengths(readings: Readings) -> Sequence[float]:
+    if _error(*nearest(readings)) <= LARGEST_ERROR_M:
+        return ()
+    return [next_length(readings)] if len(readings) > 1 else GUESSES_M
+
+
+def _next_forces(readings: Readings) -> Sequence[float]:
+    if _error(*nearest(readings)) <= FORCE_ERROR_M or next_force(readings) in readings:
+        return ()
+    return [next_force(readings)]
 
 
 def next_force(readings: Mapping[float, Pulled]) -> float:

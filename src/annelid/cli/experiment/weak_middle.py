@@ -36,16 +36,13 @@ def weak_middle_command(
     annelid experiment weak-middle -o weak-middle
     """
     from annelid.terminal import Console
-    from annelid_studies.figures.weak_middle import weak_middle_figure
     from annelid_studies.weak_middle.asymmetry import asymmetry
     from annelid_studies.weak_middle.results import (
         asymmetry_table,
         checks_table,
-        panels,
-        papers_deficit,
-        robot_deficit,
         settings_table,
         sweep_table,
+        weak_middle_figure,
         write_readings,
     )
     from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
@@ -62,6 +59,5 @@ def weak_middle_command(
             Console().print(table)
     path = output / "weak_middle.csv"
     write_readings([*readings, *(found.readings if found else ())], path)
-    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
-    for written in (path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))):
+    for written in (path, weak_middle_figure(readings, path.with_suffix(""))):
         typer.echo(written)

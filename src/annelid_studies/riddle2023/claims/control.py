@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import nan
 
 from annelid.analysis.rhythm import CONTRACTED
@@ -11,13 +12,14 @@ from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
     PLANAR_CASES,
     Evidence,
-    between,
     judged,
 )
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.gate import VARIANTS, variant
+from annelid_studies.riddle2023.examinations.words import span
 from annelid_studies.worms import fast, rods
 
+_claim = partial(Claim, "Sensing and control")
 GATES = "the worm and how its gates start"
 
 
@@ -35,18 +37,15 @@ def control_claims(evidence: Evidence) -> list[Claim]:
         ]
         for start in ("toolbox", "steady")
     }
-    walks, on = judged([rhythm.is_one_wave for rhythm in rhythms] + gates["toolbox"] + gates["steady"], GATES)
     shares = [_half_centres(run) for _, run in evidence.runs]
     flip = judged((both < 0.05 and following > 0.95 for both, following in shares), "the run")
     return [
-        Claim(
-            "Sensing and control",
+        _claim(
             "The network of the 2D worm drives the 3D worm with little to no change.",
             "sections 2.3, 5",
-            walks,
             "little to no change",
             f"in the order 1-2-3: {sum(rhythm.is_one_wave for rhythm in rhythms)} of {len(rhythms)} runs on four "
-            f"bodies, periods {between([rhythm.period_s or nan for rhythm in rhythms], digits=3)} s; with either "
+            f"bodies, periods {span([rhythm.period_s or nan for rhythm in rhythms], digits=3)} s; with either "
             f"update order of the network {sum(gates['toolbox'])} of {len(gates['toolbox'])}, with gates that start at "
             f"rest {sum(gates['steady'])} of {len(gates['steady'])}",
             "Neurons, synapses and conductances are the same on the planar worm, the paper's chain, its fast form and "
@@ -54,31 +53,28 @@ def control_claims(evidence: Evidence) -> list[Claim]:
             "2), the sensors' tolerance (0.1 mm to 10 mm), and a hold of the first sensor for 0.2 s. The gates of the "
             "sodium current start as in SNS-Toolbox; where they start at rest, all that differs is told above.",
             f"{PLANAR_CASES[300].command}; {MAIN.command}",
-            on,
+            *judged([rhythm.is_one_wave for rhythm in rhythms] + gates["toolbox"] + gates["steady"], GATES),
         ),
-        Claim(
-            "Sensing and control",
+        _claim(
             "The sodium current is Hodgkin and Huxley's fast transient current.",
             "section 2.3",
-            "does not hold",
             "fast transient",
             "persistent sodium current with a slow gate",
             "The equations have instantaneous activation and a gate of up to 300 ms, which sets the period. The name "
             "changes nothing in the results.",
             "annelid presets riddle2023",
+            "does not hold",
         ),
-        Claim(
-            "Sensing and control",
+        _claim(
             "Half-centre neurons flip between excited and inhibited states, and the muscle follows the excited one.",
             "section 2.3, Fig. 7",
-            flip[0],
             "Fig. 7",
-            f"both of a segment's neurons above R/2 in {between((both for both, _ in shares), 100, 1)} % of samples",
+            f"both of a segment's neurons above R/2 in {span((both for both, _ in shares), 100, 1)} % of samples",
             "It holds if both are excited in less than 5 % of the samples and activation follows in more than 95 %. "
             "Activation above one half goes with the contraction neuron being the higher one in "
-            f"{between((following for _, following in shares), 100, 1)} % of the samples; figure 7 shows both.",
+            f"{span((following for _, following in shares), 100, 1)} % of the samples; figure 7 shows both.",
             MAIN.command,
-            flip[1],
+            *flip,
         ),
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import nan
 
 import numpy as np
@@ -16,7 +17,6 @@ from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
     NEGLIGIBLE,
     Evidence,
-    between,
     judged,
     longer_worm,
     longer_worms,
@@ -24,8 +24,10 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY
+from annelid_studies.riddle2023.examinations.words import span
 from annelid_studies.worms import chain, fast, one_after_the_other, rods
 
+_claim = partial(Claim, "Discussion")
 SLIGHT_M = 0.001
 
 
@@ -39,39 +41,32 @@ def discussion_claims(evidence: Evidence, main: Run) -> list[Claim]:
     first, second = held.holds[0].elongation_mean_m, held.holds[1].elongation_mean_m
     # Shape (n_runs, 3, n_readings).
     lifts = np.array([_lifts(run) for _, run in evidence.runs])
-    lifted = judged((lifts > SLIGHT_M).ravel(), "how the elongation is read")
     seen = [measure_propagation(run) for _, run in evidence.runs]
     nearby, far = (
         [now / rest - 1 for rest, now in lengths]
         for lengths in ([one.near.length_m for one in seen], [one.far.length_m for one in seen])
     )
-    spreads = judged((abs(one) > 5 * abs(other) for one, other in zip(nearby, far, strict=True)), "the run")
     weight = float(main.data.attrs["total_mass_kg"]) * 9.81
     loads = [_load_N(run) for _, run in evidence.runs]
-    loaded = near(loads, weight, "the run")
     return [
-        Claim(
-            "Discussion",
+        _claim(
             "Contraction deforms unactuated neighbours, even with a rhombus between the rings, and leaves far ones "
             "alone (Fig. 8).",
             "sections 3, 4",
-            spreads[0],
             "Fig. 8",
-            f"near rhombus {between(nearby, 100, 0)} % longer, far rhombus {between(far, 100, 0)} %",
+            f"near rhombus {span(nearby, 100, 0)} % longer, far rhombus {span(far, 100, 0)} %",
             f"It holds if the near rhombus changes by more than five times as much; both are those that our "
             f"figure 8 shows. Segment 2 contracted at {seen[0].time_s:.2f} s; figure 8 shows how the deformation "
             "decays with distance.",
             MAIN.command,
-            spreads[1],
+            *judged((abs(one) > 5 * abs(other) for one, other in zip(nearby, far, strict=True)), "the run"),
         ),
-        Claim(
-            "Discussion",
+        _claim(
             "When segment 1 contracts, segment 2 lengthens slightly; when segment 2 contracts, segments 1 and 3 do.",
             "section 4",
-            lifted[0],
             "slightly longer",
             "; ".join(
-                f"{which}: {between(lifts[:, i], 1e3, 0)} mm"
+                f"{which}: {span(lifts[:, i], 1e3, 0)} mm"
                 for i, which in enumerate(("2 while 1", "1 while 2", "3 while 2"))
             ),
             "Largest reading of the neighbour during the contraction, against rest, over the six springs and their "
@@ -79,21 +74,19 @@ def discussion_claims(evidence: Evidence, main: Run) -> list[Claim]:
             f"({worm}) little of it is left: {1e3 * first[1]:+.1f} mm in segment 2 while 1 is held, "
             f"{1e3 * second[0]:+.1f} and {1e3 * second[2]:+.1f} mm in 1 and 3 while 2 is held.",
             MAIN.command,
-            lifted[1],
+            *judged((lifts > SLIGHT_M).ravel(), "how the elongation is read"),
         ),
         *_middle_claims(evidence),
         _robot_claim(evidence),
-        Claim(
-            "Discussion",
+        _claim(
             "On flat ground the contact forces are produced by gravity.",
             "section 4",
-            loaded[0],
             "gravity",
-            f"mean load on the floor {between(loads)} N, weight {weight:.2f} N",
+            f"mean load on the floor {span(loads)} N, weight {weight:.2f} N",
             "Mean of the vertical contact force from 0.5 s on, at samples of 10 ms, between which short impacts are "
             "missed or counted double.",
             MAIN.command,
-            loaded[1],
+            *near(loads, weight, "the run"),
         ),
         _speed_claim(evidence, main),
     ]
@@ -108,25 +101,22 @@ def _load_N(run: Run) -> float:
 def _speed_claim(evidence: Evidence, main: Run) -> Claim:
     body_m = float(main.data.attrs["body_length_m"])
     ours = [_travel_in_a_cycle(run, outcome.rhythm.period_s or nan) for outcome, run in evidence.runs]
-    verdict, on = judged((abs(travel) < NEGLIGIBLE * body_m for travel in ours), "the run")
     others = {
         case.preset: _travel_in_a_cycle(evidence.store.run(case), evidence.results[case].rhythm.period_s or nan)
         for case in (fast(), rods())
     }
     listed = ", ".join(f"{1e3 * travel:+.0f} mm ({name})" for name, travel in others.items())
-    return Claim(
-        "Discussion",
+    return _claim(
         "Net speed is negligible.",
         "section 5",
-        verdict,
         "negligibly small",
-        f"{between(ours, 1e3, 0)} mm forwards in the last cycle, {between(ours, 100 / body_m, 1)} % of the body",
+        f"{span(ours, 1e3, 0)} mm forwards in the last cycle, {span(ours, 100 / body_m, 1)} % of the body",
         f"Centre of mass over one period. Negligible means below "
         f"{100 * NEGLIGIBLE:.0f} % of the body here; the paper gives no number. Other worms in the same gait: "
         f"{listed}. Travel depends on pins, contact settings and time step more than on anything the paper states; "
         "friction and time step are examined.",
         MAIN.command,
-        on,
+        *judged((abs(travel) < NEGLIGIBLE * body_m for travel in ours), "the run"),
     )
 
 
@@ -160,7 +150,7 @@ def _lifts(run: Run) -> np.ndarray:
 def _middle_claims(evidence: Evidence) -> list[Claim]:
     held = {(n, worm): _own(evidence.store.run(longer_worm(n, worm))) for n, worm in longer_worms(evidence.effort)}
     shortfalls = {key: 1 - own[1:-1] / np.minimum(own[0], own[-1]) for key, own in held.items()}
-    below, on = judged(
+    below = judged(
         (one > 0 for shortfall in shortfalls.values() for one in shortfall.ravel()), "how the elongation is read"
     )
     share = float(np.mean(np.concatenate([shortfall.ravel() for shortfall in shortfalls.values()]) > 0))
@@ -174,11 +164,9 @@ def _middle_claims(evidence: Evidence) -> list[Claim]:
         if means
     )
     return [
-        Claim(
-            "Discussion",
+        _claim(
             "In longer worms all interior segments elongate less than the ends (N = 4, 5, 6).",
             "section 4",
-            below,
             "all of 2 .. N-1",
             f"interior below the lower end by {listed}",
             "Every segment contracted alone, one after the other, with equal muscles: position is all that differs. "
@@ -186,7 +174,7 @@ def _middle_claims(evidence: Evidence) -> list[Claim]:
             f"the lower end, by each spring and by their mean; {100 * share:.0f} % of these readings are below. The "
             "numbers are those of the mean of the springs.",
             longer_worm(6, "rods").command,
-            on,
+            *below,
         ),
         cause_claim(evidence),
     ]
@@ -220,12 +208,9 @@ def cause_claim(evidence: Evidence) -> Claim:
             for friction in (SLIPPERY, PAPERS_FRICTION)
         )
         parts[worm] = compiled, compiled - equal, rough - slippery
-    verdict, on = judged((whole - ranges > ranges for whole, ranges, _ in parts.values()), "the pins")
-    return Claim(
-        "Discussion",
+    return _claim(
         "Segment 2's smaller elongation is due to contact friction and its central place.",
         "section 4",
-        verdict,
         "friction and place",
         "; ".join(
             f"{LABELS[worm]}: of {100 * whole:.1f} % in open loop, {100 * ranges:.1f} points go with equal length "
@@ -237,7 +222,7 @@ def cause_claim(evidence: Evidence) -> Claim:
         "another operating range, and the middle one the range that ends earliest. Friction and place have their "
         "share, but the muscle's range is in the model for a reason that has nothing to do with the worm.",
         "annelid paper --only ranges --only friction",
-        on,
+        *judged((whole - ranges > ranges for whole, ranges, _ in parts.values()), "the pins"),
     )
 
 
@@ -247,19 +232,16 @@ def _robot_claim(evidence: Evidence) -> Claim:
     held = {worm: _own(evidence.store.run(longer_worm(4, worm))) for worm in worms}
     ours = {worm: relative_to_first(own[:, -1]) for worm, own in held.items()}
     weak = [middle_deficit(of_reading) for own in held.values() for of_reading in own.T]
-    verdict, within = near(weak, middle_deficit(ROBOT_ELONGATION_M), "the worm and how its elongation is read")
-    return Claim(
-        "Discussion",
+    return _claim(
         "The model closely emulates the robot: ends alike, middle segments clearly weaker.",
         "section 4, Fig. 9",
-        verdict,
         " / ".join(f"{value:.2f}" for value in robot) + " relative to segment 1",
         "; ".join(f"{LABELS[worm]} {' / '.join(f'{value:.2f}' for value in values)}" for worm, values in ours.items()),
-        f"Compared is by how much the middle falls short: {between(weak, 100, 0)} % by the springs and their mean "
+        f"Compared is by how much the middle falls short: {span(weak, 100, 0)} % by the springs and their mean "
         f"in our worms of four segments with equal muscles, {100 * middle_deficit(ROBOT_ELONGATION_M):.0f} % in the "
         "robot. A muscle that stops by its length hides the load; the robot's motors stop by their force. Fig. 9 shows "
         "the robot's lengths over time as a graph; the text gives numbers of their maxima only, and these are what we "
         "compare with.",
         longer_worm(4, "fast").command,
-        within,
+        *near(weak, middle_deficit(ROBOT_ELONGATION_M), "the worm and how its elongation is read"),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import nan
 
 import numpy as np
@@ -13,15 +14,16 @@ from annelid_studies.riddle2023.claims.evidence import (
     PAPER_STEPS,
     PAPER_WALL_S,
     Evidence,
-    between,
     judged,
     near,
     order_of,
     readings_m,
 )
 from annelid_studies.riddle2023.contents import Claim
+from annelid_studies.riddle2023.examinations.words import span
 from annelid_studies.worms import FAST
 
+_claim = partial(Claim, "Results")
 SPRING = "how the elongation is read"
 
 
@@ -34,28 +36,24 @@ def result_claims(evidence: Evidence) -> list[Claim]:
     order = judged((rhythm.is_one_wave for rhythm in rhythms), "the run")
     period = near(periods, 2.6, "the run")
     return [
-        Claim(
-            "Results",
+        _claim(
             "The wave runs from segment 1 to 3 and repeats, as in 2D.",
             "section 3, Fig. 7",
-            order[0],
             "1-2-3",
             f"{order_of(first)}; {walks} of {len(rhythms)} runs in one wave 1-2-3",
             first.rhythm.reason[:1].upper() + first.rhythm.reason[1:] + ".",
             MAIN.command,
-            order[1],
+            *order,
         ),
-        Claim(
-            "Results",
+        _claim(
             "A cycle of the three-segment worm takes about 2.6 s.",
             "Fig. 7",
-            period[0],
             "about 2.6 s, read off Fig. 7",
-            f"{between(periods, digits=3)} s",
+            f"{span(periods, digits=3)} s",
             "The text gives no number. The network sets the period: 875 ms a segment at a gate time constant of 300 "
             "ms; the paper's network alone gives 2.631 s in the toolbox's update order.",
             MAIN.command,
-            period[1],
+            *period,
         ),
         *_elongation_claims(evidence),
         cost_claim(evidence),
@@ -69,19 +67,17 @@ def _elongation_claims(evidence: Evidence) -> list[Claim]:
     claims = []
     for segment, paper_m in enumerate((0.0420, 0.0255, 0.0402), start=1):
         ours = read[:, segment - 1]
-        verdict, within = near(ours.ravel(), paper_m, SPRING)
+        verdict = near(ours.ravel(), paper_m, SPRING)
         claims.append(
-            Claim(
-                "Results",
+            _claim(
                 f"Segment {segment} elongates by at most {100 * paper_m:.2f} cm.",
                 "section 3",
-                verdict,
                 f"{100 * paper_m:.2f} cm",
                 _by_reading(ours, "cm"),
                 "No reading is the right one: the paper does not say how it read its figure. The spring on the first "
                 "helix comes nearest in all three segments together, and stands in the main table for that reason.",
                 MAIN.command,
-                within,
+                *verdict,
             )
         )
     shortfalls = (
@@ -101,10 +97,18 @@ def _elongation_claims(evidence: Evidence) -> list[Claim]:
     )
     for claim, paper, measure, why in shortfalls:
         ours = np.array([[measure(of_reading) for of_reading in of_run.T] for of_run in read])
-        verdict, within = near(ours.ravel(), paper, SPRING)
+        verdict = near(ours.ravel(), paper, SPRING)
         text = f"{100 * paper:g} %"
         claims.append(
-            Claim("Results", claim, "section 3", verdict, text, _by_reading(ours, "%", 1), why, MAIN.command, within)
+            _claim(
+                claim,
+                "section 3",
+                text,
+                _by_reading(ours, "%", 1),
+                why,
+                MAIN.command,
+                *verdict,
+            )
         )
     return claims
 
@@ -113,21 +117,20 @@ def _by_reading(ours: np.ndarray, unit: str, digits: int = 2) -> str:
     """Writes readings of shape ``(n_runs, n_readings)``: of the first run, and the range over all runs."""
     springs = ", ".join(f"{100 * value:.{digits}f}" for value in ours[0, :-1])
     text = f"{springs} {unit} by the six springs, {100 * ours[0, -1]:.{digits}f} {unit} in the mean"
-    return text if len(ours) == 1 else f"{text}; {between(ours.ravel(), 100, digits)} {unit} over all runs"
+    return text if len(ours) == 1 else f"{text}; {span(ours.ravel(), 100, digits)} {unit} over all runs"
 
 
 def cost_claim(evidence: Evidence) -> Claim:
     """Judges the claim about the cost of computing."""
     spent, fast = evidence.runs[0][0].cpu_time_s, evidence.results[Case(FAST)].cpu_time_s
-    return Claim(
-        "Results",
+    return _claim(
         f"{PAPER_STEPS} steps take 3.5 minutes.",
         "section 3",
-        "not testable here",
         f"{1e3 * PAPER_WALL_S / PAPER_STEPS:.0f} ms a step",
         f"{1e3 * spent / PAPER_STEPS:.0f} ms a step, {spent:.0f} s of one core; riddle2023-fast {fast:.0f} s",
         "Not judged by decision: a time of computing says as much about the machine as about the model. Ours is what "
         "the process computed, whatever else the machine did. The same formulation and step; rooting each strand in "
         "its middle halves the cost.",
         MAIN.command,
+        "not testable here",
     )

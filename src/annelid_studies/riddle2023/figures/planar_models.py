@@ -104,14 +104,14 @@ def spiral(center: Array, radius: float, turns: float = 2.25) -> Array:
     return center + radius * share[:, np.newaxis] * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def figure_1_planar_models(stem: Path) -> Path:
+def figure_1_planar_models(stem: Path) -> str:
     """Draws the three models with the middle segment contracted, each from its own plant.
 
     Args:
         stem: Path of the two files without their suffixes.
 
     Returns:
-        The path of the PNG file; the SVG file lies beside it.
+        The caption.
     """
     contracted = N_SEGMENTS // 2
     outlines = {
@@ -141,7 +141,8 @@ def figure_1_planar_models(stem: Path) -> Path:
             axes.set_ylim(-half_height, half_height)
             axes.set_aspect("equal")
             axes.axis("off")
-        return save_both(figure, stem)
+        save_both(figure, stem)
+    return CAPTION
 
 
 _PANELS = {

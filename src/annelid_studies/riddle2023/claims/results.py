@@ -20,7 +20,7 @@ from annelid_studies.riddle2023.claims.evidence import (
     readings_m,
 )
 from annelid_studies.riddle2023.contents import Claim
-from annelid_studies.riddle2023.examinations.words import span
+from annelid_studies.riddle2023.examinations.words import in_unit, span
 from annelid_studies.worms import FAST
 
 _claim = partial(Claim, "Results")
@@ -115,8 +115,8 @@ def _elongation_claims(evidence: Evidence) -> list[Claim]:
 
 def _by_reading(ours: np.ndarray, unit: str, digits: int = 2) -> str:
     """Writes readings of shape ``(n_runs, n_readings)``: of the first run, and the range over all runs."""
-    springs = ", ".join(f"{100 * value:.{digits}f}" for value in ours[0, :-1])
-    text = f"{springs} {unit} by the six springs, {100 * ours[0, -1]:.{digits}f} {unit} in the mean"
+    *springs, mean = (in_unit(value, 100, digits) for value in ours[0])
+    text = f"{', '.join(springs)} {unit} by the six springs, {mean} {unit} in the mean"
     return text if len(ours) == 1 else f"{text}; {span(ours.ravel(), 100, digits)} {unit} over all runs"
 
 

@@ -249,6 +249,7 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
             axes.set_xlim(9.0, 1.5 * edge)
         elongation.set_ylim(bottom=0.0)
         gap.set_yscale("log")
+        gap.minorticks_off()
         steps = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
         low, high = gap.get_ylim()
         gap.set_yticks(shown := [step for step in steps if low <= step <= high], [f"{step:g}" for step in shown])

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from math import isfinite
 
+import numpy as np
+
 from annelid.analysis import RhythmScore
+from annelid.morphology import Array
 from annelid_studies.riddle2023.examinations.design import Reading, number
 
 CM, MM, PERCENT = 100.0, 1000.0, 100.0
@@ -63,9 +66,9 @@ def labels(readings: Iterable[Reading]) -> str:
     return listed(one.worm.label for one in readings)
 
 
-def span(values: Iterable[float], scale: float = 1.0, digits: int = 2) -> str:
+def span(values: Iterable[float] | Array, scale: float = 1.0, digits: int = 2) -> str:
     """Formats the range of some numbers, ``12 to 40``, or the number if all are printed alike."""
-    finite = [value for value in values if isfinite(value)]
+    finite = [value for value in np.ravel([*values]) if isfinite(value)]
     if not finite:
         return NOTHING
     low, high = in_unit(min(finite), scale, digits), in_unit(max(finite), scale, digits)

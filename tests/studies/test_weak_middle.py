@@ -27,13 +27,17 @@ from annelid_studies.weak_middle import pulls, sweeps
 from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry, value_at
 from annelid_studies.weak_middle.pulls import (
     ACTUATORS,
+    END_M,
     STIFF_N_PER_M,
     Actuator,
     Pulled,
+    Setting,
     force_limited,
     length_limited,
     muscle,
     muscle_activation,
+    next_force,
+    next_length,
     papers_muscle,
     pull,
     read_pull,
@@ -51,7 +55,6 @@ from annelid_studies.weak_middle.results import (
     weak_middle_figure,
     write_readings,
 )
-from annelid_studies.weak_middle.settings import END_M, Setting, next_force, next_length
 from annelid_studies.weak_middle.sweeps import (
     QUANTITIES,
     Point,

@@ -19,8 +19,7 @@ from annelid.draw.style import panel_title, segment_colors
 from annelid.output import write_csv
 from annelid_studies.tables import tabulated, terminal_table
 from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry
-from annelid_studies.weak_middle.pulls import ACTUATORS
-from annelid_studies.weak_middle.settings import Key, Setting
+from annelid_studies.weak_middle.pulls import ACTUATORS, Key, Setting
 from annelid_studies.weak_middle.sweeps import (
     BASE,
     FRICTION,

@@ -17,8 +17,17 @@ from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store, case_key
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort
-from annelid_studies.weak_middle.pulls import Actuator, Pulled, base_body, pull, read_pull
-from annelid_studies.weak_middle.settings import GUESSES_M, Key, Setting, settings
+from annelid_studies.weak_middle.pulls import (
+    GUESSES_M,
+    Actuator,
+    Key,
+    Pulled,
+    Setting,
+    base_body,
+    pull,
+    read_pull,
+    settings,
+)
 
 
 class Quantity(NamedTuple):

@@ -40,10 +40,6 @@ def _hold(worm: Worm, radius_m: float) -> Case | None:
     return worm.case({**one_after_the_other(), _FIELD: radius_m})
 
 
-def _cases(effort: Effort) -> Sequence[Case]:
-    return design.cases_of(_points(effort))
-
-
 def _stiffness(radius_m: float) -> float:
     """Bending stiffness relative to that of the paper's strands."""
     return (radius_m / RADII_M[0]) ** 4
@@ -152,6 +148,6 @@ RADIUS = Examination(
     name="radius",
     title="Radius of the strands",
     question="Thicker strands of the same mass resist bending more. What becomes of elongation, force and rhythm?",
-    cases=_cases,
+    cases=lambda effort: design.cases_of(_points(effort)),
     examine=_examine,
 )

@@ -10,7 +10,6 @@ from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
 from annelid.config import WormBody
 from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
@@ -40,10 +39,6 @@ def _points(effort: Effort) -> list[Point]:
             changes = {_FIELD: limits}
             points.append(Point(worm, equal, worm.case(changes), worm.case({**one_after_the_other(), **changes})))
     return points
-
-
-def _cases(effort: Effort) -> Sequence[Case]:
-    return design.cases_of(_points(effort))
 
 
 class _Row(NamedTuple):
@@ -174,6 +169,6 @@ RANGES = Examination(
     title="Length ranges of the muscles",
     question="The engine of the paper's time gave each muscle a length range of its own. How much of the middle "
     "segment's deficit is left when all have the same?",
-    cases=_cases,
+    cases=lambda effort: design.cases_of(_points(effort)),
     examine=_examine,
 )

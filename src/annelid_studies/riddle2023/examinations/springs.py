@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.style import segment_colors
-from annelid.experiment.case import Case
 from annelid.morphology import Array
 from annelid.simulation.runfile import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
@@ -25,10 +24,6 @@ def _points(effort: Effort) -> list[Point]:
     worms = WORMS if effort == "full" else WORMS[1:]
     changes = {BILATERAL: None, TENSION_ONLY: {"body.springs.tension_only": True}}
     return [Point(worm, springs, worm.case(own)) for worm in worms for springs, own in changes.items()]
-
-
-def _cases(effort: Effort) -> Sequence[Case]:
-    return design.cases_of(_points(effort))
 
 
 Reach = tuple[Array, Array]
@@ -129,6 +124,6 @@ SPRINGS = Examination(
     title="Springs that push or only pull",
     question="The paper says that its axial springs act only in tension; the authors' files have them act both ways. "
     "Does it matter?",
-    cases=_cases,
+    cases=lambda effort: design.cases_of(_points(effort)),
     examine=_examine,
 )

@@ -79,10 +79,6 @@ def _points(effort: Effort) -> list[Point]:
     ]
 
 
-def _cases(effort: Effort) -> list[Case]:
-    return design.cases_of(_points(effort))
-
-
 def velocity_limit(config: RunConfig, segment: int = 0) -> float:
     """Returns the speed at which a ring muscle's force vanishes: vmax L0, with L0 = (r1 - r0) / 0.3, m/s.
 
@@ -322,6 +318,6 @@ TIMESTEP = Examination(
         "Do order, period and elongation depend on the integrator and its step, and are the first instants of a "
         "contraction resolved?"
     ),
-    cases=_cases,
+    cases=lambda effort: design.cases_of(_points(effort)),
     examine=_examine,
 )

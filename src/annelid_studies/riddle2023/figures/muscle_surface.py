@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.config import Rings
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.style import panel_title, segment_colors
+from annelid.morphology import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 SCALED_RANGE = (0.75, 1.05)
 """Scaled lengths between which a ring's operating range lies: MuJoCo's default."""

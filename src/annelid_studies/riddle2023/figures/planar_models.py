@@ -6,20 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.config import PlanarWorm, RunConfig, load_config
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.planar_scene import bent_rhombi, rhombi
 from annelid.draw.style import panel_title, segment_colors
 from annelid.errors import ConfigError
+from annelid.morphology import Array
 from annelid.protocols import Records
 from annelid.simulation import build_plant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 CAPTION = (
     "Three planar models of worm segments, each as its planar plant rests with the middle segment contracted: a) "

@@ -21,7 +21,7 @@ from annelid.draw.camera import picture_axes
 from annelid.draw.canvas import WIDTH_IN, canvas, save_both
 from annelid.draw.planar_scene import rhombi as flat_rhombi
 from annelid.draw.style import panel_title
-from annelid.morphology import MeshGeometry
+from annelid.morphology import Array, MeshGeometry
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
-Array = NDArray[np.float64]
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""

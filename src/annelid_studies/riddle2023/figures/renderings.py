@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.analysis.rhombi import nearest_frame
 from annelid.body import mesh_of
@@ -21,7 +21,7 @@ from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, postures_of, rende
 from annelid.draw.skeleton import Skeleton
 from annelid.draw.style import CONTRACTED, activation_color, panel_title
 from annelid.errors import RenderingUnavailable, RunFileError
-from annelid.morphology import MeshGeometry
+from annelid.morphology import Array, MeshGeometry
 from annelid.simulation.worm import compile_worm
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
-Array = NDArray[np.float64]
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""
 

@@ -1,4 +1,4 @@
-"""Results: order, period, elongations, cost."""
+"""What the worm does: the network and how it is wired to the body; order, period, elongations, cost."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from math import nan
 import numpy as np
 
 from annelid.analysis.elongation import end_difference, middle_deficit
+from annelid.analysis.rhythm import CONTRACTED
+from annelid.config import SnsController
 from annelid.experiment.case import Case
+from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
     PAPER_STEPS,
     PAPER_WALL_S,
+    PLANAR_CASES,
     Evidence,
     judged,
     near,
@@ -20,10 +24,87 @@ from annelid_studies.riddle2023.claims.evidence import (
     readings_m,
 )
 from annelid_studies.riddle2023.contents import Claim
+from annelid_studies.riddle2023.examinations.gate import VARIANTS, variant
 from annelid_studies.riddle2023.examinations.words import in_unit, span
-from annelid_studies.worms import FAST
+from annelid_studies.worms import FAST, fast, rods
 
-_claim = partial(Claim, "Results")
+_of_control = partial(Claim, "Sensing and control")
+GATES = "the worm and how its gates start"
+
+
+def control_claims(evidence: Evidence) -> list[Claim]:
+    """Judges the claims about sensing and the network."""
+    own = [outcome for outcome, _ in evidence.runs]
+    others = [evidence.results[case] for case in (PLANAR_CASES[300], fast(), rods())]
+    rhythms = [outcome.rhythm for outcome in (*own, *others)]
+    gates = {
+        start: [
+            evidence.results[variant(worm, *pair)].rhythm.is_one_wave
+            for worm, pairs in VARIANTS[evidence.effort].items()
+            for pair in pairs
+            if pair[0] == start
+        ]
+        for start in ("toolbox", "steady")
+    }
+    shares = [_half_centres(run) for _, run in evidence.runs]
+    flip = judged((both < 0.05 and following > 0.95 for both, following in shares), "the run")
+    return [
+        _of_control(
+            "The network of the 2D worm drives the 3D worm with little to no change.",
+            "sections 2.3, 5",
+            "little to no change",
+            f"in the order 1-2-3: {sum(rhythm.is_one_wave for rhythm in rhythms)} of {len(rhythms)} runs on four "
+            f"bodies, periods {span([rhythm.period_s or nan for rhythm in rhythms], digits=3)} s; with either "
+            f"update order of the network {sum(gates['toolbox'])} of {len(gates['toolbox'])}, with gates that start at "
+            f"rest {sum(gates['steady'])} of {len(gates['steady'])}",
+            "Neurons, synapses and conductances are the same on the planar worm, the paper's chain, its fast form and "
+            "the tight rods. What had to change lies around the network: the map from potentials to activation (Eq. "
+            "2), the sensors' tolerance (0.1 mm to 10 mm), and a hold of the first sensor for 0.2 s. The gates of the "
+            "sodium current start as in SNS-Toolbox; where they start at rest, all that differs is told above.",
+            f"{PLANAR_CASES[300].command}; {MAIN.command}",
+            *judged([rhythm.is_one_wave for rhythm in rhythms] + gates["toolbox"] + gates["steady"], GATES),
+        ),
+        _of_control(
+            "The sodium current is Hodgkin and Huxley's fast transient current.",
+            "section 2.3",
+            "fast transient",
+            "persistent sodium current with a slow gate",
+            "The equations have instantaneous activation and a gate of up to 300 ms, which sets the period. The name "
+            "changes nothing in the results.",
+            "annelid presets riddle2023",
+            "does not hold",
+        ),
+        _of_control(
+            "Half-centre neurons flip between excited and inhibited states, and the muscle follows the excited one.",
+            "section 2.3, Fig. 7",
+            "Fig. 7",
+            f"both of a segment's neurons above R/2 in {span((both for both, _ in shares), 100, 1)} % of samples",
+            "It holds if both are excited in less than 5 % of the samples and activation follows in more than 95 %. "
+            "Activation above one half goes with the contraction neuron being the higher one in "
+            f"{span((following for _, following in shares), 100, 1)} % of the samples; figure 7 shows both.",
+            MAIN.command,
+            *flip,
+        ),
+    ]
+
+
+def _half_centres(run: Run) -> tuple[float, float]:
+    """Share of samples in which both neurons of a half-centre are excited, and in which activation follows them."""
+    data, controller = run.data, run.config.controller
+    assert isinstance(controller, SnsController)
+    names = [str(name) for name in data["neuron"].values]
+    segments = range(1, run.config.body.n_segments + 1)
+    contraction, expansion = (
+        data["potential"].values[:, [names.index(f"{role}_{segment}") for segment in segments]]
+        for role in ("contraction", "expansion")
+    )
+    half = controller.range_mV / 2
+    both = (contraction > half) & (expansion > half)
+    following = (contraction > expansion) == (data["activation"].values > CONTRACTED)
+    return float(both.mean()), float(following.mean())
+
+
+_of_results = partial(Claim, "Results")
 SPRING = "how the elongation is read"
 
 
@@ -36,7 +117,7 @@ def result_claims(evidence: Evidence) -> list[Claim]:
     order = judged((rhythm.is_one_wave for rhythm in rhythms), "the run")
     period = near(periods, 2.6, "the run")
     return [
-        _claim(
+        _of_results(
             "The wave runs from segment 1 to 3 and repeats, as in 2D.",
             "section 3, Fig. 7",
             "1-2-3",
@@ -45,7 +126,7 @@ def result_claims(evidence: Evidence) -> list[Claim]:
             MAIN.command,
             *order,
         ),
-        _claim(
+        _of_results(
             "A cycle of the three-segment worm takes about 2.6 s.",
             "Fig. 7",
             "about 2.6 s, read off Fig. 7",
@@ -69,7 +150,7 @@ def _elongation_claims(evidence: Evidence) -> list[Claim]:
         ours = read[:, segment - 1]
         verdict = near(ours.ravel(), paper_m, SPRING)
         claims.append(
-            _claim(
+            _of_results(
                 f"Segment {segment} elongates by at most {100 * paper_m:.2f} cm.",
                 "section 3",
                 f"{100 * paper_m:.2f} cm",
@@ -100,7 +181,7 @@ def _elongation_claims(evidence: Evidence) -> list[Claim]:
         verdict = near(ours.ravel(), paper, SPRING)
         text = f"{100 * paper:g} %"
         claims.append(
-            _claim(
+            _of_results(
                 claim,
                 "section 3",
                 text,
@@ -123,7 +204,7 @@ def _by_reading(ours: np.ndarray, unit: str, digits: int = 2) -> str:
 def cost_claim(evidence: Evidence) -> Claim:
     """Judges the claim about the cost of computing."""
     spent, fast = evidence.runs[0][0].cpu_time_s, evidence.results[Case(FAST)].cpu_time_s
-    return _claim(
+    return _of_results(
         f"{PAPER_STEPS} steps take 3.5 minutes.",
         "section 3",
         f"{1e3 * PAPER_WALL_S / PAPER_STEPS:.0f} ms a step",

@@ -263,7 +263,7 @@ def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim])
         _what_still_differs(variants, theirs),
     ]
     if claims:
-        paragraphs.append(f"Of the {len(claims)} claims of the paper that are examined here, {tally(claims)}.")
+        paragraphs.append(f"Verdicts on the {len(claims)} claims of the paper that are examined here: {tally(claims)}.")
     paragraphs.append(
         f"Three worms stand side by side in what follows: the paper's chain (preset {CHAIN}, in the examinations at "
         f"steps of 2 ms), whose pins give; sprung rods ({FAST}), the same robot in seconds with pins of the same "

@@ -1,4 +1,4 @@
-"""Discussion and future work: propagation, the weak middle, the robot, travel; noise, friction, adaptive gaits, slip."""
+"""Discussion and future work: propagation, weak middle, robot, travel; noise, friction, adaptive gaits, slip."""
 
 from __future__ import annotations
 

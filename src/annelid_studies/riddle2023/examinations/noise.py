@@ -169,6 +169,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         _Read(chart, cells, {place: cells[place] for place in sorted(common)} if common else cells)
         for chart, cells in mapped.items()
     ]
+    noisy_maps = [one for one in maps if max(one.chart.noises_m) > 0]
     _draw(maps, stem)
     numbers: dict[str, float | str | None] = {"noise_common_cells": float(len(common))}
     for one in maps:
@@ -189,10 +190,10 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         numbers |= {f"{name}_{one.worm.name}": value for name, value in of_worm.items()}
     remarks = [
         "The largest tested tolerance with an even wave is so many times the smallest: "
-        f"{words.listed(f'{one.breadth:.1f} ({one.worm.label})' for one in maps if one.even_window)}. The true windows "
+        f"{words.told((one for one in maps if one.even_window), lambda one: f'{one.breadth:.1f}')}. The true windows "
         "are wider, by up to the next tested tolerances.",
         "The paper supposes that noise is handled by changing the sensor's threshold. The tolerances that keep every "
-        f"run in order, by noise: {'; '.join(_by_noise(one) for one in maps if len(one.chart.noises_m) > 1)}.",
+        f"run in order, by noise: {'; '.join(_by_noise(one) for one in noisy_maps)}.",
         _sensor_in_words(maps),
     ]
     if effort == "full":
@@ -209,8 +210,17 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         )
     else:
         remarks.append(f"The quick effort runs {PAPERS.label} at its own tolerance only.")
+    windows = words.told(maps, lambda one: f"{_in_mm(one.window)}, evenly {_in_mm(one.even_window)}")
+    handled = words.told(
+        noisy_maps,
+        lambda one: f"{words.in_unit(handled_noise(one.cells), MM, 0)} of {MM * max(one.chart.noises_m):g} mm",
+    )
     return Findings(
-        answer=f"{_windows_in_words(maps)} {_fragility_in_words(maps, bool(common))} {_noise_in_words(maps)}",
+        answer=(
+            f"Without noise the worm walks in one wave 1-2-3 at tolerances of {windows}. "
+            f"{_fragility_in_words(maps, bool(common))} The largest noise under which some tolerance keeps every run "
+            f"in this wave is, of the largest tested, {handled}."
+        ),
         caption=(
             "Rhythm in closed loop over the tolerance of the stretch sensors and the standard deviation of their "
             "noise. A cell's shade is the most frequent rhythm of its runs; the text says how many of them walk in a "
@@ -250,7 +260,7 @@ def _of_walks(name: str) -> Callable[[_Row], str]:
 _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
     "worm": lambda row: row[0].worm.label,
     "noise (mm)": lambda row: f"{MM * row[1]:g}",
-    "all walk at (mm)": lambda row: _in_mm(steady_tolerances(row[0].cells, row[1]), row[0].chart).removesuffix(" mm"),
+    "all walk at (mm)": lambda row: _in_mm(steady_tolerances(row[0].cells, row[1])).removesuffix(" mm"),
     "walk 1-2-3": lambda row: f"{sum(map(ONE_WAVE, row[2]))} of {len(row[2])}",
     "evenly": lambda row: str(sum(map(is_even, row[2]))),
     "other order": _count("other order"),
@@ -261,39 +271,17 @@ _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
 }
 
 
-def _in_mm(lengths_m: Sequence[float], chart: NoiseMap | None = None) -> str:
-    """Lists lengths, or gives their range where they are neighbours among the tolerances of a map."""
-    if not lengths_m:
-        return "none"
-    tested = sorted(chart.tolerances_m) if chart else []
-    first = tested.index(lengths_m[0]) if chart else 0
-    if len(lengths_m) > 1 and tested[first : first + len(lengths_m)] == list(lengths_m):
-        return f"{MM * lengths_m[0]:g} to {MM * lengths_m[-1]:g} mm"
-    return f"{words.listed(f'{MM * length:g}' for length in lengths_m)} mm"
-
-
-def _windows_in_words(maps: Sequence[_Read]) -> str:
-    parts = words.listed(
-        f"{_in_mm(one.window, one.chart)} ({one.worm.label}; evenly at {_in_mm(one.even_window, one.chart)})"
-        for one in maps
-    )
-    return f"Without noise the worm walks in one wave 1-2-3 at tolerances of {parts}."
+def _in_mm(lengths_m: Sequence[float]) -> str:
+    return f"{words.listed(f'{MM * length:g}' for length in lengths_m)}{' mm' if lengths_m else ''}"
 
 
 def _fragility_in_words(maps: Sequence[_Read], in_common: bool) -> str:
     where = f"the {len(maps[0].compared)} cells that the three maps share" if in_common else "each map's own cells"
-    measures = [
-        {one.worm: measure(one) for one in maps}
-        for measure in (
-            lambda one: share(one.compared),
-            lambda one: share(one.compared, is_even),
-            lambda one: one.breadth,
-        )
-    ]
-    walking, evenly, _ = measures
-    parts = words.listed(
-        f"{words.in_percent(walking[one.worm])} % ({one.worm.label}; {words.in_percent(evenly[one.worm])} % evenly)"
-        for one in maps
+    walking = {one.worm: share(one.compared) for one in maps}
+    evenly = {one.worm: share(one.compared, is_even) for one in maps}
+    measures = (walking, evenly, {one.worm: one.breadth for one in maps})
+    parts = words.told(
+        maps, lambda one: f"{words.in_percent(walking[one.worm])} %, {words.in_percent(evenly[one.worm])} % evenly"
     )
     fact = f"Of the runs in {where}, {parts} walk."
     if not in_common:
@@ -306,21 +294,10 @@ def _fragility_in_words(maps: Sequence[_Read], in_common: bool) -> str:
     return f"{fact} So {verdict}."
 
 
-def _noise_in_words(maps: Sequence[_Read]) -> str:
-    parts = []
-    for one in maps:
-        most, reached = max(one.chart.noises_m), handled_noise(one.cells)
-        if most:
-            text = "none" if reached is None else f"{MM * reached:g} mm"
-            parts.append(f"{text} ({one.worm.label}; up to {MM * most:g} mm tested)")
-    return f"The largest noise under which some tolerance keeps every run in this wave is {words.listed(parts)}."
-
-
 def _by_noise(one: _Read) -> str:
     parts = [
-        f"{_in_mm(steady_tolerances(one.cells, noise), one.chart)} under noise of {MM * noise:g} mm"
-        for noise in one.chart.noises_m
-        if noise
+        f"{_in_mm(steady_tolerances(one.cells, noise))} under noise of {MM * noise:g} mm"
+        for noise in one.chart.noises_m[1:]
     ]
     return f"{one.worm.label} (own tolerance {MM * one.worm.tolerance_m:g} mm), {', '.join(parts)}"
 

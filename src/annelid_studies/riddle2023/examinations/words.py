@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from math import isfinite
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from annelid.analysis import RhythmScore
 from annelid.morphology import Array
-from annelid_studies.riddle2023.examinations.design import Reading, number
+from annelid_studies.riddle2023.examinations.design import Reading, Worm, number
 
 CM, MM, PERCENT = 100.0, 1000.0, 100.0
 NOTHING = "–"
@@ -56,9 +57,21 @@ def listed(words: Iterable[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"
 
 
-def told(readings: Iterable[Reading], text: Callable[[Reading], str]) -> str:
-    """Lists what is said of readings, each with its worm's label in brackets."""
-    return listed(f"{text(one)} ({one.worm.label})" for one in readings)
+class OfWorm(Protocol):
+    """What was found of one worm."""
+
+    @property
+    def worm(self) -> Worm:
+        """The worm."""
+        ...
+
+
+Found = TypeVar("Found", bound=OfWorm)
+
+
+def told(found: Iterable[Found], text: Callable[[Found], str]) -> str:
+    """Lists what is said of things found, each with its worm's label in brackets."""
+    return listed(f"{text(one)} ({one.worm.label})" for one in found)
 
 
 def labels(readings: Iterable[Reading]) -> str:

@@ -1,10 +1,10 @@
 """How wide the range is in which a controller walks: a designed sample of worms, each walked by every controller.
 
 The sample is a Latin hypercube of 300 points over sensor noise, friction, physics step, number of segments, stiffness
-and seeds. It was drawn once, by `draw`, and lies in ``robustness.csv``. The worms are rods with rigid
-crossings. A point is *walked* if the rhythm is ordered, in one wave from front to rear, and *in time* if its period is
-also within 10 % of design. The robust controller's network starts from its design, from silence, and from random
-states in turn; the paper's from its own start, its best case. The first two turns are not judged.
+and seeds. It was drawn once and lies in ``robustness.csv``; how it was drawn is in its test. The worms are rods with
+rigid crossings. A point is *walked* if the rhythm is ordered, in one wave from front to rear, and *in time* if its
+period is also within 10 % of design. The robust controller's network starts from its design, from silence, and from
+random states in turn; the paper's from its own start, its best case. The first two turns are not judged.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ from importlib.resources import files
 from math import sqrt
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.score import DESIGN_INTERVAL_S
@@ -138,35 +136,6 @@ class Judged:
     in_time: bool
     lengthened: bool
     code: str
-
-
-def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
-    """Draws a Latin hypercube: every quantity has one point in each of ``n_points`` strata of equal weight.
-
-    Noise is spread evenly over 0 .. 5 mm; friction over 0.05 .. 1.5, step over 1 .. 10 ms and stiffness over 0.3 .. 2
-    GPa evenly in the logarithm; segments evenly over 3 .. 24. Steps are rounded to whole ms.
-
-    Args:
-        n_points: Number of points.
-        seed: Of the draw.
-    """
-    rng = np.random.default_rng(seed)
-    unit = np.column_stack([(rng.permutation(n_points) + rng.random(n_points)) / n_points for _ in range(5)])
-
-    def log_spread(share: float, low: float, high: float) -> float:
-        return low * (high / low) ** share
-
-    return [
-        Point(
-            noise_m=round(0.005 * noise, 6),
-            friction=round(log_spread(friction, 0.05, 1.5), 4),
-            physics_timestep_ms=round(log_spread(step, 1.0, 10.0)),
-            n_segments=3 + int(22 * segments),
-            young_modulus_Pa=round(log_spread(stiffness, 0.3e9, 2.0e9), -5),
-            seed=i,
-        )
-        for i, (noise, friction, step, segments, stiffness) in enumerate(unit.tolist())
-    ]
 
 
 def points() -> tuple[Point, ...]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
@@ -16,12 +19,15 @@ from annelid.draw.markdown import Table
 from annelid.draw.plots import figure7
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
+from annelid.experiment.fingerprint import code_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Workers
 from annelid.nervous import PeristalsisParameters, peristalsis_network
+from annelid.output import whole_file
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run
+from annelid.textfiles import read_json
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
 from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, tally
@@ -36,7 +42,6 @@ from annelid_studies.riddle2023.figures import (
     renderings,
     robot_lengths,
 )
-from annelid_studies.riddle2023.kept import kept
 from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, rods
 
 Progress = Callable[[str, int, int, float], object]
@@ -182,6 +187,31 @@ FIGURES: Mapping[int, tuple[str, Callable[[Run, Series, Path], str]]] = {
     ),
 }
 """Number: title, and what draws it and returns its caption. Figure 3 is a photograph of the robot."""
+
+
+def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Returns what goes with a picture: as it was kept, or made anew where code, runs or picture have changed.
+
+    Args:
+        stem: Path of the picture without suffix; ``<stem>.svg`` and ``<stem>.png`` are the picture, and
+            ``<stem>.json`` keeps what goes with it.
+        made_of: All that the picture depends on beside annelid's code, of plain numbers, words and lists.
+        make: Draws the picture and returns what goes with it, ready for JSON.
+    """
+    mark = hashlib.sha256(json.dumps([code_fingerprint(), *made_of]).encode()).hexdigest()
+    note = stem.with_name(f"{stem.name}.json")
+    pictures = [stem.with_name(f"{stem.name}{suffix}") for suffix in (".svg", ".png")]
+    try:
+        content = read_json(note)
+        if content["mark"] == mark and all(picture.exists() for picture in pictures):
+            return content["found"]
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    note.unlink(missing_ok=True)
+    found = make()
+    with whole_file(note) as draft:
+        draft.write_text(json.dumps({"mark": mark, "found": found}), encoding="utf-8")
+    return found
 
 
 def _examined(examination: Examination, effort: Effort, results: Results, folder: Path) -> Examined:

@@ -31,7 +31,7 @@ def bench_command(
     --cases levels      the levels of --fidelity
     --cases steps       physics steps of 1 to 40 ms
     --cases elements    1 to 6 elements a rhombus side
-    --cases segments    rods of 3 to 47 segments
+    --cases segments    rods of 3 to 30 segments
     --cases chain       the paper's formulation, 3 to 12 segments
     --cases duration    10 and 60 s, for the memory
     --cases peer        free rods of PyElastica, if it is installed

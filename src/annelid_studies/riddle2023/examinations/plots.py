@@ -9,7 +9,7 @@ import numpy as np
 
 from annelid.draw.style import panel_title, segment_colors
 from annelid_studies.riddle2023.examinations import words
-from annelid_studies.riddle2023.examinations.design import WORMS, Reading, Worm, by_worm
+from annelid_studies.riddle2023.examinations.design import WORMS, Reading, by_worm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,9 +110,9 @@ def segment_handles(n_segments: int = 3) -> list[Line2D]:
     return [look_handle(f"segment {i}", color=color, linewidth=3.0) for i, color in colors]
 
 
-def worm_handles(worms: Iterable[Worm] = WORMS) -> list[Line2D]:
+def worm_handles() -> list[Line2D]:
     """Returns handles for a legend of the worms' looks."""
-    return [look_handle(**worm.look) for worm in worms]
+    return [look_handle(**worm.look) for worm in WORMS]
 
 
 def look_handle(label: str, *, hollow: bool = False, color: Any = "0.25", **look: Any) -> Line2D:

@@ -13,7 +13,7 @@ from annelid.draw.canvas import canvas, save_both
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
 from annelid_studies.riddle2023.examinations.words import PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import chain, one_after_the_other
@@ -49,7 +49,7 @@ class _Row(NamedTuple):
     equal: Reading
 
     @property
-    def worm(self) -> Any:
+    def worm(self) -> Worm:
         return self.compiled.worm
 
 

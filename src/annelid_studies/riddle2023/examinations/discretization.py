@@ -218,8 +218,8 @@ def _walks_in_words(walks: Sequence[Reading]) -> str:
     periods = [one.period_s for one in good if one.period_s is not None]
     return (
         f"In closed loop {TIGHT.label} walk 1-2-3 with {words.listed(f'{one.value:g}' for one in good)} elements a "
-        f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s; of "
-        f"those tried, not with {words.listed(bad)}."
+        f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s, "
+        f"and fail with {words.listed(bad)}."
     )
 
 

@@ -83,9 +83,15 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     for worm, own in design.by_worm(readings).items():
         numbers[f"frictions_that_walk_{worm.name}"] = words.listed(f"{one.value:g}" for one in own if one.walks)
     small = [one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M]
-    parts = [rough.held_deficit - slippery.held_deficit for slippery, rough in design.by_worm(held).values()]
+    parts = [rough.held_deficit - smooth.held_deficit for smooth, rough in design.by_worm(held).values()]
     travels = words.told(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm")
-    deficits = words.told(held, lambda one: f"{words.in_percent(one.held_deficit)} % at {one.value:g}")
+    slippery = {one.worm: words.in_percent(one.held_deficit) for one in held if one.value == SLIPPERY}
+    deficits = words.told(
+        (one for one in held if one.value == PAPERS_FRICTION),
+        lambda one: (
+            f"{slippery[one.worm]} % at {SLIPPERY:g} and {words.in_percent(one.held_deficit)} % at {one.value:g}"
+        ),
+    )
     return Findings(
         answer=(
             f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is negligible "
@@ -125,9 +131,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
 def _orders(worm: Worm, own: Sequence[Reading]) -> str:
     fail = [f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in own if not one.walks]
     walk = words.listed(f"{one.value:g}" for one in own if one.walks)
-    return (
-        f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}; of those tried, not at {words.listed(fail)}."
-    )
+    return f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}, lost at {words.listed(fail)}."
 
 
 def _convergence(solved: dict[tuple[float, float], float]) -> str:

@@ -154,7 +154,8 @@ def _answer(beats: Sequence[Beat]) -> str:
         }
         failing = [f"{worm.label} ({words.listed(of_worm)})" for worm, of_worm in kinds.items() if of_worm]
         walking.append(
-            f"with the {start} start of the gates {len(own) - len(failing)} of {len(own)}, not {words.listed(failing)}"
+            f"with the {start} start of the gates {len(own) - len(failing)} of {len(own)} "
+            f"(others: {words.listed(failing)})"
         )
         lasting.append(f"{words.span(beat.first_s for beat in beats if beat.start == start)} s with the {start} start")
     changed = sum(len({words.kind(beat.rhythm) for beat in group}) > 1 for group in groups.values())

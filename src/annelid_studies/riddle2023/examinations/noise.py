@@ -210,14 +210,15 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         )
     else:
         remarks.append(f"The quick effort runs {PAPERS.label} at its own tolerance only.")
-    windows = words.told(maps, lambda one: f"{_in_mm(one.window)}, evenly {_in_mm(one.even_window)}")
     handled = words.told(
         noisy_maps,
         lambda one: f"{words.in_unit(handled_noise(one.cells), MM, 0)} of {MM * max(one.chart.noises_m):g} mm",
     )
     return Findings(
         answer=(
-            f"Without noise the worm walks in one wave 1-2-3 at tolerances of {windows}. "
+            f"Without noise the worm walks in one wave 1-2-3 at tolerances of "
+            f"{words.told(maps, lambda one: _in_mm(one.window))}, and evenly at "
+            f"{words.told(maps, lambda one: _in_mm(one.even_window))}. "
             f"{_fragility_in_words(maps, bool(common))} The largest noise under which some tolerance keeps every run "
             f"in this wave is, of the largest tested, {handled}."
         ),
@@ -280,10 +281,10 @@ def _fragility_in_words(maps: Sequence[_Read], in_common: bool) -> str:
     walking = {one.worm: share(one.compared) for one in maps}
     evenly = {one.worm: share(one.compared, is_even) for one in maps}
     measures = (walking, evenly, {one.worm: one.breadth for one in maps})
-    parts = words.told(
-        maps, lambda one: f"{words.in_percent(walking[one.worm])} %, {words.in_percent(evenly[one.worm])} % evenly"
+    parts, even_parts = (
+        words.told(maps, lambda one, of=measure: f"{words.in_percent(of[one.worm])} %") for measure in (walking, evenly)
     )
-    fact = f"Of the runs in {where}, {parts} walk."
+    fact = f"Of the runs in {where}, {parts} walk, {even_parts} evenly."
     if not in_common:
         return fact
     wider = sum(measure[TIGHT] > 1.05 * max(measure[PAPERS], measure[SPRUNG]) for measure in measures)

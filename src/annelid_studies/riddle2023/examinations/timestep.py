@@ -188,7 +188,7 @@ def _walks_in_words(own: Sequence[Reading]) -> str:
     helix = words.in_percent(_spread([one.walked_helix_m[0] for one in good]))
     return (
         f"{words.capitalised(own[0].worm.label)}: walks 1-2-3 at {words.listed(_ms(one.value) for one in good)} ms "
-        f"(elongation of segment 1 within {mean} %, on its first helix within {helix} %), not at {bad}."
+        f"(elongation of segment 1 within {mean} %, on its first helix within {helix} %) and fails at {bad}."
     )
 
 

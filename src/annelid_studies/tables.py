@@ -36,7 +36,9 @@ def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str =
 
     shown = TerminalTable(title=title, caption=caption or None)
     for i, head in enumerate(table.header):
-        shown.add_column(head, justify="left" if i < n_words else "right", no_wrap=i < n_words)
+        # Heads of numbers stand one word a line: on a narrow terminal words fold before numbers do.
+        name = head if i < n_words else head.replace(" ", "\n")
+        shown.add_column(name, justify="left" if i < n_words else "right", overflow="fold")
     for row in table.rows:
         shown.add_row(*row)
     return shown

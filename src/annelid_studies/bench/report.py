@@ -55,13 +55,16 @@ def _row(entry: Mapping[str, Any], references: Sequence[str]) -> list[str]:
     compared = entry.get("errors", {})
     if compared and entry["rhythm"]["verdict"] != "ordered":
         name = f"{name}: {entry['rhythm']['reason']}"
-    largest = [compared[reference]["largest"] if reference in compared else None for reference in references]
-    percents = [_shown(error and 100.0 * error, ".2f") if compared else "" for error in largest]
+    percents = [_percent(compared[reference]["largest"]) if reference in compared else "" for reference in references]
     return [name, *_numbers(entry), _shown(entry["peak_memory_MB"], ".0f"), *percents]
 
 
 def _numbers(entry: Mapping[str, Any]) -> list[str]:
     return [_shown(entry[key], ".3g") for key in ("step_mean_ms", "real_time_factor")]
+
+
+def _percent(error: float | None) -> str:
+    return _shown(None if error is None else 100.0 * error, ".2f")
 
 
 def _shown(value: float | None, digits: str) -> str:

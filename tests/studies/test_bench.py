@@ -223,7 +223,7 @@ class TestJudging:
     def test_exponents_over_both_ranges(self) -> None:
         cases = bench_cases("full", ["segments"])
         found = judge(cases, as_measured(cases))["cost_exponents"]
-        assert found[RODS] == pytest.approx({"3-47": 1.0, "12-47": 1.0})
+        assert found[RODS] == pytest.approx({"3-30": 1.0, "12-30": 1.0})
         assert found[CHAIN] == {}
 
     def test_a_failed_case_is_named_with_its_reason(self) -> None:
@@ -376,7 +376,7 @@ class TestPicture:
         path = bench_figure(self.report("full"), tmp_path / "bench")
         assert path.read_bytes().startswith(b"\x89PNG")
         text = path.with_suffix(".svg").read_text()
-        for words in ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..47)", "constraint"):
+        for words in ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..30)", "constraint"):
             assert f"<!-- {words}" in text or words in text, words
 
     @pytest.mark.parametrize("lines", [["peer"], ["chain"], ["levels"], ["duration"], ["steps"]])

@@ -22,7 +22,7 @@ from annelid_studies.worms import CHAIN, RODS
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"
 
-SCALED_SEGMENTS = (12, 47)
+SCALED_SEGMENTS = (12, 30)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
 
 SCHEMA = {

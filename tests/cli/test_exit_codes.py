@@ -15,7 +15,7 @@ from outcome import Command
 from annelid.cli import entry
 from annelid.errors import ConfigError, RunKilled
 from annelid.experiment.attempt import Files, Task, attempt
-from annelid.experiment.sweep.sweeping import Sweep
+from annelid.experiment.sweep import Sweep
 from annelid.experiment.workers import Result, Workers
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
@@ -73,8 +73,7 @@ def test_a_sweep_that_says_nothing_else_says_what_happened_to_its_runs(
 
 
 def test_a_sweep_tells_of_runs_that_a_guard_stopped(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    from annelid.experiment.sweep import swept
-    from annelid.experiment.sweep.sweeping import SweepRun
+    from annelid.experiment.sweep import SweepRun, swept
 
     def stopped(*words: object, **options: object) -> Sweep:
         done = swept(*words, **options)  # type: ignore[arg-type]

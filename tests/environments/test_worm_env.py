@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from worms import CHEAP, same
 
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
 from annelid.environments.reward import Deed, reward_terms
 from annelid.environments.task import Weights

@@ -33,7 +33,7 @@ def refusal(run: Run, tmp_path: Path, payload: bytes) -> str:
     """Puts a payload into both slots of a copy of a run, and returns how its continuation is refused."""
     path = shutil.copy(run.path, tmp_path / "run.nc")
     with h5py.File(path, "r+") as file:
-        file.attrs.pop("run_file_version", None)
+        file.attrs.pop("schema_version", None)
         for number, name in enumerate(SLOTS, start=1):
             slot = file[name]
             assert isinstance(slot, h5py.Dataset)

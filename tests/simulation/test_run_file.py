@@ -7,6 +7,8 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +20,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy import N, SavedToyPlant, ToyController, ToyPlant, toy_config, without_digest
 
+from annelid.config import load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid.protocols import Recordable, Signal
 from annelid.simulation import Run, container, loop, open_run, simulate
 from annelid.simulation.container import RawWriter, Variable
+from annelid.simulation.runfile import SCHEMA_VERSION, read_config, verify_run
 
 
 def toy_run(out: Path, **overrides: object) -> Run:
@@ -84,6 +88,63 @@ def test_folder_and_file_open_alike(run: Run) -> None:
         assert again.status == "complete"
         assert again.message == ""
         xarray.testing.assert_identical(again.data, run.data)
+
+
+NEWER_THAN_0_1 = {
+    "": ["turning"],
+    "body": ["heading_deg", "joints"],
+    "body.strands": ["damping_time_s", "loss_factor", "loss_frequency_Hz"],
+    "body.springs": ["sensors"],
+    "body.rings": ["kind"],
+    "body.formulation": [
+        "lateral_damping_Nms_per_rad",
+        "pins",
+        "pin_stiffness_N_per_m",
+        "pin_damping_Ns_per_m",
+        "pin_inertance_kg",
+    ],
+    "arena": ["kind", "backward_friction", "friction_cone", "slope_deg", "rail_gap_m", "posts"],
+    "guard": ["depth_m", "stretch", "ring_closure"],
+}
+
+
+def test_a_file_of_annelid_0_1_is_read(run: Run, tmp_path: Path) -> None:
+    own = {"body.strands.joint_damping_Nms_per_rad": 0.07, "body.mesh.n_segments": 4, "arena.friction": 0.4}
+    config = load_config("riddle2023-fast", {"body": {"kind": "worm"}, "arena": {}} | own)
+    tree = config.model_dump(mode="json")
+    for path, fields in NEWER_THAN_0_1.items():
+        section = reduce(getitem, filter(None, path.split(".")), tree)
+        for field in fields:
+            del section[field]
+    shutil.copy(run.path, tmp_path)
+    with without_digest(tmp_path / "run.nc") as file:
+        del file["warnings"], file["cpu_time"]
+        file.attrs["config"] = json.dumps(tree)
+    old = open_run(tmp_path)
+    assert old.config == read_config(tmp_path) == config
+    assert (old.status, old.warnings, old.cpu_time_s) == (run.status, (), 0.0)
+    xarray.testing.assert_equal(old.data, run.data)
+    assert "older version" in verify_run(tmp_path)
+
+
+def test_a_file_of_a_newer_schema_is_refused(run: Run, tmp_path: Path) -> None:
+    shutil.copy(run.path, tmp_path)
+    with without_digest(tmp_path / "run.nc") as file:
+        file.attrs["schema_version"] = SCHEMA_VERSION + 6
+        file.create_dataset("packed", data=np.zeros(100), compression="gzip")
+    for read in (open_run, read_config, verify_run):
+        with pytest.raises(
+            RunFileError, match=f"version {SCHEMA_VERSION + 6}, .* none above {SCHEMA_VERSION}: a newer"
+        ):
+            read(tmp_path)
+
+
+def test_a_schema_that_is_no_number_is_damage(run: Run, tmp_path: Path) -> None:
+    shutil.copy(run.path, tmp_path)
+    with without_digest(tmp_path / "run.nc") as file:
+        file.attrs["schema_version"] = "two"
+    with pytest.raises(RunFileError, match="damaged: its schema_version is not one whole number"):
+        open_run(tmp_path)
 
 
 def test_missing_foreign_and_damaged_files_are_named(run: Run, tmp_path: Path) -> None:

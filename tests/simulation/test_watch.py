@@ -12,7 +12,8 @@ import pytest
 import xarray
 
 from annelid import load_config, open_run, simulate, simulate_batch, summary
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.simulation.watch import Energies, Watch
 
@@ -245,5 +246,5 @@ def test_a_planar_run_and_a_file_of_before_have_no_warnings(tmp_path: Path) -> N
     run = simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), tmp_path, progress=False)
     assert run.warnings == ()
     with h5py.File(run.path, "r+") as file:
-        del file["warnings"], file.attrs["run_file_version"]
+        del file["warnings"], file.attrs["schema_version"]
     assert open_run(tmp_path).warnings == ()

@@ -186,7 +186,7 @@ def without_digest(path: Path) -> Iterator[h5py.File]:
     HDF5 cuts off what lies behind its data when it has changed a file.
     """
     with h5py.File(path, "r+") as file:
-        file.attrs.pop("run_file_version", None)
+        file.attrs.pop("schema_version", None)
         yield file
 
 

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
 from annelid.experiment.calibration import frame
 from annelid.experiment.calibration.fit import Calibration, calibrate, identifiability, places

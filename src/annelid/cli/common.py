@@ -115,14 +115,14 @@ def config_of(
     Raises:
         ConfigError: There is no such preset, file, level of fidelity or arena, or a value is out of range.
     """
-    from annelid.config import PlanarWorm, load_config
+    from annelid.config import load_config
 
     options = {"--segments": segments, "--fidelity": fidelity, "--uncertainty": uncertainty}
     refitting = [option for option, value in options.items() if value is not None]
     # An empty name, as from an unset variable of a shell, must not pass for none.
     source = (RIGID_PRESET if refitting else FIRST_PRESET) if preset is None else preset
     if segments is not None:
-        planar = isinstance(load_config(source).body, PlanarWorm)
+        planar = load_config(source).body.is_planar
         overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
     config = load_config(source, overrides, fidelity=fidelity, arena=arena)
     if preset is None and refitting:

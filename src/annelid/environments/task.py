@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from annelid.analysis.passage import reach_of
 from annelid.body import mesh_of
-from annelid.config import LEVELS, Clock, Pipe, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, Clock, RunConfig, load_config
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 
 COARSE = "coarse"
@@ -139,7 +139,8 @@ def _whole(name: str, value: float, unit_name: str, unit: float) -> int:
 
 def _goal_m(config: RunConfig) -> float | None:
     """Returns where the middle of a worm has passed a pipe: behind all that bends or narrows, else a body length on."""
-    if not isinstance(config.arena, Pipe):
+    reach_m = config.arena.reach_m() if config.arena is not None else None
+    if reach_m is None:
         return None
     assert isinstance(config.body, WormBody)
-    return reach_of(config.arena)[1] or mesh_of(config.body.mesh).length_m
+    return reach_m[1] or mesh_of(config.body.mesh).length_m

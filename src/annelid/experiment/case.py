@@ -10,7 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config, toml_value
 from annelid.errors import ConfigError
 from annelid.plausibility import refuse_nonsense
 
@@ -21,7 +22,7 @@ SHEAR_OVER_YOUNG = 1.0 / 1.5
 _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
 
 # Milliseconds of one core for each evaluation of the dynamics, only to start the longest runs first.
-_COST_MS = {"chain": 3.8, "rods": 4.5, "planar": 0.05}
+_PLANAR_STEP_MS = 0.05
 
 
 class Work(ABC):
@@ -52,13 +53,9 @@ class Work(ABC):
         body, clock = self.config.body, self.config.clock
         evaluations = self.config.duration_s / clock.physics_timestep_s
         if not isinstance(body, WormBody):
-            return evaluations * _COST_MS["planar"] / 1e3
-        formulation = body.formulation
-        chain = isinstance(formulation, Chain)
-        if isinstance(formulation, Chain) and formulation.integrator == "RK4":
-            evaluations *= 4
+            return evaluations * _PLANAR_STEP_MS / 1e3
         size = body.mesh.n_segments / 3 * body.mesh.elements_per_side / 3
-        return evaluations * size * _COST_MS["chain" if chain else "rods"] / 1e3
+        return evaluations * size * body.formulation.step_cost_ms / 1e3
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
-from annelid.config import Program
 from annelid.simulation.runfile import Run
 
 
@@ -112,9 +111,8 @@ def read_outcome(path: Path, reader: str) -> Outcome:
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:
-    program = run.config.controller
-    data = run.data
-    if not isinstance(program, Program) or not data.sizes.get("time"):
+    contractions, data = run.config.controller.laid_down, run.data
+    if not contractions or not data.sizes.get("time"):
         return ()
     times = data["time"].values
     n_segments = run.config.body.n_segments
@@ -122,7 +120,7 @@ def _holds(run: Run) -> tuple[Hold, ...]:
     ring = data["ring_length"].values.reshape(len(times), n_segments, -1).sum(axis=2)
     force = _segment_means(data["muscle_force"].values, n_segments) if "muscle_force" in data else None
     holds = []
-    for contraction in program.contractions:
+    for contraction in contractions:
         within = np.flatnonzero(times <= contraction.stop_s + 1e-9)
         if times[-1] < contraction.stop_s - 2 * float(np.diff(times).max(initial=0.0)):
             continue

@@ -17,6 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, 
 from contextlib import contextmanager
 from pathlib import Path
 
+from annelid.config.kinds import kinds_in
 from annelid.errors import ClusterError, RunFileError
 from annelid.experiment.attempt import (
     DRAFTS,
@@ -29,7 +30,7 @@ from annelid.experiment.attempt import (
     stored_outcome,
 )
 from annelid.experiment.case import Work
-from annelid.experiment.fingerprint import physics_fingerprint
+from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.simulation.runfile import Run, open_run
@@ -199,6 +200,7 @@ class Store:
 
 
 def case_key(case: Work) -> str:
-    """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
-    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
+    """Digest of all that a run depends on: its configuration, the code that computes it, and the engine."""
+    foreign = "".join(sorted(foreign_code(kind) for kind in kinds_in(case.config)))
+    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint() + foreign
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -23,7 +23,8 @@ from annelid.simulation.container import RawWriter, Variable
 from annelid.simulation.runfile import (
     CPU_TIME,
     MESSAGE_BYTES,
-    RUN_FILE_VERSION,
+    SCHEMA,
+    SCHEMA_VERSION,
     SLOTS,
     STATUSES,
     WARNING_BYTES,
@@ -133,7 +134,7 @@ def global_attributes(config: RunConfig, parts: Sequence[Recordable]) -> dict[st
     for part in parts:
         attrs.update(part.attrs)
     return attrs | {
-        "run_file_version": RUN_FILE_VERSION,
+        SCHEMA: SCHEMA_VERSION,
         "config": config.model_dump_json(),
         # The format's integers have 64 bits, a seed may have more.
         "seed": config.seed if config.seed < 2**63 else str(config.seed),

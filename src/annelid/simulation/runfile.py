@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,14 +19,17 @@ from annelid.simulation.digest import Finding, examine
 from annelid.simulation.lock import LOCK_NAME
 
 if TYPE_CHECKING:
+    import h5py
     import xarray
 
 FILE_NAME = "run.nc"
 MESSAGE_BYTES = 512
 WARNINGS = "warnings"
 WARNING_BYTES = 8192
-RUN_FILE_VERSION = 2
-"""Of the file's form: 2 has room for a digest; 1, which does not say so, has none."""
+SCHEMA = "schema_version"
+SCHEMA_VERSION = 1
+"""Of the file's names and their meanings; a change that an older reader would take for something else raises it, and
+`migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
 """Files up to this size are compared with their digests whenever they are opened; larger ones by `verify_run` only."""
 SLOTS = ("checkpoint/slot_0", "checkpoint/slot_1")
@@ -101,31 +106,52 @@ def open_run(path: str | Path) -> Run:
     Raises:
         RunFileError: There is no such file, it is no annelid run, or it is truncated or damaged.
     """
+    file = _checked_file(path)
+    with _dataset(file) as dataset:
+        marks = dataset[[*_BOOKKEEPING, WARNINGS, CPU_TIME]].load()
+        n_samples = _count(marks, "samples_written", dataset.sizes["time"])
+        n_frames = _count(marks, "frames_written", dataset.sizes["frame"])
+        status = STATUSES[_count(marks, "status_code", len(STATUSES) - 1)]
+        kept = dataset.drop_vars([*marks.data_vars])
+        for name, variable in kept.variables.items():
+            # Labels of a dimension may be words.
+            if variable.dtype.kind not in "fiu" and variable.dims != (name,):
+                raise ValueError(f"{name!r} holds no numbers")
+            if variable.dims[:1] not in (("time",), ("frame",), (name,)) and name != "stretch_rest_length":
+                raise ValueError(f"{name!r} is along {variable.dims}, not along time or frame")
+        data = kept.isel(time=slice(n_samples), frame=slice(n_frames)).load()
+        message = str(marks["status_message"].values)
+        doubts = tuple(str(marks[WARNINGS].values).splitlines())
+        cpu_time_s = float(marks[CPU_TIME])
+    return Run(file, data, _config(file, data.attrs), status, message, doubts, cpu_time_s)
+
+
+def migrated(data: xarray.Dataset) -> xarray.Dataset:
+    """Returns the content of a run file of any schema up to the present one in the present one.
+
+    Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
+    it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
+
+    Args:
+        data: All variables and attributes of a run file.
+    """
+    if data.attrs.get(SCHEMA, 0) < 1:
+        added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
+        data = data.assign({name: value for name, value in added.items() if name not in data})
+    return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
+
+
+@contextmanager
+def _dataset(file: Path) -> Iterator[xarray.Dataset]:
+    """Opens a checked run file in the present schema."""
     import xarray
 
-    file = _checked_file(path)
     try:
         with xarray.open_dataset(file, engine="h5netcdf") as dataset:
-            marks = dataset[list(_BOOKKEEPING)].load()
-            n_samples = _count(marks, "samples_written", dataset.sizes["time"])
-            n_frames = _count(marks, "frames_written", dataset.sizes["frame"])
-            status = STATUSES[_count(marks, "status_code", len(STATUSES) - 1)]
-            message = str(marks["status_message"].values)
-            # Files of an older annelid have neither.
-            doubts = str(dataset[WARNINGS].values) if WARNINGS in dataset else ""
-            cpu_time_s = float(dataset[CPU_TIME]) if CPU_TIME in dataset else 0.0
-            kept = dataset.drop_vars([*_BOOKKEEPING, WARNINGS, CPU_TIME], errors="ignore")
-            for name, variable in kept.variables.items():
-                # Labels of a dimension may be words.
-                if variable.dtype.kind not in "fiu" and variable.dims != (name,):
-                    raise ValueError(f"{name!r} holds no numbers")
-                if variable.dims[:1] not in (("time",), ("frame",), (name,)) and name != "stretch_rest_length":
-                    raise ValueError(f"{name!r} is along {variable.dims}, not along time or frame")
-            data = kept.isel(time=slice(n_samples), frame=slice(n_frames)).load()
+            yield migrated(dataset)
     # What a damaged file raises depends on where the damage is.
     except Exception as error:
         raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
-    return Run(file, data, _config(file, data.attrs), status, message, tuple(doubts.splitlines()), cpu_time_s)
 
 
 def read_config(path: str | Path) -> RunConfig:
@@ -134,14 +160,9 @@ def read_config(path: str | Path) -> RunConfig:
     Raises:
         RunFileError: As `open_run`.
     """
-    import h5py
-
     file = _checked_file(path)
-    try:
-        with h5py.File(file, "r") as content:
-            attrs = dict(content.attrs)
-    except Exception as error:
-        raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
+    with _dataset(file) as dataset:
+        attrs = dataset.attrs
     return _config(file, attrs)
 
 
@@ -238,9 +259,15 @@ def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Find
         if not h5py.is_hdf5(file):
             raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file")
         with h5py.File(file, "r") as content:
+            # First, since a newer file may hold what the present schema does not.
+            schema = _schema_of(content)
+            if schema > SCHEMA_VERSION:
+                raise RunFileError(
+                    f"{file} has schema version {schema}, and this version of annelid reads none above "
+                    f"{SCHEMA_VERSION}: a newer annelid wrote it"
+                )
             check_content(content, size)
-            version = content.attrs.get("run_file_version", 1)
-            if version != 1 and finding.state == "absent":
+            if schema > 0 and finding.state == "absent":
                 raise RunFileError(f"{file} is truncated or damaged: the digest at its end is missing")
             ours = "config" in content.attrs and "annelid_version" in content.attrs
             missing = [name for name in _BOOKKEEPING if name not in content]
@@ -260,6 +287,16 @@ def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Find
     if not ours or missing:
         raise RunFileError(f"{file} is not an annelid run: another program wrote it")
     return file, finding
+
+
+def _schema_of(content: h5py.File) -> int:
+    """Returns the schema version of an open file whose content is not checked yet."""
+    if SCHEMA not in content.attrs:
+        return 0
+    attribute = content.attrs.get_id(SCHEMA)
+    if attribute.dtype.kind not in "iu" or attribute.shape not in ((), (1,)):
+        raise ValueError(f"its {SCHEMA} is not one whole number")
+    return content.attrs[SCHEMA].item()
 
 
 def _count(marks: xarray.Dataset, name: str, most: int) -> int:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from annelid.config import Chain
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
@@ -139,7 +138,7 @@ def _name(case: BenchCase | None) -> str | None:
 def _cost_s(case: BenchCase | None) -> float:
     if case is None:
         return _PEER_COST_S
-    growth = _GROWTH["chain" if isinstance(case.body.formulation, Chain) else "rods"]
+    growth = _GROWTH[case.body.formulation.kind]
     return case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
 
 
@@ -151,7 +150,7 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
         "lines": list(case.lines),
         "level": level_of(config) if "levels" in case.lines else None,
         "preset": case.case.preset,
-        "formulation": "chain" if isinstance(case.body.formulation, Chain) else "rods",
+        "formulation": case.body.formulation.kind,
         "n_segments": config.body.n_segments,
         "elements_per_side": case.body.mesh.elements_per_side,
         "physics_step_ms": round(1e3 * config.clock.physics_timestep_s, 9),

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any, Literal
 
-from annelid.config import LEVELS, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort

@@ -13,7 +13,7 @@ from typing import Any
 
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.draw.figures import network_diagram
 from annelid.draw.markdown import Table
 from annelid.draw.plots import figure7

@@ -1,16 +1,18 @@
-"""A sweep as one labelled dataset."""
+"""A sweep that is done: its runs, and all of them as one labelled dataset."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from annelid.config import field_paths, unit_of
-from annelid.experiment.sweep.design import REPEAT, SAMPLE, label
+from annelid.experiment.outcome import Outcome
+from annelid.experiment.sweep.design import REPEAT, SAMPLE, Plan, Point, label
 from annelid.experiment.sweep.numbers import Number
-from annelid.experiment.sweep.sweeping import Sweep, SweepRun
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +25,45 @@ _TEXT = {
     "rhythm": "verdict on the rhythm",
     "warnings": "what is doubtful about a run, a sentence a line",
 }
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """One run of a sweep, done.
+
+    Attributes:
+        point: The run.
+        status: "stopped" where a guard ended it before its time, "failed" where it could not be computed.
+        reason: Why; empty for a complete run.
+        outcome: What is kept of it; None where it failed.
+    """
+
+    point: Point
+    status: Literal["complete", "stopped", "failed"]
+    reason: str
+    outcome: Outcome | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about it, a sentence each."""
+        return () if self.outcome is None else self.outcome.summary.warnings
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """All runs of a study.
+
+    Attributes:
+        plan: The design.
+        numbers: What is told of every run.
+        runs: The runs, in the order of the plan's points.
+        folder: Folder of the results.
+    """
+
+    plan: Plan
+    numbers: tuple[Number, ...]
+    runs: tuple[SweepRun, ...]
+    folder: Path
 
 
 def dataset_of(sweep: Sweep) -> xr.Dataset:

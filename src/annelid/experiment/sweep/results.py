@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.experiment.sweep.dataset import SEGMENT
+from annelid.experiment.sweep.dataset import SEGMENT, Sweep, SweepRun
 from annelid.experiment.sweep.design import REPEAT, label
 from annelid.experiment.sweep.numbers import PREFERRED
-from annelid.experiment.sweep.sweeping import Sweep, SweepRun
 from annelid.output import whole_file, write_csv
 
 if TYPE_CHECKING:

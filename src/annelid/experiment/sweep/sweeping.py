@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from annelid.config import Cluster, Study, find_cluster, load_study
 from annelid.errors import AnnelidError
@@ -15,8 +14,9 @@ from annelid.experiment.cluster import workers_of
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Store, case_key
-from annelid.experiment.sweep.design import Plan, Point, plan_of
-from annelid.experiment.sweep.numbers import Number, check_rank, chosen_numbers
+from annelid.experiment.sweep.dataset import Sweep, SweepRun, dataset_of
+from annelid.experiment.sweep.design import Point, plan_of
+from annelid.experiment.sweep.numbers import check_rank, chosen_numbers
 from annelid.simulation.lock import locks
 
 if TYPE_CHECKING:
@@ -24,45 +24,6 @@ if TYPE_CHECKING:
 
 RUNS = "runs"
 """Subfolder of the runs."""
-
-
-@dataclass(frozen=True)
-class SweepRun:
-    """One run of a sweep, done.
-
-    Attributes:
-        point: The run.
-        status: "stopped" where a guard ended it before its time, "failed" where it could not be computed.
-        reason: Why; empty for a complete run.
-        outcome: What is kept of it; None where it failed.
-    """
-
-    point: Point
-    status: Literal["complete", "stopped", "failed"]
-    reason: str
-    outcome: Outcome | None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is doubtful about it, a sentence each."""
-        return () if self.outcome is None else self.outcome.summary.warnings
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """All runs of a study.
-
-    Attributes:
-        plan: The design.
-        numbers: What is told of every run.
-        runs: The runs, in the order of the plan's points.
-        folder: Folder of the results.
-    """
-
-    plan: Plan
-    numbers: tuple[Number, ...]
-    runs: tuple[SweepRun, ...]
-    folder: Path
 
 
 @locks("folder")
@@ -98,7 +59,6 @@ def sweep(
         RunFileError: A file cannot be written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    from annelid.experiment.sweep.dataset import dataset_of
     from annelid.experiment.sweep.results import write_results
 
     to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.experiment.calibration.fit import PARAMETERS
 from annelid.experiment.calibration.loop import wrap_factors

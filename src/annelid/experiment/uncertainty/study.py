@@ -20,7 +20,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Work, run_command
 from annelid.experiment.outcome import Outcome

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from annelid.body.assemble import build_spec
-from annelid.config import Rods, WormBody
+from annelid.body.formulations.chain import Chain
+from annelid.body.formulations.rods import Rods
+from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
@@ -58,6 +60,7 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     formulation = config.body.formulation
     if isinstance(formulation, Rods):
         return formulation.pin_stiffness_N_per_m if formulation.pins == "separate" else float("inf")
+    assert isinstance(formulation, Chain)
     model = build_spec(config).compile()
     inverse_mass = model.body_invweight0[model.eq_obj1id, 0] + model.body_invweight0[model.eq_obj2id, 0]
     impedance = formulation.pin_impedance[1]

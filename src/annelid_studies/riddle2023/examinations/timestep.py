@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.draw.canvas import canvas, save_both
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome

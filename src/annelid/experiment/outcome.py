@@ -80,15 +80,8 @@ def outcome(run: Run) -> Outcome:
 
 def write_outcome(read: Outcome, path: Path, reader: str) -> None:
     """Writes an outcome as JSON, with the mark of the code that read it."""
-    content = {
-        "reader": reader,
-        "summary": read.summary.to_dict(),
-        "rhythm": asdict(read.rhythm),
-        "holds": [asdict(hold) for hold in read.holds],
-        "message": read.message,
-        "gait": read.gait.to_dict(),
-        "cpu_time_s": read.cpu_time_s,
-    }
+    content = {"reader": reader, **asdict(read)}
+    del content["path"]
     path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
 
 
@@ -107,7 +100,7 @@ def read_outcome(path: Path, reader: str) -> Outcome:
         raise ValueError(f"{path} is no outcome: {part}: {wrong['msg']}") from None
     if held.reader != reader:
         raise ValueError(f"{path} was read by other code")
-    return Outcome(path.parent, held.summary, held.rhythm, held.holds, held.message, held.gait, held.cpu_time_s)
+    return Outcome(path.parent, **{name: value for name, value in held if name != "reader"})
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:

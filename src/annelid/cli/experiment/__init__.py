@@ -1,15 +1,18 @@
-"""The commands `experiment ..`: what is done to a worm to learn about it, one module each."""
+"""The commands `experiment ..`: what is done to a worm to learn about it."""
 
 from __future__ import annotations
 
 import typer
 
 from annelid.cli.entry import Command
+from annelid.cli.experiment.crawling import (
+    pipes_command,
+    slip_command,
+    slip_detector_command,
+    speed_command,
+    turning_command,
+)
 from annelid.cli.experiment.load_frame import load_frame_command
-from annelid.cli.experiment.pipes import pipes_command
-from annelid.cli.experiment.slip import slip_command, slip_detector_command
-from annelid.cli.experiment.speed import speed_command
-from annelid.cli.experiment.turning import turning_command
 from annelid.cli.experiment.weak_middle import weak_middle_command
 
 __all__ = ["experiment"]

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 EXTEND = Path(__file__).parent.parent / "examples" / "extend"
+OUTPUT = {"own_study": "--output"}
 TOLD = {
+    "own_study": "friction 0.1",
     "own_arena": "waves of 20 mm",
     "own_actuator": "greatest force",
     "own_formulation": "10 g a crossing",
@@ -30,7 +32,8 @@ def answer(*command: str, path: Path | None = None) -> str:
 
 @pytest.mark.parametrize("name", TOLD)
 def test_one_file_is_enough(name: str, tmp_path: Path) -> None:
-    assert TOLD[name] in answer(str(EXTEND / f"{name}.py"), str(tmp_path))
+    option = [OUTPUT[name]] if name in OUTPUT else []
+    assert TOLD[name] in answer(str(EXTEND / f"{name}.py"), *option, str(tmp_path))
 
 
 def test_every_example_is_tried() -> None:

@@ -174,7 +174,6 @@ TRUE = {
 
 
 def test_a_fit_finds_the_worm_that_made_the_data() -> None:
-    pytest.importorskip("scipy")
     base = load_config("riddle2023-rods")
     made = cable_force(line(load_config("riddle2023-rods", TRUE)), 0.9)
     free = ("young_modulus", "dry_friction", "cable_friction")

@@ -211,7 +211,6 @@ def test_the_fit_that_comes_along_is_whole() -> None:
 
 @pytest.mark.slow
 def test_the_fit_that_comes_along_is_the_one_that_calibrate_makes() -> None:
-    pytest.importorskip("scipy")
     fit = calibrate(load_config(RODS, EQUAL_STIFFNESS), read_loop())
     known = read_spread()
     assert fit.names == known.names

@@ -7,6 +7,7 @@ import shlex
 import signal
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from contextvars import ContextVar
 from io import TextIOWrapper
@@ -115,6 +116,14 @@ class Command(TyperCommand):
                     f"{value} is not a finite number.", ctx=ctx, param_hint=f"'{parameter.opts[0]}'"
                 )
         return rest
+
+
+experiment = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm.")
+
+
+def study(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Returns a decorator that makes a function the command `annelid experiment NAME`, its parameters as Typer's."""
+    return experiment.command(name, cls=Command)
 
 
 app = typer.Typer(

@@ -11,12 +11,11 @@ import numpy as np
 
 from annelid.config import toml_value
 from annelid.config.study import Design
-from annelid.errors import ConfigError, MissingDependency
+from annelid.errors import ConfigError
 from annelid.morphology import Array
 
 DIGITS = 4
 """Significant digits of a value, so that a file that states it makes the same run."""
-MISSING = "samples need SciPy: install it with  pip install 'annelid[sweep]'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,17 +118,12 @@ def unit_samples(design: Design, n: int, n_variables: int, seed: int) -> Array:
 
     Returns:
         Places in [0, 1), ``(n, n_variables)``.
-
-    Raises:
-        MissingDependency: SciPy is needed and not installed.
     """
     rng = np.random.default_rng(seed)
     if design == "random":
         return rng.random((n, n_variables))
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise MissingDependency(MISSING) from None
+    from scipy.stats import qmc
+
     engine = qmc.LatinHypercube(n_variables, rng=rng) if design == "lhs" else qmc.Sobol(n_variables, rng=rng)
     with warnings.catch_warnings():
         # That any number but a power of two is less even: the user may add samples later.

@@ -134,7 +134,7 @@ def _tables(
 
 for _format in (
     Format("csv", "csv", ".csv", SELECTION, _csv),
-    Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)], "scipy"),
+    Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)]),
     Format("parquet", "parquet", ".parquet", SELECTION, _parquet, "pyarrow"),
     Format("mp4", "video.mp4", ".mp4", WINDOW, lambda run, path, told: [render_video(run, path, progress=told)]),
     Format(

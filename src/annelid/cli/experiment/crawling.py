@@ -8,11 +8,13 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import ClusterName, Jobs, Output, Quiet, kept_runs, print_results
+from annelid.cli.entry import study
 
 SLIP = Path("slip")
 GAIT = "riddle2025-muscles"
 
 
+@study("speed")
 def speed_command(
     gaits: Annotated[
         list[str] | None,
@@ -47,6 +49,7 @@ def speed_command(
     print_results(written, *(crawling_table(readings, quantity) for quantity in VALUES), quiet=quiet)
 
 
+@study("slip")
 def slip_command(
     output: Output = SLIP,
     preset: Annotated[str, typer.Option(help="Gait that gets the feedback: riddle2025-muscles or crawler.")] = GAIT,
@@ -83,6 +86,7 @@ def slip_command(
     print_results(written, feedback_table(readings, preset), quiet=quiet)
 
 
+@study("slip-detector")
 def slip_detector_command(
     output: Output = SLIP,
     quick: Annotated[bool, typer.Option("--quick", help="Two runs only.")] = False,
@@ -119,6 +123,7 @@ def slip_detector_command(
     print_results(written, detection_table(told), quiet=quiet)
 
 
+@study("turning")
 def turning_command(
     output: Output = Path("turning"),
     quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
@@ -148,6 +153,7 @@ def turning_command(
     print_results(written, turning_table(turned.readings), quiet=quiet)
 
 
+@study("pipes")
 def pipes_command(
     output: Output = Path("pipes"),
     quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,

@@ -19,9 +19,10 @@ from annelid.cli.common import (
     print_results,
     refuse_existing,
 )
-from annelid.cli.entry import lock
+from annelid.cli.entry import lock, study
 
 
+@study("load-frame")
 def load_frame_command(
     preset: NamedPreset = RIGID_PRESET,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("load-frame"),

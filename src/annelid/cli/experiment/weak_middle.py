@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from annelid.cli.common import ClusterName, Jobs, Output, Quiet, kept_runs, print_results
+from annelid.cli.entry import study
 
 
+@study("weak-middle")
 def weak_middle_command(
     output: Output = Path("weak-middle"),
     quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,

@@ -18,7 +18,7 @@ from importlib import import_module
 import numpy as np
 
 from annelid.config import RunConfig, load_config
-from annelid.errors import ConfigError, MissingDependency, suggest
+from annelid.errors import ConfigError, suggest
 from annelid.experiment.calibration.frame import load_frame
 from annelid.experiment.calibration.loop import Loop, cable_force
 from annelid.experiment.case import SHEAR_OVER_YOUNG
@@ -189,7 +189,6 @@ def calibrate(
 
     Raises:
         ConfigError: A parameter is unknown or none is given.
-        MissingDependency: scipy is not installed.
     """
     names = tuple(dict.fromkeys(free))
     for name in names:
@@ -197,10 +196,8 @@ def calibrate(
             raise ConfigError(f"unknown parameter {name!r}: {suggest(name, PARAMETERS)}")
     if not names:
         raise ConfigError(f"no parameter to fit: name at least one of {', '.join(PARAMETERS)}")
-    try:
-        least_squares = import_module("scipy.optimize").least_squares
-    except ImportError:
-        raise MissingDependency("calibrating needs scipy: install it with  pip install 'annelid[calibrate]'") from None
+    # Loading it takes a second, which only a fit should pay.
+    least_squares = import_module("scipy.optimize").least_squares
     at_m = places(measured)
     wanted = measured.branches(at_m)
     run = simulate or partial(load_frame, displacement_m=_reach(measured))

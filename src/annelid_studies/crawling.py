@@ -7,20 +7,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from annelid.body.worm import WormBody
 from annelid.config import load_config
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
+from annelid.draw.markdown import Table
+from annelid.draw.style import panel_title
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
 from annelid.experiment.tune.judge import Judged
 from annelid.experiment.tune.search import judged_run
+from annelid.morphology import Array
 from annelid.output import write_csv
-from annelid_studies.figures.crawling import Line, crawling_figure
 from annelid_studies.riddle2023.examination import Effort
+from annelid_studies.tables import terminal_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as TerminalTable
 
 GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""
@@ -42,6 +49,12 @@ COLUMNS = {
     "cost_of_transport_cables": "the same, cables",
 }
 """Numbers of a gait that are written, with their heads in a table."""
+PANELS = {
+    "speed_body_lengths_per_s": "speed (body lengths/s)",
+    "cost_of_transport": "cost of transport",
+    "slip_ratio": "slip ratio",
+}
+"""Numbers of a gait that are drawn, with their labels."""
 
 
 @dataclass(frozen=True)
@@ -141,54 +154,66 @@ def write_readings(readings: Sequence[Reading], path: Path) -> None:
 
 
 def _cells(reading: Reading) -> list[str]:
-    point, numbers = reading.point, [_short(reading.number(name)) for name in COLUMNS]
-    return [point.gait, point.quantity, f"{point.value:g}", *numbers, reading.judged.problem]
+    point = reading.point
+    return [point.gait, point.quantity, f"{point.value:g}", *_numbers(reading), reading.judged.problem]
 
 
-def crawling_table(readings: Sequence[Reading], quantity: Quantity) -> Table:
+def _numbers(reading: Reading) -> list[str]:
+    read = (reading.number(name) for name in COLUMNS)
+    return ["" if number is None else f"{number:.4g}" for number in read]
+
+
+def crawling_table(readings: Sequence[Reading], quantity: Quantity) -> TerminalTable:
     """Returns what was found over one quantity as a table for the terminal, one row a gait and value."""
-    from rich.table import Table
-
-    table = Table(title=f"Crawling, by {LABELS[quantity]}")
-    for head in ("gait", LABELS[quantity], *COLUMNS.values(), "problem"):
-        table.add_column(head, justify="left" if head in ("gait", "problem") else "right")
-    for reading in readings:
-        point = reading.point
-        if point.quantity == quantity:
-            numbers = [_short(reading.number(name)) for name in COLUMNS]
-            table.add_row(_name(point.gait), f"{point.value:g}", *numbers, reading.judged.problem)
-    return table
+    rows = [
+        [_name(one.point.gait), f"{one.point.value:g}", *_numbers(one), one.judged.problem]
+        for one in readings
+        if one.point.quantity == quantity
+    ]
+    header = ["gait", LABELS[quantity], *COLUMNS.values(), "problem"]
+    return terminal_table(Table(header, rows), f"Crawling, by {LABELS[quantity]}")
 
 
 def write_figure(readings: Sequence[Reading], stem: Path) -> Path:
-    """Draws speed, cost of transport and slip over both quantities.
+    """Draws a column for each quantity, and in it a panel for speed, cost of transport and slip, a line a gait.
+
+    A cross on the lower edge marks where a gait does not walk.
+
+    Args:
+        readings: What was found.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written.
+
+    Returns:
+        The path of the picture in pixels.
 
     Raises:
         RunFileError: A file cannot be written.
     """
-    gaits = list(dict.fromkeys(reading.point.gait for reading in readings))
-    lines = {LABELS[quantity]: [_line(readings, gait, quantity) for gait in gaits] for quantity in VALUES}
-    return crawling_figure(lines, stem)
+    with canvas(7.0) as figure:
+        grid = figure.subplots(len(PANELS), len(VALUES), squeeze=False, sharex="col", sharey="row")
+        for letter, axes in zip("abcdefgh", grid.flat, strict=False):
+            panel_title(axes, f"{letter})")
+        for row, (name, label) in zip(grid, PANELS.items(), strict=True):
+            row[0].set_ylabel(label)
+            for axes, quantity in zip(row, VALUES, strict=True):
+                draw_lines(axes, _lines(readings, quantity, name), markersize=4.0)
+            row[0].set_ylim(bottom=0.0)
+        for axes, quantity in zip(grid[-1], VALUES, strict=True):
+            axes.set_xlabel(LABELS[quantity])
+        handles, labels = grid[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+        return save_both(figure, stem)
 
 
-def _line(readings: Sequence[Reading], gait: str, quantity: Quantity) -> Line:
-    own = [one for one in readings if (one.point.gait, one.point.quantity) == (gait, quantity)]
-
-    def column(name: str) -> tuple[float | None, ...]:
-        return tuple(one.number(name) for one in own)
-
-    return Line(
-        _name(gait),
-        tuple(one.point.value for one in own),
-        column("speed_body_lengths_per_s"),
-        column("cost_of_transport"),
-        column("slip_ratio"),
-    )
+def _lines(readings: Sequence[Reading], quantity: Quantity, name: str) -> dict[str, tuple[Array, Array]]:
+    """Values of a quantity and a number of the gait, NaN where it does not walk, by the gait's name."""
+    found = {}
+    for gait in dict.fromkeys(one.point.gait for one in readings):
+        own = [one for one in readings if (one.point.gait, one.point.quantity) == (gait, quantity)]
+        numbers = np.array([one.number(name) for one in own], dtype=float)
+        found[_name(gait)] = np.array([one.point.value for one in own]), numbers
+    return found
 
 
 def _name(gait: str) -> str:
     return Path(gait).name.removesuffix(".toml")
-
-
-def _short(number: float | None) -> str:
-    return "" if number is None else f"{number:.4g}"

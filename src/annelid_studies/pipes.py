@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from annelid.analysis.gait import Gait, gait
+import numpy as np
+
+from annelid.analysis.gait import gait
 from annelid.analysis.passage import Passage, passage_of
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
+from annelid.draw.style import panel_title, segment_colors
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
+from annelid.morphology import Array
 from annelid.output import write_csv
-from annelid_studies.figures.pipes import BendLine, Way, pipes_figure
+from annelid_studies.tables import tabulated, terminal_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from matplotlib.axes import Axes
+    from rich.table import Table as TerminalTable
+
+    from annelid.simulation.runfile import Run
 
 PRESET = "riddle2025-muscles"
-STAGE = "pipes"
+CM = 100.0
+WINDOW_S = 5.25
+"""Speed and drive are drawn as means over this time, the undriven wave's cycle."""
 BASE: dict[str, Any] = {"record.signals_interval_s": 0.02, "record.frames_interval_s": 0.1}
 RADII_M = (0.3, 0.4, 0.5, 0.6, 0.9, 1.3)
 QUICK_RADII_M = (0.3,)
@@ -111,6 +122,40 @@ class Reading:
 
 
 @dataclass(frozen=True)
+class Way:
+    """What is drawn of one run in a pipe that narrows, at the times of its postures.
+
+    Attributes:
+        front_m: Where the foremost ring is along the centre line, m, ``(n,)``.
+        bore_m: Radius of the bore there, m, ``(n,)``.
+        speed_m_per_s: Speed of the middle, m/s, ``(n,)``.
+        drive: Activity of the descending neuron, ``(n,)``; zeros without one.
+        first_ring_m: Length of the foremost ring, m, ``(n,)``.
+    """
+
+    front_m: Array
+    bore_m: Array
+    speed_m_per_s: Array
+    drive: Array
+    first_ring_m: Array
+
+    @classmethod
+    def of(cls, run: Run, passage: Passage) -> Self:
+        """Reads it from a run."""
+        data, time = run.data, run.data["time"].values
+        rings = data["ring_length"].values.reshape(len(time), run.config.body.n_segments, -1).sum(axis=2)
+        drive = data["drive"].values if "drive" in data else np.zeros(len(time))
+        smooth = np.array([drive[np.abs(time - now) <= WINDOW_S / 2].mean() for now in passage.time_s])
+        return cls(
+            passage.front_m,
+            passage.bore_m[:, 0],
+            passage.speed_over_m_per_s(WINDOW_S),
+            smooth,
+            np.interp(passage.time_s, time, rings[:, 0]),
+        )
+
+
+@dataclass(frozen=True)
 class Passages:
     """All readings, and what the figure of the narrow pipes is drawn from."""
 
@@ -154,59 +199,47 @@ def pass_pipes(
         RunFileError: A run ended before its second posture.
         KeyboardInterrupt: Runs in progress are dropped, all others kept.
     """
-    store.compute(
-        [trial.case for trial in wanted],
-        jobs=jobs,
-        progress=in_stage(progress, STAGE),
-    )
+    store.compute([trial.case for trial in wanted], jobs=jobs, progress=in_stage(progress, "pipes"))
     readings, ways = [], {}
     for trial in wanted:
         run = store.run(trial.case)
         passage = passage_of(run)
-        readings.append(_reading(trial, passage, gait(run), store[trial.case].summary.wave))
+        readings.append(_reading(trial, run, passage, store[trial.case].summary.wave))
         if trial.gait in (FIXED, ADAPTIVE):
             ways[trial.arena, trial.gait] = Way.of(run, passage)
     return Passages(tuple(readings), ways)
 
 
-def _reading(trial: Trial, passage: Passage, found: Gait, wave: bool | None) -> Reading:
-    way = float(passage.middle_m[-1] - passage.middle_m[0])
-    work = None if found.energy is None or way <= 0 else found.energy.muscle_work_J / way
+def _reading(trial: Trial, run: Run, passage: Passage, wave: bool | None) -> Reading:
+    found, way = gait(run), float(passage.middle_m[-1] - passage.middle_m[0])
     return Reading(
-        trial.arena,
-        trial.gait,
-        trial.radius_m,
-        passage.passed,
-        passage.speed_m_per_s(),
-        float(passage.front_m.max()),
-        wave,
-        work,
-        found.slip_ratio,
-        trial.case.command,
+        arena=trial.arena,
+        gait=trial.gait,
+        radius_m=trial.radius_m,
+        passed=passage.passed,
+        speed_m_per_s=passage.speed_m_per_s(),
+        front_m=float(passage.front_m.max()),
+        in_order=wave,
+        work_J_per_m=None if found.energy is None or way <= 0 else found.energy.muscle_work_J / way,
+        slip_ratio=found.slip_ratio,
+        command=trial.case.command,
     )
 
 
-def pipes_table(readings: Sequence[Reading]) -> Table:
+def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
     """Lays out readings as a table for the terminal."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title="Pipes", title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    headings = ("pipe", "gait", "passed", "speed (cm/s)", "front at (m)", "in order", "net work (J/m)", "slip ratio")
-    for heading in headings:
-        table.add_column(heading, justify="left" if heading in headings[:2] else "right")
     yes = {True: "yes", False: "no", None: "-"}
-    for one in readings:
-        pipe = f"bend of {one.radius_m:g} m" if one.radius_m else one.arena
-        numbers = (
-            f"{100 * one.speed_m_per_s:.2f}",
-            f"{one.front_m:.2f}",
-            yes[one.in_order],
-            "-" if one.work_J_per_m is None else f"{one.work_J_per_m:.0f}",
-            "-" if one.slip_ratio is None else f"{one.slip_ratio:.2f}",
-        )
-        table.add_row(pipe, one.gait, yes[one.passed], *numbers)
-    return table
+    columns: Mapping[str, Callable[[Reading], str]] = {
+        "pipe": lambda one: f"bend of {one.radius_m:g} m" if one.radius_m else one.arena,
+        "gait": lambda one: one.gait,
+        "passed": lambda one: yes[one.passed],
+        "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
+        "front at (m)": lambda one: f"{one.front_m:.2f}",
+        "in order": lambda one: yes[one.in_order],
+        "net work (J/m)": lambda one: "-" if one.work_J_per_m is None else f"{one.work_J_per_m:.0f}",
+        "slip ratio": lambda one: "-" if one.slip_ratio is None else f"{one.slip_ratio:.2f}",
+    }
+    return terminal_table(tabulated(readings, columns), "Pipes", n_words=2)
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
@@ -215,7 +248,7 @@ def write_readings(readings: Sequence[Reading], path: Path) -> Path:
 
 
 def pipes_picture(found: Passages, stem: str | Path) -> Path:
-    """Draws why adaptation pays, and speed against the bends' radius.
+    """Draws why adaptation pays, a column for every narrowing pipe, and speed against the bends' radius below.
 
     Args:
         found: What `pass_pipes` found.
@@ -227,12 +260,46 @@ def pipes_picture(found: Passages, stem: str | Path) -> Path:
     Raises:
         RunFileError: A file cannot be written.
     """
-    bends = {
-        name: BendLine(
-            [one.radius_m for one in found.readings if one.radius_m and one.gait == name],
-            [one.speed_m_per_s for one in found.readings if one.radius_m and one.gait == name],
-            [one.passed for one in found.readings if one.radius_m and one.gait == name],
-        )
-        for name in BEND_GAITS
-    }
-    return pipes_figure(found.ways, bends, stem)
+    pipes = list(dict.fromkeys(pipe for pipe, _ in found.ways))
+    with canvas(8.4) as figure:
+        grid = figure.add_gridspec(4, max(len(pipes), 1), height_ratios=[1.0, 1.0, 1.0, 1.4])
+        for column, pipe in enumerate(pipes):
+            rows = [figure.add_subplot(grid[row, column]) for row in range(3)]
+            _draw_pipe(rows, pipe, {gait: way for (of, gait), way in found.ways.items() if of == pipe})
+            if column == 0:
+                rows[0].legend(loc="best")
+        _draw_bends(figure.add_subplot(grid[3, :]), [one for one in found.readings if one.radius_m])
+        return save_both(figure, stem)
+
+
+def _draw_pipe(rows: Sequence[Axes], pipe: str, ways: Mapping[str, Way]) -> None:
+    """Draws speed, drive and foremost ring over the place in a narrowing pipe, a line a gait."""
+    speed, drive, ring = rows
+    panel_title(speed, f"{pipe}: speed of the middle (cm/s)")
+    panel_title(drive, "drive of the descending neuron")
+    panel_title(ring, "foremost ring (cm); dashed: the bore")
+    for color, (name, way) in zip(segment_colors(3), ways.items(), strict=False):
+        lines = (CM * way.speed_m_per_s, way.drive, CM * way.first_ring_m)
+        for axes, values in zip(rows, lines, strict=True):
+            axes.plot(way.front_m, values, label=name, color=color, linewidth=1.1, alpha=0.85)
+    farthest = max(ways.values(), key=lambda way: way.front_m.max())
+    order = np.argsort(farthest.front_m)
+    # The ring is the hexagon of six crossings that lie in the bore.
+    bore_cm = CM * 6.0 * farthest.bore_m[order]
+    ring.plot(farthest.front_m[order], bore_cm, color="0.3", linestyle=(0, (4, 3)))
+    ring.set_xlabel("foremost ring along the pipe (m)")
+    drive.set_ylim(-0.05, 1.05)
+
+
+def _draw_bends(axes: Axes, readings: Sequence[Reading]) -> None:
+    own = {gait: [one for one in readings if one.gait == gait] for gait in BEND_GAITS}
+    lines = {gait: ([one.radius_m for one in of], [CM * one.speed_m_per_s for one in of]) for gait, of in own.items()}
+    draw_lines(axes, lines, markerfacecolor="none")
+    for of, drawn in zip(own.values(), list(axes.lines), strict=True):
+        passed = [(one.radius_m, CM * one.speed_m_per_s) for one in of if one.passed]
+        style = {"color": drawn.get_color(), "marker": drawn.get_marker(), "linestyle": "none"}
+        axes.plot(*np.reshape(passed, (-1, 2)).T, **style)
+    panel_title(axes, "Bends of 90 degrees: speed along the centre line (cm/s); filled: the worm came through")
+    axes.set_xlabel("radius of the centre line (m)")
+    axes.set_ylim(bottom=0.0)
+    axes.legend(loc="best", ncols=2)

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.track import Track, Turn, track_of, turn_of
+from annelid.analysis.track import Track, track_of, turn_of
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
+from annelid.draw.style import panel_title, segment_colors
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
 from annelid.output import write_csv
-from annelid_studies.figures.turning import turning_figure
+from annelid_studies.tables import tabulated, terminal_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from matplotlib.axes import Axes
+    from rich.table import Table as TerminalTable
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
 MODULATIONS = (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9)
 QUICK = (-0.9, 0.9)
-STAGE = "turning"
+LARGEST_RADIUS_M = 20.0
+"""Where the axis of the radius ends: a worm that turns more weakly than this goes straight."""
 
 
 @dataclass(frozen=True)
@@ -122,54 +127,47 @@ def turning(
         KeyboardInterrupt: Runs in progress are dropped, all others kept.
     """
     work = [(gait, modulation, gait.case(modulation)) for gait in gaits for modulation in modulations]
-    store.compute(
-        [case for _, _, case in work],
-        jobs=jobs,
-        progress=in_stage(progress, STAGE),
-    )
+    store.compute([case for _, _, case in work], jobs=jobs, progress=in_stage(progress, "turning"))
     readings, tracks = [], []
     for gait, modulation, case in work:
         track, found = track_of(store.run(case)), store[case].summary
         timed = case.config.controller.kind == "timed"
         cycle_s = gait.cycle_s if timed or found.period_s is None else found.period_s
         turn = turn_of(track, cycle_s, after_s=cycle_s)
-        readings.append(_reading(gait, modulation, found.wave, cycle_s, turn, case.command))
+        readings.append(
+            Reading(
+                gait=gait.name,
+                modulation=modulation,
+                wave=found.wave,
+                cycle_s=cycle_s,
+                speed_m_per_s=turn.path_m / (turn.cycles * cycle_s),
+                turn_deg_per_cycle=math.degrees(turn.angle_rad) / turn.cycles,
+                curvature_per_m=turn.curvature_per_m,
+                radius_m=turn.radius_m,
+                command=case.command,
+            )
+        )
         tracks.append(track)
     return Turned(tuple(readings), tuple(tracks))
 
 
-def _reading(gait: Gait, modulation: float, wave: bool | None, cycle_s: float, turn: Turn, command: str) -> Reading:
-    return Reading(
-        gait.name,
-        modulation,
-        wave,
-        cycle_s,
-        turn.path_m / (turn.cycles * cycle_s),
-        math.degrees(turn.angle_rad) / turn.cycles,
-        turn.curvature_per_m,
-        turn.radius_m,
-        command,
-    )
-
-
-def turning_table(readings: Sequence[Reading]) -> Table:
+def turning_table(readings: Sequence[Reading]) -> TerminalTable:
     """Lays out readings as a table for the terminal."""
-    from rich import box
-    from rich.table import Table
+    columns: Mapping[str, Callable[[Reading], str]] = {
+        "gait": lambda one: one.gait,
+        "modulation": lambda one: f"{one.modulation:g}",
+        "in order": lambda one: {True: "yes", False: "no", None: "-"}[one.wave],
+        "cycle (s)": lambda one: f"{one.cycle_s:.2f}",
+        "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
+        "deg a cycle": lambda one: f"{one.turn_deg_per_cycle:.1f}",
+        "radius (m)": lambda one: f"{one.radius_m:.2f}",
+    }
+    return terminal_table(tabulated(readings, columns), "Turning")
 
-    table = Table(title="Turning", title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for heading in ("gait", "modulation", "in order", "cycle (s)", "speed (m/s)", "deg a cycle", "radius (m)"):
-        table.add_column(heading, justify="left" if heading == "gait" else "right")
-    for one in readings:
-        order = {True: "yes", False: "no", None: "-"}[one.wave]
-        numbers = (
-            f"{one.cycle_s:.2f}",
-            f"{one.speed_m_per_s:.3f}",
-            f"{one.turn_deg_per_cycle:.1f}",
-            f"{one.radius_m:.2f}",
-        )
-        table.add_row(one.gait, f"{one.modulation:g}", order, *numbers)
-    return table
+
+def write_readings(readings: Sequence[Reading], path: Path) -> Path:
+    """Writes readings as CSV, one row each; returns the path."""
+    return write_csv(path, Reading.__slots__, map(astuple, readings))
 
 
 def turning_picture(turned: Turned, stem: str | Path) -> Path:
@@ -185,21 +183,38 @@ def turning_picture(turned: Turned, stem: str | Path) -> Path:
     Raises:
         RunFileError: A file cannot be written.
     """
-    names = list(dict.fromkeys(reading.gait for reading in turned.readings))
-    lines = {
-        name: (
-            np.array([one.modulation for one in turned.readings if one.gait == name]),
-            np.array([one.curvature_per_m for one in turned.readings if one.gait == name]),
-        )
-        for name in names
-    }
-    shown = names[min(1, len(names) - 1)]
-    tracks = {
-        one.modulation: track for one, track in zip(turned.readings, turned.tracks, strict=True) if one.gait == shown
-    }
-    return turning_figure(lines, tracks, shown, stem)
+    curvatures = {}
+    for gait in dict.fromkeys(one.gait for one in turned.readings):
+        own = [(one.modulation, one.curvature_per_m) for one in turned.readings if one.gait == gait]
+        curvatures[gait] = tuple(np.array(own).T)
+    radii = {gait: (x, 1.0 / np.maximum(np.abs(bend), 1e-9)) for gait, (x, bend) in curvatures.items()}
+    shown = list(curvatures)[min(1, len(curvatures) - 1)]
+    pairs = zip(turned.readings, turned.tracks, strict=True)
+    with canvas(5.6) as figure:
+        grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.25])
+        curvature, radius = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
+        draw_lines(curvature, curvatures, markersize=4.5)
+        panel_title(curvature, "Curvature, positive to the left")
+        curvature.set_ylabel("1/m")
+        draw_lines(radius, radii, markersize=4.5)
+        panel_title(radius, "Radius")
+        radius.set(ylabel="m", xlabel="modulation", yscale="log")
+        radius.set_ylim(top=LARGEST_RADIUS_M)
+        from_above = figure.add_subplot(grid[:, 1])
+        _draw_tracks(from_above, {one.modulation: track for one, track in pairs if one.gait == shown})
+        panel_title(from_above, f"Tracks: {shown}")
+        handles, labels = curvature.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        return save_both(figure, stem)
 
 
-def write_readings(readings: Sequence[Reading], path: Path) -> Path:
-    """Writes readings as CSV, one row each; returns the path."""
-    return write_csv(path, Reading.__slots__, map(astuple, readings))
+def _draw_tracks(axes: Axes, tracks: Mapping[float, Track]) -> None:
+    """Middles of the body, every one from the same start, with the outline at the end, by modulation."""
+    for (modulation, track), color in zip(sorted(tracks.items()), segment_colors(len(tracks)), strict=True):
+        start = track.middle_m[0]
+        axes.plot(*(track.middle_m - start).T, color=color, linewidth=1.4)
+        axes.plot(*(track.outline_m(-1) - start).T, color=color, linewidth=0.6)
+        x, y = track.front_m[-1] - start
+        axes.annotate(f"{modulation:g}", (x, y), color=color, fontsize=7, ha="center", va="center")
+    axes.set_aspect("equal")
+    axes.set(xlabel="x (m)", ylabel="y (m)")

@@ -102,7 +102,7 @@ def test_a_benchmark_tells_of_cases_that_were_not_measured(
         return folder / "bench.json"
 
     monkeypatch.setattr("annelid_studies.bench.benchmark.bench", bench)
-    monkeypatch.setattr("annelid_studies.figures.bench.bench_figure", lambda *_: Path("bench.png"))
+    monkeypatch.setattr("annelid_studies.bench.report.bench_figure", lambda *_: Path("bench.png"))
     done = annelid("bench", "--quiet")
     assert done.exit_code == code, done.err
     assert ("of 2 runs" in done.err) == bool(failed)

@@ -15,7 +15,7 @@ from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_pro
 from annelid_studies.riddle2023.contents import Claim, Report
 from annelid_studies.riddle2023.examination import Effort, Table
 
-CLAIM = Claim("results", "It walks", "Sect. 4", "holds", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023")
+CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")
 REPORT = Report("full", ["It walks."], Table(["period, s"], [["2.629"]]), [], [CLAIM], [], {"annelid": "0"})
 
 Asked = list[tuple[Path, Effort, Sequence[str] | None, int | None]]

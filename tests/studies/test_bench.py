@@ -17,14 +17,12 @@ from annelid.config import LEVELS, load_config
 from annelid.errors import ConfigError
 from annelid_studies.bench import peer as peer_module
 from annelid_studies.bench import store as store_module
-from annelid_studies.bench.benchmark import JSON_NAME, bench, judge
+from annelid_studies.bench.benchmark import JSON_NAME, bench, errors, exponent, front, judge
 from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
-from annelid_studies.bench.errors import errors, exponent, front
 from annelid_studies.bench.measure import measure, peak_memory_bytes
+from annelid_studies.bench.report import bench_figure, bench_table
 from annelid_studies.bench.store import MeasurementFailed, Measurements
-from annelid_studies.bench.table import bench_table
 from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
-from annelid_studies.figures.bench import bench_figure
 from annelid_studies.worms import CHAIN, RODS
 
 positive = st.floats(1e-3, 1e3)
@@ -226,7 +224,7 @@ class TestJudging:
     def test_exponents_over_both_ranges(self) -> None:
         cases = bench_cases("full", ["segments"])
         found = judge(cases, as_measured(cases))["cost_exponents"]
-        assert found[RODS] == pytest.approx({"3-47": 1.0, "12-47": 1.0})
+        assert found[RODS] == pytest.approx({"3-30": 1.0, "12-30": 1.0})
         assert found[CHAIN] == {}
 
     def test_a_failed_case_is_named_with_its_reason(self) -> None:
@@ -379,7 +377,7 @@ class TestPicture:
         path = bench_figure(self.report("full"), tmp_path / "bench")
         assert path.read_bytes().startswith(b"\x89PNG")
         text = path.with_suffix(".svg").read_text()
-        for words in ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..47)", "constraint"):
+        for words in ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..30)", "constraint"):
             assert f"<!-- {words}" in text or words in text, words
 
     @pytest.mark.parametrize("lines", [["peer"], ["chain"], ["levels"], ["duration"], ["steps"]])

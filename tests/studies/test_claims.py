@@ -14,12 +14,10 @@ from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import Store, case_key
 from annelid.simulation.loop import simulate
-from annelid_studies.riddle2023.claims.actuation import velocity_claim
-from annelid_studies.riddle2023.claims.discussion import cause_claim
+from annelid_studies.riddle2023.claims.behaviour import cost_claim
+from annelid_studies.riddle2023.claims.discussion import cause_claim, friction_claim, noise_claim
 from annelid_studies.riddle2023.claims.evidence import Evidence, judged, near
-from annelid_studies.riddle2023.claims.outlook import friction_claim, noise_claim
-from annelid_studies.riddle2023.claims.results import cost_claim
-from annelid_studies.riddle2023.claims.structure import elements_claim, pins_claim
+from annelid_studies.riddle2023.claims.model import elements_claim, pins_claim, velocity_claim
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.worms import FAST, rods

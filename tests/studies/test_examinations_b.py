@@ -13,8 +13,9 @@ from annelid.config import load_config
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store, case_key
 from annelid_studies.riddle2023.examination import Effort, Examination, Results
+from annelid_studies.riddle2023.examinations.design import TIGHT
 from annelid_studies.riddle2023.examinations.discretization import DISCRETIZATION, convergence_order
-from annelid_studies.riddle2023.examinations.gate import GATE, read_beat
+from annelid_studies.riddle2023.examinations.gate import FLAT, GATE, read_beat
 from annelid_studies.riddle2023.examinations.noise import (
     MAPS,
     NOISE,
@@ -24,8 +25,14 @@ from annelid_studies.riddle2023.examinations.noise import (
     share,
     steady_tolerances,
 )
-from annelid_studies.riddle2023.examinations.side_by_side import TIGHT
-from annelid_studies.riddle2023.examinations.timestep import EARLY_S, HARD, TIMESTEP, Start, read_start, velocity_limit
+from annelid_studies.riddle2023.examinations.timestep import (
+    EARLY_S,
+    TIMESTEP,
+    Start,
+    read_start,
+    start_case,
+    velocity_limit,
+)
 from annelid_studies.worms import CHAIN, chain, rods
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
@@ -92,7 +99,7 @@ def test_the_velocity_limit_is_that_of_the_papers_muscle() -> None:
 
 def test_shortening_is_measured_by_what_the_limit_allows() -> None:
     time = np.linspace(0.0, 0.1, 11)
-    start = Start(time, 1.0 - 6.0 * time, limit_m_per_s=2.0, message="")
+    start = Start(time, 1.0 - 6.0 * time, limit_m_per_s=2.0)
     assert start.times_limit(EARLY_S) == pytest.approx(3.0)
     assert np.isnan(start.at(0.2))
 
@@ -111,19 +118,19 @@ def test_no_order_is_told_where_there_is_none() -> None:
 
 
 def test_tight_rods_keep_within_the_muscles_limit(tmp_path: Path) -> None:
-    case = HARD.start(0.005)
+    case = start_case(TIGHT, 0.005)
     store = Store(tmp_path)
     outcomes = store.compute([case], jobs=1)
-    start = read_start(Results(outcomes, case_key)[case])
-    assert 0.3 < start.times_limit(EARLY_S) < 1.0
-    assert start.message == ""
+    outcome = Results(outcomes, case_key)[case]
+    assert 0.3 < read_start(outcome).times_limit(EARLY_S) < 1.0
+    assert outcome.message == ""
 
 
 def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import annelid_studies.riddle2023.examinations.gate as gate
 
     pairs = (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler"))
-    monkeypatch.setattr(gate, "VARIANTS", {"quick": {"planar": pairs}})
+    monkeypatch.setattr(gate, "VARIANTS", {"quick": {FLAT: pairs}})
     outcomes = Store(tmp_path).compute(GATE.cases("quick"), jobs=1)
     results = Results(outcomes, case_key)
     findings = GATE.examine(results, "quick", tmp_path / "gate")
@@ -131,7 +138,8 @@ def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytes
     assert findings.numbers["period_planar_toolbox_euler_s"] == pytest.approx(2.625, abs=0.001)
     assert findings.numbers["period_planar_toolbox_toolbox_s"] == pytest.approx(2.631, abs=0.001)
     assert {"gate.svg", "gate.png"} <= {path.name for path in tmp_path.iterdir()}
-    long, short = (read_beat(results[gate.variant("planar", start, "euler")]).first_s for start in gate.STARTS)
+    cases = {start: gate.variant(FLAT, start, "euler") for start in gate.STARTS}
+    long, short = (read_beat(FLAT, start, "euler", results[case]).first_s for start, case in cases.items())
     assert long > 5 * short
 
 

@@ -13,7 +13,6 @@ from annelid.analysis.passage import Passage, passage_of
 from annelid.arena.kinds.pipe import Pipe
 from annelid.control.robust import RobustSns
 from annelid.errors import RunFileError
-from annelid_studies.figures.pipes import Way
 from annelid_studies.pipes import (
     ADAPTIVE,
     BEND_GAITS,
@@ -23,6 +22,7 @@ from annelid_studies.pipes import (
     RADII_M,
     Passages,
     Reading,
+    Way,
     pipes_picture,
     pipes_table,
     trials,

@@ -14,11 +14,40 @@ from annelid.control.waves import TimedWave
 from annelid.errors import ConfigError, RunFileError
 from annelid.plausibility import tolerance_window_m
 from annelid_studies import robustness as study
-from annelid_studies.robustness import CONTROLLERS, STARTS, Judged, draw, judge, points, shares, shares_table, wilson
+from annelid_studies.robustness import CONTROLLERS, STARTS, Judged, Point, judge, points, shares, shares_table, wilson
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
+
+
+def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
+    """Draws a Latin hypercube: every quantity has one point in each of ``n_points`` strata of equal weight.
+
+    Noise is spread evenly over 0 .. 5 mm; friction over 0.05 .. 1.5, step over 1 .. 10 ms and stiffness over 0.3 .. 2
+    GPa evenly in the logarithm; segments evenly over 3 .. 24. Steps are rounded to whole ms.
+
+    Args:
+        n_points: Number of points.
+        seed: Of the draw.
+    """
+    rng = np.random.default_rng(seed)
+    unit = np.column_stack([(rng.permutation(n_points) + rng.random(n_points)) / n_points for _ in range(5)])
+
+    def log_spread(share: float, low: float, high: float) -> float:
+        return low * (high / low) ** share
+
+    return [
+        Point(
+            noise_m=round(0.005 * noise, 6),
+            friction=round(log_spread(friction, 0.05, 1.5), 4),
+            physics_timestep_ms=round(log_spread(step, 1.0, 10.0)),
+            n_segments=3 + int(22 * segments),
+            young_modulus_Pa=round(log_spread(stiffness, 0.3e9, 2.0e9), -5),
+            seed=i,
+        )
+        for i, (noise, friction, step, segments, stiffness) in enumerate(unit.tolist())
+    ]
 
 
 def test_the_committed_sample_is_the_one_that_was_drawn() -> None:

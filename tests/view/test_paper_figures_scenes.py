@@ -21,15 +21,12 @@ from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 from annelid_studies.riddle2023.figures import renderings
 from annelid_studies.riddle2023.figures.propagation import (
-    figure_2_caption,
     figure_2_propagation,
-    figure_8_caption,
     figure_8_propagation,
     measure_propagation,
 )
 from annelid_studies.riddle2023.figures.renderings import (
     ISOMETRIC_DEG,
-    figure_4_caption,
     figure_4_model,
     recorded_posture,
     rendering_works,
@@ -145,17 +142,23 @@ def test_a_still_is_on_white_and_its_rings_are_red_or_as_active() -> None:
 
 @needs_gl
 def test_figures_4_and_8_are_rendered(rods_run: Run, tmp_path: Path) -> None:
-    check_files(figure_4_model(rods_run, tmp_path / "figure_4"), rendered=True)
-    check_files(figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S), rendered=True)
-    for caption in (figure_4_caption(rods_run), figure_8_caption(rods_run, LATE_S)):
+    captions = [
+        figure_4_model(rods_run.config, tmp_path / "figure_4"),
+        figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S),
+    ]
+    for name, caption in zip(("figure_4", "figure_8"), captions, strict=True):
+        check_files(tmp_path / f"{name}.png", rendered=True)
         assert "rendered" in caption
         assert "not rendered" not in caption
 
 
 def test_figures_4_and_8_are_drawn_without_opengl(rods_run: Run, tmp_path: Path, no_opengl: None) -> None:
-    check_files(figure_4_model(rods_run.config, tmp_path / "figure_4"), rendered=False)
-    check_files(figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S), rendered=False)
-    for caption in (figure_4_caption(rods_run), figure_8_caption(rods_run, LATE_S)):
+    captions = [
+        figure_4_model(rods_run.config, tmp_path / "figure_4"),
+        figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S),
+    ]
+    for name, caption in zip(("figure_4", "figure_8"), captions, strict=True):
+        check_files(tmp_path / f"{name}.png", rendered=False)
         assert "drawn" in caption
         assert "not rendered" in caption
 
@@ -163,8 +166,8 @@ def test_figures_4_and_8_are_drawn_without_opengl(rods_run: Run, tmp_path: Path,
 def test_figure_2_is_drawn_and_its_rigid_rhombus_keeps_its_sides(
     rods_run: Run, tmp_path: Path, no_opengl: None
 ) -> None:
-    check_files(figure_2_propagation(rods_run, tmp_path / "figure_2", LATE_S), rendered=False)
-    caption = figure_2_caption(rods_run, LATE_S)
+    caption = figure_2_propagation(rods_run, tmp_path / "figure_2", LATE_S)
+    check_files(tmp_path / "figure_2.png", rendered=False)
     found = re.search(r"The row of ([\d.]+) cm becomes ([\d.]+) cm long in a\) and ([\d.]+) cm in b\)", caption)
     assert found is not None
     rest, alone, _ = (float(number) for number in found.groups())
@@ -191,7 +194,7 @@ def test_near_and_far_rhombi_are_unactuated_and_off_the_contracted_ring(rods_run
 
 def test_planar_worms_and_times_outside_are_refused(planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
     with pytest.raises(RunFileError, match="planar"):
-        figure_4_model(planar_run, tmp_path / "figure")
+        figure_4_model(planar_run.config, tmp_path / "figure")
     with pytest.raises(RunFileError, match="planar"):
         figure_8_propagation(planar_run, tmp_path / "figure")
     with pytest.raises(RunFileError, match=r"no posture at 1\.5 s"):

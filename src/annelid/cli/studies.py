@@ -147,8 +147,7 @@ def bench_command(
 
     from annelid.experiment.progress import study_progress
     from annelid_studies.bench.benchmark import bench
-    from annelid_studies.bench.table import bench_table
-    from annelid_studies.figures.bench import bench_figure
+    from annelid_studies.bench.report import bench_figure, bench_table
 
     lock(output)
     with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:

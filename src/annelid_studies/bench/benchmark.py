@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
@@ -10,10 +9,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.output import whole_file
+import numpy as np
+
+from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
-from annelid_studies.bench.errors import errors, exponent, front
 from annelid_studies.bench.store import MeasurementFailed, Measurements
 from annelid_studies.riddle2023.examination import Effort
 from annelid_studies.worms import CHAIN, RODS
@@ -21,7 +21,7 @@ from annelid_studies.worms import CHAIN, RODS
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"
 
-SCALED_SEGMENTS = (12, 47)
+SCALED_SEGMENTS = (12, 30)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
 
 SCHEMA = {
@@ -85,10 +85,7 @@ def bench(
         "peer": measured.get(None),
     }
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / JSON_NAME
-    with whole_file(path) as draft:
-        draft.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    return path
+    return write_json(folder / JSON_NAME, report)
 
 
 def judge(cases: Sequence[BenchCase], measured: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
@@ -195,3 +192,64 @@ def _front(entries: Sequence[Mapping[str, Any]], reference: str) -> list[str]:
         if entry["rhythm"]["verdict"] == "ordered" and entry["errors"][reference]["largest"] is not None
     }
     return front(points)
+
+
+def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[str, Any]:
+    """Compares a run with a converged one.
+
+    Args:
+        measured: A `annelid.analysis.Summary` as a mapping.
+        reference: The same of the converged run.
+
+    Returns:
+        Relative errors, as fractions, of the shortest ring, of each segment's elongation and the largest of these, and
+        of the period; ``travel_m``, the difference of the travel, m; and ``largest``, of the
+        largest elongation's and the period's, which decides. Each is None where
+        one of the two runs lacks the quantity, or the reference's is zero.
+    """
+    elongations = measured["elongation_mean_max_m"], reference["elongation_mean_max_m"]
+    elongation = None if None in elongations else [_relative(*pair) for pair in zip(*elongations, strict=True)]
+    travels = measured["travel_m"], reference["travel_m"]
+    found: dict[str, Any] = {
+        "ring_length_min": _relative(measured["ring_length_min_m"], reference["ring_length_min_m"]),
+        "elongation": elongation,
+        "elongation_max": _largest(elongation),
+        "period": _relative(measured["period_s"], reference["period_s"]),
+        "travel_m": None if None in travels else abs(travels[0] - travels[1]),
+    }
+    return found | {"largest": _largest([found["elongation_max"], found["period"]])}
+
+
+def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:
+    """Slope of log(cost) against log(size) by least squares; None for fewer than two sizes."""
+    if len(set(sizes)) < 2:
+        return None
+    return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
+
+
+def front(points: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Names the points that no other one beats, from the fastest to the most exact.
+
+    Args:
+        points: Speed and error of each; more of the first and less of the second is better.
+
+    Returns:
+        Names of those for which no other point is at least as good in both and better in one.
+    """
+    best = []
+    least = float("inf")
+    for name, (_, error) in sorted(points.items(), key=lambda item: (-item[1][0], item[1][1])):
+        if error < least:
+            best.append(name)
+            least = error
+    return best
+
+
+def _relative(value: float | None, reference: float | None) -> float | None:
+    return None if value is None or not reference else abs(value - reference) / abs(reference)
+
+
+def _largest(values: Sequence[float | None] | None) -> float | None:
+    """The largest, or None where one is missing: an error that is not known is not small."""
+    known = [value for value in values or () if value is not None]
+    return max(known) if values and len(known) == len(values) else None

@@ -6,19 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from annelid.draw.markdown import Table
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings
 
 Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
-_COUNTED: Mapping[Verdict, tuple[str, str]] = {
-    "holds": ("holds", "hold"),
-    "holds within": ("holds within the margin given", "hold within the margin given"),
-    "rests on": ("rests on a choice that is named", "rest on a choice that is named"),
-    "does not hold": ("does not hold", "do not hold"),
-    "not testable here": ("cannot be tested here", "cannot be tested here"),
-}
 
 
 @dataclass(frozen=True)
@@ -29,22 +22,22 @@ class Claim:
         topic: Structure, sensing, actuation, results, discussion, future work.
         claim: What the paper says, in our words.
         place: Where it says so.
-        verdict: Whether it holds.
-        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
         paper: The paper's number or words.
         ours: Our number or words.
         evidence: Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it.
         command: The command that makes our number.
+        verdict: Whether it holds.
+        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
     """
 
     topic: str
     claim: str
     place: str
-    verdict: Verdict
     paper: str
     ours: str
     evidence: str
     command: str
+    verdict: Verdict
     within: str = ""
 
 
@@ -100,9 +93,6 @@ class Report:
 
 
 def tally(claims: Sequence[Claim]) -> str:
-    """Counts the verdicts in words: ``18 hold, 6 rest on a choice that is named and 2 cannot be tested here``."""
+    """Counts the verdicts: ``holds: 18; does not hold: 6``."""
     number = Counter(claim.verdict for claim in claims)
-    parts = [
-        f"{number[verdict]} {words[number[verdict] != 1]}" for verdict, words in _COUNTED.items() if number[verdict]
-    ]
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return "; ".join(f"{verdict}: {number[verdict]}" for verdict in get_args(Verdict) if number[verdict])

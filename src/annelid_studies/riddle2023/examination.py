@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,7 +30,7 @@ class Results:
 
 
 class Numbers(dict[str, Any]):
-    """Single results of an examination by name; one that is not there is an error, never a gap in what rests on it."""
+    """Single results of an examination by name; a name that is not there is an error."""
 
     def __missing__(self, name: str) -> Any:
         raise KeyError(f"the examination has no number {name!r}: {suggest(name, self)}")
@@ -44,7 +45,7 @@ class Findings:
         caption: What one sees in the figure.
         table: The numbers.
         remarks: Paragraphs for those who want to know more; may be empty.
-        numbers: Single results by name, for the claims.
+        numbers: Single results by name, for the claims; NaN and infinities become None, since JSON lacks them.
     """
 
     answer: str
@@ -54,7 +55,14 @@ class Findings:
     numbers: Mapping[str, float | str | None] = field(default_factory=Numbers)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "numbers", Numbers(self.numbers))
+        plain = {name: _plain(value) for name, value in self.numbers.items()}
+        object.__setattr__(self, "numbers", Numbers(plain))
+
+
+def _plain(value: float | str | None) -> float | str | None:
+    if value is None or isinstance(value, str):
+        return value
+    return float(value) if isfinite(value) else None
 
 
 @dataclass(frozen=True)

@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
 from annelid.body.worm import WormBody
+from annelid.draw.figures import network_diagram
 from annelid.draw.markdown import Table
+from annelid.draw.plots import figure7
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
+from annelid.experiment.fingerprint import code_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Workers
 from annelid.nervous import PeristalsisParameters, peristalsis_network
+from annelid.output import whole_file
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run
+from annelid.textfiles import read_json
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
-from annelid_studies.riddle2023.claims.evidence import between, readings_m
+from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, tally
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import EXAMINATIONS
-from annelid_studies.riddle2023.kept import kept
+from annelid_studies.riddle2023.examinations import EXAMINATIONS, words
+from annelid_studies.riddle2023.examinations.design import walked_elongation
+from annelid_studies.riddle2023.examinations.words import CM, MM, PERCENT
+from annelid_studies.riddle2023.figures import (
+    muscle_surface,
+    planar_models,
+    propagation,
+    renderings,
+    robot_lengths,
+)
 from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, rods
 
 Progress = Callable[[str, int, int, float], object]
@@ -124,47 +140,24 @@ def _stage(progress: Progress, stage: str) -> Callable[[int, int, float], object
     return lambda done, total, share: progress(stage, done, total, share)
 
 
-def _figure_1(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid_studies.riddle2023.figures.planar_models import CAPTION, figure_1_planar_models
-
-    figure_1_planar_models(stem)
-    return CAPTION
+Series = Mapping[str, Sequence[float]]
+"""Elongation of each segment, m, by the label of a simulation."""
 
 
-def _figure_2(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid_studies.riddle2023.figures.propagation import figure_2_caption, figure_2_propagation
-
-    figure_2_propagation(run, stem)
-    return figure_2_caption(run)
-
-
-def _figure_4(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid_studies.riddle2023.figures.renderings import figure_4_caption, figure_4_model
-
-    figure_4_model(run.config, stem)
-    return figure_4_caption(run.config)
-
-
-def _figure_5(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid_studies.riddle2023.figures.muscle_surface import caption, figure_5_muscle_surface
-
+def _figure_5(run: Run, series: Series, stem: Path) -> str:
     assert isinstance(run.config.body, WormBody)
-    figure_5_muscle_surface(run.config.body.muscles, stem, run.config.body.n_segments)
-    return caption(run.config.body.muscles, run.config.body.n_segments)
+    return muscle_surface.figure_5_muscle_surface(run.config.body.muscles, stem, run.config.body.n_segments)
 
 
-def _figure_6(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid.draw.figures.network_diagram import CAPTION, figure_6_network_diagram
+def _figure_6(run: Run, series: Series, stem: Path) -> str:
+    network = peristalsis_network(run.config.body.n_segments, PeristalsisParameters())
+    network_diagram.figure_6_network_diagram(network, stem)
+    return network_diagram.CAPTION
 
-    figure_6_network_diagram(peristalsis_network(run.config.body.n_segments, PeristalsisParameters()), stem)
-    return CAPTION
 
-
-def _figure_7(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid.draw.plots import figure7
-
-    figure7(run, stem.with_suffix(".svg"))
-    figure7(run, stem.with_suffix(".png"))
+def _figure_7(run: Run, series: Series, stem: Path) -> str:
+    for suffix in (".svg", ".png"):
+        figure7(run, stem.with_suffix(suffix))
     return (
         "The paper's run, reproduced: membrane potentials of the half-centres, the phases in which each segment's "
         "muscle is active, and the lengths of the stretch sensors. The wave runs 1-2-3. A segment lengthens while "
@@ -174,31 +167,51 @@ def _figure_7(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> st
     )
 
 
-def _figure_8(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid_studies.riddle2023.figures.propagation import figure_8_caption, figure_8_propagation
-
-    figure_8_propagation(run, stem)
-    return figure_8_caption(run)
-
-
-def _figure_9(run: Run, stem: Path, series: Mapping[str, Sequence[float]]) -> str:
-    from annelid_studies.riddle2023.figures.robot_lengths import CAPTION, figure_9_robot_lengths
-
-    figure_9_robot_lengths(series, stem)
-    return CAPTION
-
-
-FIGURES: Mapping[int, tuple[str, Callable[[Run, Path, Mapping[str, Sequence[float]]], str]]] = {
-    1: ("The planar models", _figure_1),
-    2: ("Contraction with and without propagation of deformation", _figure_2),
-    4: ("The model", _figure_4),
+FIGURES: Mapping[int, tuple[str, Callable[[Run, Series, Path], str]]] = {
+    1: ("The planar models", lambda run, series, stem: planar_models.figure_1_planar_models(stem)),
+    2: (
+        "Contraction with and without propagation of deformation",
+        lambda run, series, stem: propagation.figure_2_propagation(run, stem),
+    ),
+    4: ("The model", lambda run, series, stem: renderings.figure_4_model(run.config, stem)),
     5: ("Force, length and velocity of the muscle", _figure_5),
     6: ("The control network", _figure_6),
     7: ("Potentials and stretch lengths", _figure_7),
-    8: ("Propagation of deformation at 1500 ms", _figure_8),
-    9: ("The robot's elongations beside ours", _figure_9),
+    8: (
+        "Propagation of deformation at 1500 ms",
+        lambda run, series, stem: propagation.figure_8_propagation(run, stem),
+    ),
+    9: (
+        "The robot's elongations beside ours",
+        lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
+    ),
 }
 """Number: title, and what draws it and returns its caption. Figure 3 is a photograph of the robot."""
+
+
+def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Returns what goes with a picture: as it was kept, or made anew where code, runs or picture have changed.
+
+    Args:
+        stem: Path of the picture without suffix; ``<stem>.svg`` and ``<stem>.png`` are the picture, and
+            ``<stem>.json`` keeps what goes with it.
+        made_of: All that the picture depends on beside annelid's code, of plain numbers, words and lists.
+        make: Draws the picture and returns what goes with it, ready for JSON.
+    """
+    mark = hashlib.sha256(json.dumps([code_fingerprint(), *made_of]).encode()).hexdigest()
+    note = stem.with_name(f"{stem.name}.json")
+    pictures = [stem.with_name(f"{stem.name}{suffix}") for suffix in (".svg", ".png")]
+    try:
+        content = read_json(note)
+        if content["mark"] == mark and all(picture.exists() for picture in pictures):
+            return content["found"]
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    note.unlink(missing_ok=True)
+    found = make()
+    with whole_file(note) as draft:
+        draft.write_text(json.dumps({"mark": mark, "found": found}), encoding="utf-8")
+    return found
 
 
 def _examined(examination: Examination, effort: Effort, results: Results, folder: Path) -> Examined:
@@ -212,99 +225,80 @@ def _examined(examination: Examination, effort: Effort, results: Results, folder
 def _figure(number: int, main: Run, variants: Mapping[str, Case], results: Results, folder: Path) -> Figure:
     title, draw = FIGURES[number]
     stem = folder / f"figure_{number}"
-    first_helix = results[MAIN].summary.elongation_first_helix_pp_m
-    series = {f"{CHAIN}, first helix": _measured(first_helix)} | {
-        f"{label}, mean of six": _measured(results[variants[label]].summary.elongation_mean_max_m) for label in _QUICK
+    series = {f"{CHAIN}, first helix": walked_elongation(results[MAIN], first_helix=True).tolist()} | {
+        f"{label}, mean of six": walked_elongation(results[variants[label]]).tolist() for label in _QUICK
     }
-    found = kept(stem, [case_key(MAIN), series], lambda: {"caption": draw(main, stem, series)})
+
+    found = kept(stem, [case_key(MAIN), series], lambda: {"caption": draw(main, series, stem)})
     return Figure(number, title, stem.with_suffix(".png"), found["caption"])
 
 
-def _measured(values: Sequence[float | None] | None) -> tuple[float, ...]:
-    return tuple(float("nan") if value is None else value for value in values or ())
-
-
-def _centimetres(values: Sequence[float | None] | None) -> str:
-    return " / ".join(f"{100 * value:.2f}" for value in _measured(values))
-
-
 def _main_table(variants: Mapping[str, Case], results: Results) -> Table:
-    theirs = published(MAIN.config)
-
-    def row(label: str, paper: str, ours: Callable[[Outcome], str]) -> list[str]:
-        return [label, paper, *(ours(results[case]) for case in variants.values())]
-
-    def percent(value: float | None) -> str:
-        return "-" if value is None else f"{100 * value:.1f}"
-
-    def order(outcome: Outcome) -> str:
-        return "-".join(str(segment) for segment in outcome.rhythm.order)
-
-    def optional(value: float | None, digits: int, factor: float = 1.0) -> str:
-        return "-" if value is None else f"{factor * value:.{digits}f}"
-
-    elongation = theirs["elongation_first_helix_pp_m"].value
-    deficit, difference = theirs["middle_deficit"].value, theirs["end_difference"].value
-    assert isinstance(elongation, tuple)
-    assert isinstance(deficit, float)
-    assert isinstance(difference, float)
+    helix_m, deficit, difference = _published()
+    rows: dict[tuple[str, str], Callable[[Outcome], str]] = {
+        ("order of onsets", "1-2-3"): order_of,
+        ("period (s)", "about 2.6 (Fig. 7)"): lambda o: words.in_unit(o.rhythm.period_s, digits=3),
+        ("elongation, first helix, peak to peak (cm)", words.all_in_cm(helix_m)): _helix,
+        ("elongation, mean of six, maximum (cm)", ""): lambda o: words.all_in_cm(walked_elongation(o)),
+        ("segment 2 below segment 1 (%)", words.in_percent(deficit, 1)): (
+            lambda o: words.in_percent(o.summary.middle_deficit, 1)
+        ),
+        ("the same, mean of six (%)", ""): lambda o: words.in_percent(o.summary.middle_deficit_mean, 1),
+        ("segment 3 below segment 1 (%)", words.in_percent(difference, 1)): (
+            lambda o: words.in_percent(o.summary.end_difference, 1)
+        ),
+        ("force while contracted, median (N)", "up to 2.5"): (
+            lambda o: words.in_unit(o.summary.contraction_force_median_N)
+        ),
+        ("largest pin gap (mm)", ""): lambda o: words.in_unit(o.summary.pin_gap_max_m, MM, 1),
+        ("travel forwards in 5 s (mm)", "negligible"): lambda o: words.in_unit(o.summary.travel_m, MM, 0),
+        ("processor time (s)", "210 (of a clock)"): lambda o: words.in_unit(o.cpu_time_s or None, digits=0),
+    }
     return Table(
         ["quantity", "paper", *variants],
-        [
-            row("order of onsets", "1-2-3", order),
-            row("period (s)", "about 2.6 (Fig. 7)", lambda o: optional(o.rhythm.period_s, 3)),
-            row(
-                "elongation, first helix, peak to peak (cm)",
-                _centimetres(elongation),
-                lambda o: _centimetres(o.summary.elongation_first_helix_pp_m),
-            ),
-            row("elongation, mean of six, maximum (cm)", "", lambda o: _centimetres(o.summary.elongation_mean_max_m)),
-            row("segment 2 below segment 1 (%)", percent(deficit), lambda o: percent(o.summary.middle_deficit)),
-            row("the same, mean of six (%)", "", lambda o: percent(o.summary.middle_deficit_mean)),
-            row("segment 3 below segment 1 (%)", percent(difference), lambda o: percent(o.summary.end_difference)),
-            row(
-                "force while contracted, median (N)",
-                "up to 2.5",
-                lambda o: optional(o.summary.contraction_force_median_N, 2),
-            ),
-            row("largest pin gap (mm)", "", lambda o: optional(o.summary.pin_gap_max_m, 1, 1e3)),
-            row("travel forwards in 5 s (mm)", "negligible", lambda o: optional(o.summary.travel_m, 0, 1e3)),
-            row("processor time (s)", "210 (of a clock)", _seconds),
-        ],
+        [[*head, *(text(results[case]) for case in variants.values())] for head, text in rows.items()],
     )
 
 
-def _seconds(outcome: Outcome) -> str:
-    return f"{outcome.cpu_time_s:.0f}" if outcome.cpu_time_s else "-"
+def _published() -> tuple[tuple[float, ...], float, float]:
+    """The paper's elongations, m, its deficit of segment 2 and its difference of segment 3, fractions."""
+    theirs = published(MAIN.config)
+    helix_m = theirs["elongation_first_helix_pp_m"].value
+    deficit, difference = theirs["middle_deficit"].value, theirs["end_difference"].value
+    assert isinstance(helix_m, tuple)
+    assert isinstance(deficit, float)
+    assert isinstance(difference, float)
+    return helix_m, deficit, difference
+
+
+def _helix(outcome: Outcome) -> str:
+    return words.all_in_cm(walked_elongation(outcome, first_helix=True))
 
 
 def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim]) -> list[str]:
     main = variants[MAIN.config.name]
-    elongation = _measured(main.summary.elongation_first_helix_pp_m)
-    deficit = 100 * (main.summary.middle_deficit or float("nan"))
     read = readings_m(run)
-    every = " / ".join(between(of_segment, 100) for of_segment in read)
-    deficits = between((middle_deficit(of_reading) for of_reading in read.T), 100, 0)
-    period = main.rhythm.period_s
-    theirs = published(MAIN.config)["elongation_first_helix_pp_m"].value
-    assert isinstance(theirs, tuple)
+    every = " / ".join(words.span(of_segment, CM) for of_segment in read)
+    deficits = words.span((middle_deficit(of_reading) for of_reading in read.T), PERCENT, 0)
+    theirs, deficit, _ = _published()
     paragraphs = [
-        f"The paper's worm, rebuilt in its own formulation and driven by its own network, has a rhythm that is "
-        f"{main.rhythm.verdict or 'not settled'}: segments begin in the order {'-'.join(map(str, main.rhythm.order))}"
-        + (f", one cycle every {period:.3f} s" if period else "")
-        + f". They elongate by {_centimetres(elongation)} cm (paper: {_centimetres(theirs)} cm; spring on the first "
-        f"helix, peak to peak), segment 2 by {deficit:.1f} % less than segment 1 (paper: 39.4 %). That "
-        f"reading comes nearest. By all six springs, and their mean, the segments elongate by {every} cm, and "
-        f"segment 2 by {deficits} % less than segment 1; the claims are judged by all of these readings.",
+        "The paper's worm, rebuilt in its own formulation and driven by its own network, has a rhythm that is "
+        f"{main.rhythm.verdict or 'not settled'}: segments begin in the order {order_of(main)}, one cycle every "
+        f"{words.in_unit(main.rhythm.period_s, digits=3)} s. They elongate by {_helix(main)} cm (paper: "
+        f"{words.all_in_cm(theirs)} cm; spring on the first helix, peak to peak), segment 2 by "
+        f"{words.in_percent(main.summary.middle_deficit, 1)} % less than segment 1 (paper: "
+        f"{words.in_percent(deficit, 1)} %). That reading comes nearest. By all six springs, and their mean, the "
+        f"segments elongate by {every} cm, and segment 2 by {deficits} % less than segment 1; the claims are judged by "
+        "all of these readings.",
         _what_still_differs(variants, theirs),
     ]
     if claims:
-        paragraphs.append(f"Of the {len(claims)} claims of the paper that are examined here, {tally(claims)}.")
+        paragraphs.append(f"Verdicts on the {len(claims)} claims of the paper that are examined here: {tally(claims)}.")
     paragraphs.append(
         f"Three worms stand side by side in what follows: the paper's chain (preset {CHAIN}, in the examinations at "
         f"steps of 2 ms), whose pins give; sprung rods ({FAST}), the same robot in seconds with pins of the same "
         f"stiffness; and tight rods ({RODS}, with the paper's three elements a side and steps of "
-        f"{1e3 * RODS_STEP_S:g} ms), whose pins hold."
+        f"{MM * RODS_STEP_S:g} ms), whose pins hold."
     )
     return paragraphs
 
@@ -312,20 +306,18 @@ def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim])
 def _what_still_differs(variants: Mapping[str, Outcome], theirs: Sequence[float]) -> str:
     """Names the segment farthest from the paper, and what the variants of the paper's own formulation make of it."""
     read = {
-        label: _measured(outcome.summary.elongation_first_helix_pp_m)
+        label: walked_elongation(outcome, first_helix=True)
         for label, outcome in variants.items()
         if label not in (FAST, RODS)
     }
     errors = [ours / paper - 1 for ours, paper in zip(read[MAIN.config.name], theirs, strict=True)]
     worst = max(range(len(errors)), key=lambda segment: abs(errors[segment]))
-    text = (
-        f"On the first helix, segment {worst + 1} differs most, {100 * errors[worst]:+.1f} % from the paper; the "
-        f"others are within {100 * max(abs(error) for i, error in enumerate(errors) if i != worst):.1f} %."
+    others = [f"{words.in_cm(m[worst])} cm with {label}" for label, m in read.items() if label != MAIN.config.name]
+    return (
+        f"On the first helix, segment {worst + 1} differs most, {PERCENT * errors[worst]:+.1f} % from the paper; the "
+        f"others are within {PERCENT * max(abs(error) for i, error in enumerate(errors) if i != worst):.1f} %."
+        f"{f' It is {words.listed(others)}.' if others else ''}"
     )
-    others = [
-        f"{100 * values[worst]:.2f} cm with {label}" for label, values in read.items() if label != MAIN.config.name
-    ]
-    return text + (f" It is {' and '.join(others)}." if others else "")
 
 
 def _provenance(outcomes: Mapping[str, Outcome]) -> dict[str, str]:

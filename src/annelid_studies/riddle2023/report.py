@@ -115,7 +115,7 @@ def _main_numbers(report: Report) -> list[str]:
 def _claims(claims: Sequence[Claim], rule: Sequence[str]) -> list[str]:
     if not claims:
         return []
-    blocks = ["## Claims", f"Of {len(claims)} claims, {tally(claims)}.", *_paragraphs(rule)]
+    blocks = ["## Claims", f"{len(claims)} claims. {tally(claims)}.", *_paragraphs(rule)]
     topics = dict.fromkeys(claim.topic for claim in claims)
     first = 1
     for topic in topics:

@@ -5,23 +5,25 @@ The detector's constants were chosen on one run, `CHOSEN_ON`; the others test it
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from annelid.analysis.detector import Detection, Score, detect, precision_recall, score
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
-from annelid.morphology import Array
 from annelid.output import write_csv
 from annelid_studies.slip.feedback import DURATION_S, PLAIN, PRESET, PRESSURE, case
+from annelid_studies.tables import tabulated, terminal_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as TerminalTable
 
 LIMIT_M_PER_S = 0.1
 """The detector's own limit."""
@@ -70,11 +72,6 @@ def scores(detections: Mapping[str, Detection]) -> dict[str, Score]:
     return each | ({"all but the first": score(unseen, LIMIT_M_PER_S)} if unseen else {})
 
 
-def curves(detections: Mapping[str, Detection]) -> dict[str, tuple[Array, Array]]:
-    """Returns recall and precision of every run over `LIMITS_M_PER_S`."""
-    return {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}
-
-
 def write_scores(told: Mapping[str, Score], path: Path) -> None:
     """Writes one row a run as CSV with a header.
 
@@ -85,23 +82,42 @@ def write_scores(told: Mapping[str, Score], path: Path) -> None:
     write_csv(path, ["run", *(field.name for field in fields(Score))], rows)
 
 
-def detection_table(told: Mapping[str, Score]) -> Table:
+def detection_table(told: Mapping[str, Score]) -> TerminalTable:
     """Tabulates the scores."""
-    from rich.table import Table
+    columns: Mapping[str, Callable[[tuple[str, Score]], str]] = {
+        "run": lambda row: row[0],
+        "precision": lambda row: f"{row[1].precision:.2f}",
+        "recall": lambda row: f"{row[1].recall:.2f}",
+        "blind": lambda row: f"{row[1].base_rate:.2f}",
+        "found": lambda row: f"{row[1].found:.2f}",
+        "episodes": lambda row: f"{row[1].episodes}",
+        "delay (ms)": lambda row: f"{1e3 * row[1].delay_s:.0f}",
+        "false (1/s)": lambda row: f"{row[1].false_alarms_per_s:.1f}",
+        "correlation": lambda row: f"{row[1].correlation:.2f}",
+    }
+    return terminal_table(tabulated(told.items(), columns), f"slip told above {100 * LIMIT_M_PER_S:g} cm/s")
 
-    table = Table("run", title=f"slip told above {100 * LIMIT_M_PER_S:g} cm/s")
-    for heading in ("precision", "recall", "blind", "found", "episodes", "delay (ms)", "false (1/s)", "correlation"):
-        table.add_column(heading, justify="right")
-    for name, one in told.items():
-        table.add_row(
-            name,
-            f"{one.precision:.2f}",
-            f"{one.recall:.2f}",
-            f"{one.base_rate:.2f}",
-            f"{one.found:.2f}",
-            f"{one.episodes}",
-            f"{1e3 * one.delay_s:.0f}",
-            f"{one.false_alarms_per_s:.1f}",
-            f"{one.correlation:.2f}",
-        )
-    return table
+
+def detector_figure(detections: Mapping[str, Detection], stem: str | Path) -> Path:
+    """Draws precision against recall of every run over `LIMITS_M_PER_S`, and of all at the detector's own limit.
+
+    Args:
+        detections: What the detector said, by the name of the run.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written.
+
+    Returns:
+        The path of the picture in pixels.
+
+    Raises:
+        RunFileError: A file cannot be written.
+    """
+    together = score(list(detections.values()), LIMIT_M_PER_S)
+    with canvas(3.6) as figure:
+        axes = figure.subplots()
+        curves = {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}
+        draw_lines(axes, curves, markers=False, linewidth=1.1)
+        chosen: dict[str, Any] = {"marker": "o", "markersize": 7, "color": "black", "linestyle": "none"}
+        axes.plot(together.recall, together.precision, label="all runs, as it is set", **chosen)
+        axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="recall", ylabel="precision")
+        axes.legend(loc="lower left")
+        return save_both(figure, stem)

@@ -13,14 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.slip import SlipCost, slip_cost
 from annelid.config import load_config
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.lines import draw_lines
+from annelid.draw.markdown import Table
+from annelid.draw.style import panel_title
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
 from annelid.output import write_csv
+from annelid_studies.tables import terminal_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.table import Table as TerminalTable
 
 PRESET = "riddle2025-muscles"
 GAITS = (PRESET, "crawler")
@@ -32,6 +37,7 @@ QUICK = (0.7, 1.0)
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
 PLAIN, EXTENSION, PRESSURE = "none", "no pressure", "with pressure"
+LOSS_TICKS = (2, 5, 10, 20, 50, 100)
 FEEDBACKS = (PLAIN, EXTENSION, PRESSURE)
 """What is fed back beside the paper's stretch sensors: nothing, what of our design needs no touch, all of it."""
 COLUMNS = (
@@ -149,24 +155,58 @@ def _cells(one: Reading, readings: Sequence[Reading]) -> list[object]:
     return [one.feedback, f"{one.friction:g}", cost.cycles if cost else 0, *texts, one.one_wave]
 
 
-def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> Table:
+def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> TerminalTable:
     """Tabulates speed and loss, and what feedback gains and saves on the same friction."""
-    from rich.table import Table
-
-    told = f"* feedback was tuned here{'' if preset == PRESET else f', on {PRESET}'}"
-    table = Table(title=f"slip of {preset}, over whole cycles", caption=told)
-    for heading in ("friction", "feedback"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("wave", "cm/s", "J/m", "faster (%)", "saved (%)", "per m (%)"):
-        table.add_column(heading, justify="right")
+    rows = []
     for one in readings:
-        friction = f"{one.friction:g}{'*' if one.friction in TUNED_AT else ''}"
-        wave = "yes" if one.one_wave else "no"
         cost, gains = one.cost, compared(readings, one)
-        if cost is None:
-            table.add_row(friction, one.feedback, wave, "no whole cycles")
-            continue
-        percents = [f"{gain:+.0f}" for gain in gains] if gains and one.feedback != PLAIN else []
-        speed, joules = f"{100 * cost.speed_m_per_s:.1f}", f"{cost.loss_J_per_m:.2f}"
-        table.add_row(friction, one.feedback, wave, speed, joules, *percents)
-    return table
+        numbers = ["no whole cycles", "", *[""] * 3]
+        if cost is not None:
+            percents = [f"{gain:+.0f}" for gain in gains] if gains and one.feedback != PLAIN else [""] * 3
+            numbers = [f"{100 * cost.speed_m_per_s:.1f}", f"{cost.loss_J_per_m:.2f}", *percents]
+        friction = f"{one.friction:g}{'*' if one.friction in TUNED_AT else ''}"
+        rows.append([friction, one.feedback, "yes" if one.one_wave else "no", *numbers])
+    header = ["friction", "feedback", "wave", "cm/s", "J/m", "faster (%)", "saved (%)", "per m (%)"]
+    caption = f"* feedback was tuned here{'' if preset == PRESET else f', on {PRESET}'}"
+    return terminal_table(Table(header, rows), f"slip of {preset}, over whole cycles", n_words=2, caption=caption)
+
+
+def feedback_figure(readings: Sequence[Reading], preset: str, stem: str | Path) -> Path:
+    """Draws loss per metre and speed against friction; dotted lines where the preset's feedback was tuned.
+
+    Args:
+        readings: What `slip_feedback` found.
+        preset: One of `GAITS`.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written.
+
+    Returns:
+        The path of the picture in pixels.
+
+    Raises:
+        RunFileError: A file cannot be written.
+    """
+    costs: dict[str, tuple[list[float], list[float]]] = {}
+    speeds: dict[str, tuple[list[float], list[float]]] = {}
+    for feedback in FEEDBACKS:
+        own = [(one.friction, one.cost) for one in readings if one.feedback == feedback and one.cost is not None]
+        if own:
+            frictions = [friction for friction, _ in own]
+            costs[feedback] = frictions, [cost.loss_J_per_m for _, cost in own]
+            speeds[feedback] = frictions, [100 * cost.speed_m_per_s for _, cost in own]
+    tuned_at = TUNED_AT if preset == PRESET else ()
+    with canvas(3.0) as figure:
+        cost, pace = figure.subplots(1, 2)
+        for axes, lines in ((cost, costs), (pace, speeds)):
+            axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at else ""))
+            for friction in tuned_at:
+                axes.axvline(friction, color="0.35", linewidth=0.8, linestyle=":")
+            draw_lines(axes, lines, markersize=4)
+        panel_title(cost, "What slip costs")
+        cost.set(ylabel="work lost to friction (J/m)", yscale="log")
+        cost.set_yticks(LOSS_TICKS, [f"{loss}" for loss in LOSS_TICKS])
+        cost.minorticks_off()
+        cost.legend(title="feedback")
+        panel_title(pace, "How fast it is")
+        pace.set_ylabel("speed (cm/s)")
+        pace.set_ylim(bottom=0.0)
+        return save_both(figure, stem)

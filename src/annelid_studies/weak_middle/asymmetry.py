@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,29 +19,13 @@ from annelid_studies.weak_middle.sweeps import (
     FRICTION,
     WEIGHT,
     Point,
+    Quantity,
     Reading,
     compute,
 )
-from annelid_studies.weak_middle.worms import friction_changes, weight_changes
 
 STAGE = "two interior segments"
 _ENDS = "ends"
-
-
-class Cause(NamedTuple):
-    """A quantity that may differ between two interior segments.
-
-    Attributes:
-        name: In one word, for the CSV.
-        label: In words, with its unit.
-        values: Its values.
-        changes: Fields of the base worm for a value.
-    """
-
-    name: str
-    label: str
-    values: tuple[float, ...]
-    changes: Callable[[float], dict[str, Any]]
 
 
 def spring_changes(stiffness_N_per_m: float) -> dict[str, Any]:
@@ -49,11 +33,11 @@ def spring_changes(stiffness_N_per_m: float) -> dict[str, Any]:
     return {"body.springs.stiffness_N_per_m": stiffness_N_per_m}
 
 
-FORCE = Cause("force", "force limit of its servo (N)", (12.0, 12.6, 13.2, 13.8, 14.4, 15.0), lambda _: {})
+FORCE = Quantity("force", "force limit of its servo (N)", (12.0, 12.6, 13.2, 13.8, 14.4, 15.0), lambda _: {})
 CAUSES = (
-    Cause("springs", "rate of the springs (N/m)", (14.0, 17.0, 20.0, 24.5, 29.0, 32.0), spring_changes),
-    Cause(WEIGHT.name, "mass of the worm (kg)", (0.6, *WEIGHT.values["full"][1:]), weight_changes),
-    Cause(FRICTION.name, FRICTION.label, (*FRICTION.values["full"], 2.0), friction_changes),
+    Quantity("springs", "rate of the springs (N/m)", (14.0, 17.0, 20.0, 24.5, 29.0, 32.0), spring_changes),
+    WEIGHT._replace(values=(0.6, *WEIGHT.values[1:])),
+    FRICTION._replace(values=(*FRICTION.values, 2.0)),
 )
 """Quantities of the whole worm: what they do is a bound to what the same difference in one segment could do."""
 END_FORCES_N = (12.8, 13.1, 13.4)

@@ -1,27 +1,43 @@
-"""What the study leaves behind: its CSV, its tables, and what its figure is drawn from."""
+"""What the study leaves behind: its CSV, its tables and its figure."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from annelid.analysis.elongation import interior_deficit
 from annelid.analysis.paper import published
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.config import load_config
+from annelid.draw.canvas import canvas, save_both
+from annelid.draw.markdown import Table
+from annelid.draw.style import panel_title, segment_colors
 from annelid.output import write_csv
-from annelid_studies.figures.weak_middle import Panel
-from annelid_studies.weak_middle.asymmetry import Asymmetry
-from annelid_studies.weak_middle.pulls import ACTUATORS
-from annelid_studies.weak_middle.settings import Key, Setting
-from annelid_studies.weak_middle.sweeps import BASE, QUANTITIES, Quantity, Reading, deficits
+from annelid_studies.tables import tabulated, terminal_table
+from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry
+from annelid_studies.weak_middle.pulls import ACTUATORS, Key, Setting
+from annelid_studies.weak_middle.sweeps import (
+    BASE,
+    FRICTION,
+    QUANTITIES,
+    STIFFNESS,
+    WEIGHT,
+    Quantity,
+    Reading,
+    deficits,
+)
 from annelid_studies.worms import CHAIN
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from matplotlib.axes import Axes
+    from rich.table import Table as TerminalTable
 
+PERCENT = 100.0
+FADED = "0.35"
 COLUMNS = (
     "quantity",
     "value",
@@ -80,88 +96,118 @@ def papers_deficit() -> float:
     return interior_deficit(elongation)
 
 
-def panels(readings: Sequence[Reading]) -> list[Panel]:
-    """Gathers the sweeps for the figure."""
-    return [
-        Panel(
-            quantity.title,
-            quantity.label,
-            BASE[quantity.name],
-            {kind: deficits(readings, quantity, kind) for kind in ACTUATORS},
-            logarithmic=quantity.name in ("stiffness", "friction"),
-            names={0.0: "weightless"} if quantity.name == "weight" else {},
-        )
-        for quantity in QUANTITIES
-    ]
+def weak_middle_figure(readings: Sequence[Reading], stem: str | Path) -> Path:
+    """Draws the deficit over every quantity, a panel each, one line for every kind of actuator.
+
+    Args:
+        readings: The sweeps.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written.
+
+    Returns:
+        The path of the picture in pixels.
+
+    Raises:
+        RunFileError: A file cannot be written.
+    """
+    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
+    largest = max([*marks.values(), *(one.deficit for one in readings if isfinite(one.deficit))])
+    with canvas(6.0) as figure:
+        grid = figure.subplots(2, 2, sharey=True, squeeze=False)
+        for letter, axes, quantity in zip("abcd", grid.flat, QUANTITIES, strict=True):
+            _draw(axes, readings, quantity)
+            panel_title(axes, f"{letter}) {quantity.title}")
+            for value in marks.values():
+                axes.axhline(PERCENT * value, color=FADED, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+            axes.set_ylim(0.0, 1.08 * PERCENT * largest)
+        for left, right in grid:
+            left.set_ylabel("interior below the ends (%)")
+            beside: dict[str, Any] = {"xycoords": right.get_yaxis_transform(), "xytext": (4, 0), "va": "center"}
+            for name, value in marks.items():
+                text = f"{name}\n{PERCENT * value:.0f} %"
+                look = {"textcoords": "offset points", "fontsize": 7.5, "color": FADED}
+                right.annotate(text, (1.0, PERCENT * value), **beside, **look)
+        handles, labels = grid.flat[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), handlelength=3.0)
+        return save_both(figure, stem)
 
 
-def settings_table(set_to: Mapping[Key, Setting]) -> Table:
+def _draw(axes: Axes, readings: Sequence[Reading], quantity: Quantity) -> None:
+    values = np.array([])
+    looks = zip(segment_colors(4), ("o", "o", "^", "s"), ("-", (0, (1.2, 1.2)), (0, (5, 2)), "-"), strict=True)
+    for order, (kind, (color, marker, dashes)) in enumerate(zip(ACTUATORS, looks, strict=True)):
+        values, deficit = deficits(readings, quantity, kind)
+        # Wherever the servo stalls its line lies on the force-limited one, so it is drawn as rings around that.
+        ring = kind == "servo"
+        look = {"markersize": 7.5 if ring else 4.5, "markerfacecolor": "none" if ring else color, "zorder": 6 - order}
+        axes.plot(values, PERCENT * deficit, label=kind, color=color, marker=marker, linestyle=dashes, **look)
+    axes.axvline(BASE[quantity.name], color="0.7", linewidth=0.8, zorder=0, label="base worm")
+    axes.set_xlabel(quantity.label)
+    if quantity in (STIFFNESS, FRICTION):
+        axes.set_xscale("log")
+    weightless = quantity is WEIGHT
+    axes.set_xticks(values, ["weightless" if weightless and value == 0 else f"{value:g}" for value in values])
+    axes.minorticks_off()
+
+
+def settings_table(set_to: Mapping[Key, Setting]) -> TerminalTable:
     """Tabulates how strongly the actuators pull."""
-    from rich.table import Table
-
-    table = Table("worm", "", title="an end pulled to the robot's elongation")
-    for heading in ("force limit (N)", "cable wound to (m)", "ring (m)", "muscle's activation"):
-        table.add_column(heading, justify="right")
     labels = {quantity.name: quantity.label for quantity in QUANTITIES}
-    for (name, value), one in set_to.items():
-        numbers = (f"{one.force_N:.2f}", f"{one.length_m:.4f}", f"{one.ring_length_m:.4f}", f"{one.activation:.4f}")
-        table.add_row(labels.get(name, name), f"{value:g}" if name in labels else "", *numbers)
-    return table
+    rows = [
+        [
+            labels.get(name, name),
+            f"{value:g}" if name in labels else "",
+            f"{one.force_N:.2f}",
+            f"{one.length_m:.4f}",
+            f"{one.ring_length_m:.4f}",
+            f"{one.activation:.4f}",
+        ]
+        for (name, value), one in set_to.items()
+    ]
+    header = ["worm", "", "force limit (N)", "cable wound to (m)", "ring (m)", "muscle's activation"]
+    return terminal_table(Table(header, rows), "an end pulled to the robot's elongation", n_words=2)
 
 
-def sweep_table(readings: Sequence[Reading], quantity: Quantity) -> Table:
+def sweep_table(readings: Sequence[Reading], quantity: Quantity) -> TerminalTable:
     """Tabulates one sweep: deficit, and elongations from the front to the middle."""
-    from rich.table import Table
-
-    table = Table(quantity.label, title="deficit of the interior, % (elongation from the front to the middle, cm)")
     own = [one for one in readings if one.point.quantity == quantity.name and not one.point.resolution]
-    for kind in ACTUATORS:
-        table.add_column(kind, justify="right")
-    for value in dict.fromkeys(one.point.value for one in own):
-        table.add_row(f"{value:g}", *(_cell(one) for one in own if one.point.value == value))
-    return table
+    values = dict.fromkeys(one.point.value for one in own)
+    rows = [[f"{value:g}", *(_cell(one) for one in own if one.point.value == value)] for value in values]
+    title = "deficit of the interior, % (elongation from the front to the middle, cm)"
+    return terminal_table(Table([quantity.label, *ACTUATORS], rows), title)
 
 
-def checks_table(readings: Sequence[Reading]) -> Table:
+def checks_table(readings: Sequence[Reading]) -> TerminalTable:
     """Tabulates deficits at other resolutions, with force-limited actuators."""
-    from rich.table import Table
-
-    table = Table("mass of the worm (kg)", "resolution", title="force-limited, at other resolutions")
-    table.add_column("deficit, % (elongation, cm)", justify="right")
     masses = [one.point.value for one in readings if one.point.resolution]
-    for one in readings:
-        point = one.point
-        if (point.quantity, point.actuator.kind) == ("weight", "force-limited") and point.value in masses:
-            table.add_row(f"{point.value:g}", point.resolution or "the study's", _cell(one))
-    return table
+    rows = [
+        [f"{one.point.value:g}", one.point.resolution or "the study's", _cell(one)]
+        for one in readings
+        if (one.point.quantity, one.point.actuator.kind) == ("weight", "force-limited") and one.point.value in masses
+    ]
+    header = [WEIGHT.label, "resolution", "deficit, % (elongation, cm)"]
+    return terminal_table(Table(header, rows), "force-limited, at other resolutions", n_words=2)
 
 
-def asymmetry_table(found: Asymmetry) -> Table:
+def asymmetry_table(found: Asymmetry) -> TerminalTable:
     """Tabulates what the robot's segments 2 and 3 would take."""
-    from rich.table import Table
-
     weak, strong = (f"{100 * one:.2f} cm" for one in ROBOT_ELONGATION_M[1:-1])
-    table = Table("one cause alone", title="what makes an interior segment as weak and as strong as the robot's two")
-    for heading in (weak, strong, "difference", "tried, cm"):
-        table.add_column(heading, justify="right")
-    for one in found.answers:
-        low, high = one.tried
-        difference = f"{100 * one.difference:.0f} %" if isfinite(one.difference) else "-"
-        table.add_row(
-            one.label,
-            _number(one.weak, 3) or "-",
-            _number(one.strong, 3) or "-",
-            difference,
-            f"{100 * low:.2f} to {100 * high:.2f}",
-        )
+    columns: Mapping[str, Callable[[Answer], str]] = {
+        "one cause alone": lambda one: one.label,
+        weak: lambda one: _number(one.weak, 3) or "-",
+        strong: lambda one: _number(one.strong, 3) or "-",
+        "difference": lambda one: f"{100 * one.difference:.0f} %" if isfinite(one.difference) else "-",
+        "tried, cm": lambda one: " to ".join(f"{100 * end:.2f}" for end in one.tried),
+    }
+    caption = ""
     if found.confirmed is not None:
         limits = " / ".join(f"{one:.2f}" for one in found.limits_N)
-        reached = " / ".join(f"{100 * one:.2f}" for one in found.confirmed.elongation_m)
-        robot = " / ".join(f"{100 * one:.2f}" for one in ROBOT_ELONGATION_M)
-        table.caption = (
-            f"with force limits of {limits} N the segments elongate by {reached} cm; the robot's by {robot} cm"
+        reached, robot = (
+            " / ".join(f"{100 * one:.2f}" for one in lengths)
+            for lengths in (found.confirmed.elongation_m, ROBOT_ELONGATION_M)
         )
-    return table
+        caption = f"with force limits of {limits} N the segments elongate by {reached} cm; the robot's by {robot} cm"
+    title = "what makes an interior segment as weak and as strong as the robot's two"
+    return terminal_table(tabulated(found.answers, columns), title, caption=caption)
 
 
 def _cell(reading: Reading) -> str:

@@ -8,16 +8,26 @@ from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.analysis.elongation import interior_deficit
+from annelid.body.assemble import mesh_of
+from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store, case_key
+from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort
-from annelid_studies.weak_middle.pulls import Actuator, Pulled, base_body, pull, read_pull
-from annelid_studies.weak_middle.settings import GUESSES_M, Key, Setting, settings
-from annelid_studies.weak_middle.worms import friction_changes, segment_changes, stiffness_changes, weight_changes
+from annelid_studies.weak_middle.pulls import (
+    GUESSES_M,
+    Actuator,
+    Key,
+    Pulled,
+    Setting,
+    base_body,
+    pull,
+    read_pull,
+    settings,
+)
 
 
 class Quantity(NamedTuple):
@@ -25,46 +35,75 @@ class Quantity(NamedTuple):
 
     Attributes:
         name: In one word, for the CSV.
-        title: In a few words, for a panel.
         label: For the axis of a panel and the head of a table, with its unit.
-        values: Values of the full study and of the quick one, in that unit.
+        values: Values of the full study, in that unit.
         changes: Fields of the base worm for a value.
+        quick: Values of the quick study.
+        title: In a few words, for a panel.
     """
 
     name: str
-    title: str
     label: str
-    values: Mapping[Effort, tuple[float, ...]]
+    values: tuple[float, ...]
     changes: Callable[[float], dict[str, Any]]
+    quick: tuple[float, ...] = ()
+    title: str = ""
 
 
-SEGMENTS = Quantity(
-    "segments",
-    "Length of the worm",
-    "number of segments",
-    {"full": (3, 4, 5, 6, 7, 8), "quick": (3, 4)},
-    segment_changes,
-)
+def segment_changes(n_segments: float) -> dict[str, Any]:
+    """Fields for a number of segments."""
+    return {"body.mesh.n_segments": int(n_segments)}
+
+
+def stiffness_changes(young_GPa: float) -> dict[str, Any]:
+    """Fields for a Young's modulus, GPa.
+
+    Shear modulus and damping keep their ratios to it, so that soft rods come to rest as soon as stiff ones.
+    """
+    strands = base_body().strands
+    share = young_GPa * 1e9 / strands.young_modulus_Pa
+    return {
+        "body.strands.young_modulus_Pa": young_GPa * 1e9,
+        "body.strands.shear_modulus_Pa": round(share * strands.shear_modulus_Pa),
+        "body.strands.joint_damping_Nms_per_rad": round(share * strands.joint_damping_Nms_per_rad, 6),
+    }
+
+
+def weight_changes(mass_kg: float) -> dict[str, Any]:
+    """Fields for a mass of the worm, kg, that its pins carry; 0 is a worm of the base worm's mass without weight.
+
+    Raises:
+        ConfigError: The strands alone weigh more.
+    """
+    if mass_kg == 0:
+        return {"arena.gravity_m_per_s2": 0.0}
+    body = base_body()
+    mesh = mesh_of(body.mesh)
+    strands_kg = mesh.n_strands * mesh.strand_length_m * body.strands.linear_density_kg_per_m
+    if mass_kg <= strands_kg:
+        raise ConfigError(f"mass_kg = {mass_kg:g} must be above {strands_kg:.3f}, which the strands weigh alone")
+    return {"body.pins.mass_kg": round((mass_kg - strands_kg) / mesh.n_crossings, 9)}
+
+
+def friction_changes(friction: float) -> dict[str, Any]:
+    """Fields for a coefficient of friction."""
+    return {"arena.friction": friction}
+
+
+SEGMENTS = Quantity("segments", "number of segments", (3, 4, 5, 6, 7, 8), segment_changes, (3, 4), "Length of the worm")
 STIFFNESS = Quantity(
     "stiffness",
-    "Stiffness of the rods",
     "Young's modulus (GPa)",
-    {"full": (0.3, 0.5, 0.8, 1.2, 2.0), "quick": (0.5, 2.0)},
+    (0.3, 0.5, 0.8, 1.2, 2.0),
     stiffness_changes,
+    (0.5, 2.0),
+    "Stiffness of the rods",
 )
 WEIGHT = Quantity(
-    "weight",
-    "Weight",
-    "mass of the worm (kg)",
-    {"full": (0.0, 0.77, 1.3, 1.87, 2.4, 3.0), "quick": (0.0, 1.87)},
-    weight_changes,
+    "weight", "mass of the worm (kg)", (0.0, 0.77, 1.3, 1.87, 2.4, 3.0), weight_changes, (0.0, 1.87), "Weight"
 )
 FRICTION = Quantity(
-    "friction",
-    "Friction",
-    "friction of the ground",
-    {"full": (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5), "quick": (0.1, 0.7)},
-    friction_changes,
+    "friction", "friction of the ground", (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5), friction_changes, (0.1, 0.7), "Friction"
 )
 QUANTITIES = (SEGMENTS, STIFFNESS, WEIGHT, FRICTION)
 """The sweeps. Every one passes through the base worm."""
@@ -170,6 +209,11 @@ def compute(
     ]
 
 
+def values_of(quantity: Quantity, effort: Effort) -> tuple[float, ...]:
+    """Returns the values of a quantity that are swept at an effort."""
+    return quantity.values if effort == "full" else quantity.quick
+
+
 def worm_key(quantity: Quantity, value: float) -> Key:
     """Names the worm that the actuators of a point are set for; longer worms have those of the base worm."""
     longer = quantity is SEGMENTS and value > BASE[SEGMENTS.name]
@@ -188,7 +232,7 @@ def sweep_points(quantity: Quantity, effort: Effort, set_to: Mapping[Key, Settin
         set_to: Settings by `worm_key`.
     """
     points = []
-    for value in quantity.values[effort]:
+    for value in values_of(quantity, effort):
         actuators = set_to[worm_key(quantity, value)].actuators().values()
         n_segments = int(value) if quantity is SEGMENTS else base_body().n_segments
         changes = {} if value == BASE[quantity.name] else quantity.changes(value)
@@ -203,7 +247,7 @@ def all_settings(store: Store, effort: Effort, jobs: int | None, progress: Study
     near = (found[BASE_KEY].length_m,)
     worms, guesses = {}, {}
     for quantity in QUANTITIES:
-        for value in quantity.values[effort]:
+        for value in values_of(quantity, effort):
             key = worm_key(quantity, value)
             if key != BASE_KEY:
                 worms[key], guesses[key] = quantity.changes(value), GUESSES_M if quantity is STIFFNESS else near
@@ -246,9 +290,7 @@ def weak_middle(
     return set_to, compute(store, points, "pulling", jobs, progress)
 
 
-def deficits(
-    readings: Sequence[Reading], quantity: Quantity, kind: str
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def deficits(readings: Sequence[Reading], quantity: Quantity, kind: str) -> tuple[Array, Array]:
     """Returns values and deficits of one sweep with one kind of actuator, NaN where there is none, each ``(n,)``."""
     own = [
         one

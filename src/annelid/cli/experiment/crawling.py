@@ -69,15 +69,10 @@ def slip_command(
     annelid experiment slip --quick
     annelid experiment slip --preset crawler -o slip-crawler
     """
-    import numpy as np
-
-    from annelid_studies.figures.slip import feedback_figure
     from annelid_studies.slip.feedback import (
-        FEEDBACKS,
         FRICTIONS,
-        PRESET,
         QUICK,
-        TUNED_AT,
+        feedback_figure,
         feedback_table,
         slip_feedback,
         write_readings,
@@ -87,14 +82,7 @@ def slip_command(
         readings = slip_feedback(store, QUICK if quick else FRICTIONS, preset=preset, jobs=jobs, progress=progress)
     path = output / "slip.csv"
     write_readings(readings, path)
-    lines = {}
-    for feedback in FEEDBACKS:
-        judged = [(one.friction, one.cost) for one in readings if one.feedback == feedback and one.cost is not None]
-        rows = np.array([(friction, cost.loss_J_per_m, cost.speed_m_per_s) for friction, cost in judged])
-        if len(rows):
-            lines[feedback] = (rows[:, 0], rows[:, 1], rows[:, 2])
-    tuned_at = TUNED_AT if preset == PRESET else ()
-    written = path, feedback_figure(lines, tuned_at, path.with_suffix(""))
+    written = path, feedback_figure(readings, preset, path.with_suffix(""))
     print_results(written, feedback_table(readings, preset), quiet=quiet)
 
 
@@ -117,13 +105,10 @@ def slip_detector_command(
     annelid experiment slip-detector --quick
     annelid experiment slip-detector -o slip
     """
-    from annelid.analysis.detector import score
-    from annelid_studies.figures.slip import detector_figure
     from annelid_studies.slip.detection import (
-        LIMIT_M_PER_S,
         QUICK,
-        curves,
         detection_table,
+        detector_figure,
         scores,
         slip_detection,
         write_scores,
@@ -134,9 +119,7 @@ def slip_detector_command(
     told = scores(detections)
     path = output / "slip_detector.csv"
     write_scores(told, path)
-    together = score(list(detections.values()), LIMIT_M_PER_S)
-    chosen = together.recall, together.precision
-    written = path, detector_figure(curves(detections), chosen, path.with_suffix(""))
+    written = path, detector_figure(detections, path.with_suffix(""))
     print_results(written, detection_table(told), quiet=quiet)
 
 

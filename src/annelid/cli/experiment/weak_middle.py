@@ -35,16 +35,13 @@ def weak_middle_command(
     annelid experiment weak-middle --quick
     annelid experiment weak-middle -o weak-middle
     """
-    from annelid_studies.figures.weak_middle import weak_middle_figure
     from annelid_studies.weak_middle.asymmetry import asymmetry
     from annelid_studies.weak_middle.results import (
         asymmetry_table,
         checks_table,
-        panels,
-        papers_deficit,
-        robot_deficit,
         settings_table,
         sweep_table,
+        weak_middle_figure,
         write_readings,
     )
     from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
@@ -58,5 +55,4 @@ def weak_middle_command(
     tables += [checks_table(readings), asymmetry_table(found)] if found else []
     path = output / "weak_middle.csv"
     write_readings([*readings, *(found.readings if found else ())], path)
-    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
-    print_results((path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))), *tables, quiet=quiet)
+    print_results((path, weak_middle_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)

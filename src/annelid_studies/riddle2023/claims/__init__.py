@@ -3,13 +3,10 @@
 Places are those of Riddle et al. 2023, "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control".
 """
 
-from annelid_studies.riddle2023.claims.actuation import actuation_claims
-from annelid_studies.riddle2023.claims.control import control_claims
-from annelid_studies.riddle2023.claims.discussion import discussion_claims
+from annelid_studies.riddle2023.claims.behaviour import control_claims, result_claims
+from annelid_studies.riddle2023.claims.discussion import discussion_claims, outlook_claims
 from annelid_studies.riddle2023.claims.evidence import Evidence, claim_cases, rule
-from annelid_studies.riddle2023.claims.outlook import outlook_claims
-from annelid_studies.riddle2023.claims.results import result_claims
-from annelid_studies.riddle2023.claims.structure import structure_claims
+from annelid_studies.riddle2023.claims.model import actuation_claims, structure_claims
 from annelid_studies.riddle2023.contents import Claim
 
 __all__ = ["Evidence", "claim_cases", "paper_claims", "rule"]

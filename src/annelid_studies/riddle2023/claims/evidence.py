@@ -16,7 +16,7 @@ from annelid.morphology import Array
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.contents import Verdict
 from annelid_studies.riddle2023.examination import Effort, Findings, Results
-from annelid_studies.riddle2023.examinations.side_by_side import WORMS
+from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.slip import detection
 from annelid_studies.worms import CHAIN, FAST, PLANAR, chain, fast, one_after_the_other, rods
 
@@ -201,18 +201,6 @@ def judged(has: Iterable[bool], on: str = "") -> tuple[Verdict, str]:
     if all(found):
         return "holds", ""
     return ("rests on", on) if any(found) else ("does not hold", "")
-
-
-def between(values: Iterable[float], scale: float = 1.0, digits: int = 2) -> str:
-    """Writes the range of some numbers, ``1.20 to 1.40``, or the number where all print alike."""
-    found = scale * np.array([*values])
-    low, high = (f"{value:.{digits}f}" for value in (found.min(), found.max()))
-    return low if low == high else f"{low} to {high}"
-
-
-def centimetres(values: Sequence[float | None] | None, digits: int = 2) -> str:
-    """Writes lengths given in m as ``1.00 / 2.00 cm``."""
-    return " / ".join("-" if value is None else f"{100 * value:.{digits}f}" for value in values or ()) + " cm"
 
 
 def order_of(outcome: Outcome) -> str:

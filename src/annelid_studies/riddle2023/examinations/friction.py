@@ -2,43 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from annelid.analysis.elongation import middle_deficit
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
 from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations.side_by_side import (
-    CM,
-    PAPERS,
-    SPRUNG,
-    TIGHT,
-    WORMS,
-    Worm,
-    all_in_cm,
-    capitalised,
-    draw_rhythms,
-    held_elongation,
-    in_cm,
-    in_percent,
-    kept,
-    legend_below,
-    listed,
-    look_handle,
-    number,
-    parameter_ticks,
-    rhythm_words,
-    span,
-    walked_elongation,
-)
+from annelid_studies.riddle2023.examinations import design, plots, words
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.words import CM, MM, PERCENT
+from annelid_studies.tables import tabulated
 from annelid_studies.worms import one_after_the_other, rods
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
@@ -51,7 +26,6 @@ NEGLIGIBLE_M = 0.01
 """Travel below this, a fiftieth of the body in two cycles, is called negligible."""
 
 _FIELD = "arena.friction"
-_OPEN = (SPRUNG, TIGHT)
 
 
 def frictions_of(worm: Worm, effort: Effort) -> Sequence[float]:
@@ -61,213 +35,139 @@ def frictions_of(worm: Worm, effort: Effort) -> Sequence[float]:
     return (PAPERS_FRICTION,) if worm is PAPERS else (SLIPPERY, 0.4, PAPERS_FRICTION)
 
 
-def _walking(worm: Worm, friction: float) -> Case:
-    return worm.case({_FIELD: friction})
+def _points(effort: Effort) -> list[Point]:
+    return [
+        Point(worm, friction, worm.case({_FIELD: friction}), _hold(worm, friction))
+        for worm in WORMS
+        for friction in frictions_of(worm, effort)
+    ]
 
 
-def _held(worm: Worm, friction: float) -> Case:
+def _hold(worm: Worm, friction: float) -> Case | None:
+    if worm is PAPERS or friction not in (SLIPPERY, PAPERS_FRICTION):
+        return None
     return worm.case({**one_after_the_other(), _FIELD: friction})
 
 
-def _solved(timestep_s: float, ratio: float) -> Case:
-    return rods({"clock.physics_timestep_s": timestep_s, "body.formulation.friction_impedance_ratio": ratio})
-
-
-def _solutions(effort: Effort) -> Sequence[tuple[float, float]]:
-    return [(step, ratio) for step in TIMESTEPS_S for ratio in IMPEDANCE_RATIOS] if effort == "full" else []
+def _solved(effort: Effort) -> dict[tuple[float, float], Case]:
+    """Tight rods at the paper's friction, by physics step (s) and impedance ratio of the friction cone."""
+    return {
+        (step, ratio): rods({"clock.physics_timestep_s": step, "body.formulation.friction_impedance_ratio": ratio})
+        for step in TIMESTEPS_S
+        for ratio in IMPEDANCE_RATIOS
+        if effort == "full"
+    }
 
 
 def _cases(effort: Effort) -> Sequence[Case]:
-    return [
-        *(_walking(worm, friction) for worm in WORMS for friction in frictions_of(worm, effort)),
-        *(_held(worm, friction) for worm in _OPEN for friction in (SLIPPERY, PAPERS_FRICTION)),
-        *(_solved(*solution) for solution in _solutions(effort)),
-    ]
-
-
-class _Series(NamedTuple):
-    """One worm in closed loop over the frictions."""
-
-    worm: Worm
-    frictions: Sequence[float]
-    outcomes: Sequence[Outcome]
-
-    @property
-    def travel_m(self) -> NDArray[np.float64]:
-        """Towards the front, against the axis x, which runs from front to rear."""
-        return np.array([number(outcome.summary.travel_m) for outcome in self.outcomes])
-
-    @property
-    def elongation_m(self) -> NDArray[np.float64]:
-        return np.array([walked_elongation(outcome) for outcome in self.outcomes])
-
-    @property
-    def deficit(self) -> NDArray[np.float64]:
-        """Over all springs."""
-        return np.array([middle_deficit(elongation) for elongation in self.elongation_m])
-
-    def at(self, friction: float) -> int:
-        return list(self.frictions).index(friction)
+    return [*design.cases_of(_points(effort)), *_solved(effort).values()]
 
 
 def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    every = [
-        _Series(worm, frictions := frictions_of(worm, effort), [results[_walking(worm, f)] for f in frictions])
-        for worm in WORMS
-    ]
-    held = {
-        worm.name: tuple(middle_deficit(held_elongation(results[_held(worm, f)])) for f in (SLIPPERY, PAPERS_FRICTION))
-        for worm in _OPEN
-    }
-    solved = [
-        (step, ratio, number(results[_solved(step, ratio)].summary.travel_m)) for step, ratio in _solutions(effort)
-    ]
-    _draw(every, held, stem)
-    numbers: dict[str, Any] = {}
-    for series in every:
-        name = series.worm.name
-        for i, friction in enumerate(series.frictions):
-            numbers[f"travel_friction_{friction:g}_{name}_m"] = kept(series.travel_m[i])
-            numbers[f"deficit_closed_mean_friction_{friction:g}_{name}"] = kept(series.deficit[i])
-            numbers[f"verdict_friction_{friction:g}_{name}"] = rhythm_words(series.outcomes[i].rhythm)
-        walk = [f"{f:g}" for f, o in zip(series.frictions, series.outcomes, strict=True) if o.rhythm.is_one_wave]
-        numbers[f"frictions_that_walk_{name}"] = listed(walk)
-    for name, (slippery, rough) in held.items():
-        numbers[f"deficit_open_mean_friction_{SLIPPERY:g}_{name}"] = kept(slippery)
-        numbers[f"deficit_open_mean_friction_{PAPERS_FRICTION:g}_{name}"] = kept(rough)
-    numbers["travel_friction_1_m"] = kept(every[0].travel_m[every[0].at(PAPERS_FRICTION)])
-    for step, ratio, travel in solved:
-        numbers[f"travel_rods_{step * 1e3:g}ms_impratio_{ratio:g}_m"] = kept(travel)
+    readings = design.read(_points(effort), results)
+    held = [one for one in readings if one.hold]
+    solved = {at: design.number(results[case].summary.travel_m) for at, case in _solved(effort).items()}
+    _draw(readings, held, stem)
+    at_papers = [one for one in readings if one.value == PAPERS_FRICTION]
+    numbers = design.numbered(
+        readings,
+        {
+            "travel_friction_{value:g}_{worm}_m": lambda one: one.travel_m,
+            "deficit_closed_mean_friction_{value:g}_{worm}": lambda one: one.deficit,
+            "verdict_friction_{value:g}_{worm}": lambda one: words.rhythm(one.rhythm),
+        },
+    )
+    numbers |= design.numbered(held, {"deficit_open_mean_friction_{value:g}_{worm}": lambda one: one.held_deficit})
+    numbers["travel_friction_1_m"] = at_papers[0].travel_m
+    numbers |= {f"travel_rods_{MM * step:g}ms_impratio_{ratio:g}_m": travel for (step, ratio), travel in solved.items()}
+    for worm, own in design.by_worm(readings).items():
+        numbers[f"frictions_that_walk_{worm.name}"] = words.listed(f"{one.value:g}" for one in own if one.walks)
+    small = [one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M]
+    parts = [rough.held_deficit - smooth.held_deficit for smooth, rough in design.by_worm(held).values()]
+    travels = words.told(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm")
+    slippery = {one.worm: words.in_percent(one.held_deficit) for one in held if one.value == SLIPPERY}
+    deficits = words.told(
+        (one for one in held if one.value == PAPERS_FRICTION),
+        lambda one: (
+            f"{slippery[one.worm]} % at {SLIPPERY:g} and {words.in_percent(one.held_deficit)} % at {one.value:g}"
+        ),
+    )
     return Findings(
-        answer=_answer(every, held),
+        answer=(
+            f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is negligible "
+            f"for {words.labels(small)} of them. In open loop the deficit of segment 2 over all springs is {deficits}: "
+            f"friction makes {words.span(parts, PERCENT, 1)} percentage points of it."
+        ),
         caption=(
             "Closed loop, 5 s, over the coefficient of friction: travel of the centre of mass, positive towards the "
             "front, against the wave; elongation of segments 1 and 2 (2 with empty markers), mean of six springs; the "
             "deficit of segment 2 below 1 in the same reading, in closed loop (filled) and open loop (empty); rhythm. "
-            f"One run a point, {', '.join(str(len(series.frictions)) for series in every)} frictions."
+            f"One run a point, {', '.join(str(len(own)) for own in design.by_worm(readings).values())} frictions."
         ),
-        table=_table(every, held),
-        remarks=_remarks(every, solved, effort),
+        table=tabulated(
+            readings,
+            {
+                "worm": lambda one: one.worm.label,
+                "friction (1)": lambda one: f"{one.value:g}",
+                "travel forwards in 5 s (cm)": lambda one: words.in_cm(one.travel_m),
+                "elongation, mean of springs (cm)": lambda one: words.all_in_cm(one.walked_m),
+                "deficit (%)": lambda one: words.in_percent(one.deficit, 1),
+                "deficit, first helix (%)": lambda one: words.in_percent(one.helix_deficit, 1),
+                "deficit, open loop (%)": lambda one: (
+                    words.in_percent(one.held_deficit, 1) if one.hold else words.NOTHING
+                ),
+                "rhythm": lambda one: words.rhythm(one.rhythm),
+            },
+        ),
+        remarks=[
+            *(_orders(worm, own) for worm, own in design.by_worm(readings).items()),
+            *([_convergence(solved)] if solved else []),
+            *([f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only."] if not solved else []),
+        ],
         numbers=numbers,
     )
 
 
-def _answer(every: Sequence[_Series], held: Mapping[str, tuple[float, ...]]) -> str:
-    travels = [series.travel_m[series.at(PAPERS_FRICTION)] for series in every]
-    goes = [f"{in_cm(t, 1)} cm ({s.worm.label})" for t, s in zip(travels, every, strict=True)]
-    small = [s.worm.label for t, s in zip(travels, every, strict=True) if abs(t) < NEGLIGIBLE_M]
-    sentences = [f"At friction {PAPERS_FRICTION:g} the centre of mass travels {listed(goes)} forwards in 5 s."]
-    if len(small) < len(every):
-        large = [s.worm.label for s in every if s.worm.label not in small]
-        sentences.append(
-            f"That is not negligible for {listed(large)}" + (f", and negligible for {listed(small)}." if small else ".")
-        )
-    shares = [
-        f"{in_percent(held[worm.name][0])} % at {SLIPPERY:g} and {in_percent(held[worm.name][1])} % at "
-        f"{PAPERS_FRICTION:g} ({worm.label})"
-        for worm in _OPEN
-    ]
-    parts = [rough - slippery for slippery, rough in held.values()]
-    sentences.append(
-        f"In open loop the deficit of segment 2 over all springs is {listed(shares)}: friction makes "
-        f"{span(parts, 100.0, 1)} percentage points of it."
+def _orders(worm: Worm, own: Sequence[Reading]) -> str:
+    fail = [f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in own if not one.walks]
+    walk = words.listed(f"{one.value:g}" for one in own if one.walks)
+    return f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}, lost at {words.listed(fail)}."
+
+
+def _convergence(solved: dict[tuple[float, float], float]) -> str:
+    travels = list(solved.values())
+    sizes = [f"{words.in_cm(t)} cm at {MM * step:g} ms and impratio {ratio:g}" for (step, ratio), t in solved.items()]
+    spread, scale = max(travels) - min(travels), float(np.mean(np.abs(travels)))
+    artefact = "is no artefact of step or friction cone" if spread < 0.2 * scale else "is known to that accuracy only"
+    return (
+        f"Convergence, tight rods at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. The spread is "
+        f"{words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel {artefact}."
     )
-    return " ".join(sentences)
 
 
-def _remarks(every: Sequence[_Series], solved: Sequence[tuple[float, float, float]], effort: Effort) -> list[str]:
-    remarks = []
-    for series in every:
-        pairs = list(zip(series.frictions, series.outcomes, strict=True))
-        walk = [f"{f:g}" for f, o in pairs if o.rhythm.is_one_wave]
-        fail = [f"{f:g} ({rhythm_words(o.rhythm)})" for f, o in pairs if not o.rhythm.is_one_wave]
-        sentence = f"{capitalised(series.worm.label)}: order 1-2-3 at friction {listed(walk)}"
-        remarks.append(
-            sentence + (f"; not at {listed(fail)}." if fail else "; no other was tried." if len(pairs) == 1 else ".")
-        )
-    if solved:
-        travels = [travel for *_, travel in solved]
-        sizes = [f"{in_cm(t)} cm at {step * 1e3:g} ms and impratio {ratio:g}" for step, ratio, t in solved]
-        spread = max(travels) - min(travels)
-        scale = float(np.mean(np.abs(travels)))
-        remarks.append(
-            f"Convergence, tight rods at friction {PAPERS_FRICTION:g}: travel {listed(sizes)}. The spread is "
-            f"{in_cm(spread)} cm, {100 * spread / scale:.0f} % of the mean; "
-            + (
-                "so the travel is no artefact of step or friction cone."
-                if spread < 0.2 * scale
-                else "so the travel is known to that accuracy and no better."
-            )
-        )
-    if effort == "quick":
-        remarks.append(f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only.")
-    return remarks
-
-
-def _table(every: Sequence[_Series], held: Mapping[str, tuple[float, ...]]) -> Table:
-    rows = []
-    for series in every:
-        opened = dict(zip((SLIPPERY, PAPERS_FRICTION), held.get(series.worm.name, ()), strict=False))
-        for i, friction in enumerate(series.frictions):
-            rows.append(
-                [
-                    series.worm.label,
-                    f"{friction:g}",
-                    in_cm(series.travel_m[i]),
-                    all_in_cm(series.elongation_m[i]),
-                    in_percent(series.deficit[i], 1),
-                    in_percent(series.outcomes[i].summary.middle_deficit, 1),
-                    in_percent(opened.get(friction), 1),
-                    rhythm_words(series.outcomes[i].rhythm),
-                ]
-            )
-    header = [
-        "worm",
-        "friction (1)",
-        "travel forwards in 5 s (cm)",
-        "elongation, mean of springs (cm)",
-        "deficit (%)",
-        "deficit, first helix (%)",
-        "deficit, open loop (%)",
-        "rhythm",
-    ]
-    return Table(header, rows)
-
-
-def _draw(every: Sequence[_Series], held: Mapping[str, tuple[float, ...]], stem: Path) -> None:
+def _draw(readings: Sequence[Reading], held: Sequence[Reading], stem: Path) -> None:
     with canvas(5.4) as figure:
         (travel, elongation), (deficit, rhythms) = figure.subplots(2, 2)
-        for series in every:
-            look = series.worm.look
-            travel.plot(series.frictions, CM * series.travel_m, **look)
-            for segment, face in ((0, series.worm.color), (1, "white")):
-                values = CM * series.elongation_m[:, segment]
-                elongation.plot(series.frictions, values, **{**look, "markerfacecolor": face})
-            deficit.plot(series.frictions, 100 * series.deficit, **look)
-            if series.worm.name in held:
-                values = [100 * value for value in held[series.worm.name]]
-                deficit.plot(
-                    (SLIPPERY, PAPERS_FRICTION), values, **{**look, "markerfacecolor": "white", "linewidth": 0.9}
-                )
+        plots.draw_over(travel, readings, lambda one: CM * one.travel_m)
         travel.axhline(0.0, color="0.3", linewidth=0.8)
+        for worm, own in design.by_worm(readings).items():
+            for segment in (0, 1):
+                plots.draw_over(elongation, own, lambda one, i=segment: CM * one.walked_m[i], hollow=segment == 1)
+            plots.draw_over(deficit, own, lambda one: PERCENT * one.deficit)
+            opened = [one for one in held if one.worm is worm]
+            plots.draw_over(deficit, opened, lambda one: PERCENT * one.held_deficit, hollow=True, linewidth=0.9)
         elongation.set_ylim(bottom=0.0)
-        rows = [(s.worm.short, [(f, o.rhythm) for f, o in zip(s.frictions, s.outcomes, strict=True)]) for s in every]
-        kinds = draw_rhythms(rhythms, rows)
-        panels = (
+        kinds = plots.draw_rhythms(rhythms, readings)
+        for axes, title, label in (
             (travel, "Travel", "forwards in 5 s (cm)"),
             (elongation, "Elongation of segments 1 and 2", "elongation (cm)"),
             (deficit, "Deficit", "segment 2 below segment 1 (%)"),
             (rhythms, "Rhythm", ""),
-        )
-        for axes, title, label in panels:
-            panel_title(axes, title)
-            axes.set_ylabel(label)
-            parameter_ticks(axes, FRICTIONS)
+        ):
+            plots.label_panel(axes, title, "coefficient of friction (1)", label, FRICTIONS, logarithmic=True)
             axes.set_xlim(0.042, 1.8)
-            axes.set_xlabel("coefficient of friction (1)")
-        worms = [look_handle(w.label, color=w.color, marker=w.marker, linestyle=w.line) for w in WORMS]
-        opened = look_handle("segment 2 / open loop", hollow=True, marker="o", linestyle="none")
-        legend_below(figure, [*worms, opened, *kinds], 4)
+        opened = plots.look_handle("segment 2 / open loop", hollow=True, marker="o", linestyle="none")
+        plots.legend_below(figure, [*plots.worm_handles(), opened, *kinds], 4)
         save_both(figure, stem)
 
 

@@ -4,56 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
 from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations.side_by_side import (
-    CM,
-    PAPERS,
-    SPRUNG,
-    TIGHT,
-    WORMS,
-    Worm,
-    all_in_cm,
-    capitalised,
-    draw_rhythms,
-    draw_segments,
-    held_elongation,
-    in_cm,
-    in_percent,
-    in_unit,
-    kept,
-    legend_below,
-    listed,
-    look_handle,
-    number,
-    rhythm_words,
-    segment_handles,
-    walked_elongation,
-)
+from annelid_studies.riddle2023.examinations import design, plots, words
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.words import CM, MM
+from annelid_studies.tables import tabulated
 from annelid_studies.worms import one_after_the_other
 
 RADII_M = (0.002, 0.00233, 0.00299)
 """The paper's strands, and the two radii of the authors' later files."""
 
 _FIELD = "body.strands.radius_m"
-_MM = 1e3
-
-
-def _walking(worm: Worm, radius_m: float) -> Case:
-    return worm.case({_FIELD: radius_m})
-
-
-def _held(worm: Worm, radius_m: float) -> Case:
-    return worm.case({**one_after_the_other(), _FIELD: radius_m})
 
 
 def _radii(worm: Worm, effort: Effort) -> Sequence[float]:
@@ -62,85 +26,64 @@ def _radii(worm: Worm, effort: Effort) -> Sequence[float]:
     return RADII_M[:1] if worm is PAPERS else RADII_M[::2]
 
 
-def _cases(effort: Effort) -> Sequence[Case]:
-    walking = [_walking(worm, radius) for worm in WORMS for radius in _radii(worm, effort)]
-    held = [_held(worm, radius) for worm in (SPRUNG, TIGHT) for radius in _radii(worm, effort)]
-    return [*walking, *held, _held(PAPERS, RADII_M[0])]
+def _points(effort: Effort) -> list[Point]:
+    return [
+        Point(worm, radius, worm.case({_FIELD: radius}), _hold(worm, radius))
+        for worm in WORMS
+        for radius in _radii(worm, effort)
+    ]
 
 
-class _Series(NamedTuple):
-    """One worm over the radii: closed-loop outcomes, and open-loop elongations, m, where they were run."""
-
-    worm: Worm
-    radii: Sequence[float]
-    outcomes: Sequence[Outcome]
-    held_m: NDArray[np.float64]
-
-    @property
-    def walked_m(self) -> NDArray[np.float64]:
-        return np.array([walked_elongation(outcome) for outcome in self.outcomes])
-
-    @property
-    def force_N(self) -> NDArray[np.float64]:
-        return np.array([number(outcome.summary.contraction_force_median_N) for outcome in self.outcomes])
+def _hold(worm: Worm, radius_m: float) -> Case | None:
+    if worm is PAPERS and radius_m != RADII_M[0]:
+        return None
+    return worm.case({**one_after_the_other(), _FIELD: radius_m})
 
 
-def _series(results: Results, worm: Worm, effort: Effort) -> _Series:
-    radii = _radii(worm, effort)
-    held = radii[:1] if worm is PAPERS else radii
-    return _Series(
-        worm,
-        radii,
-        [results[_walking(worm, radius)] for radius in radii],
-        np.array([held_elongation(results[_held(worm, radius)]) for radius in held]),
-    )
+def _stiffness(radius_m: float) -> float:
+    """Bending stiffness relative to that of the paper's strands."""
+    return (radius_m / RADII_M[0]) ** 4
 
 
 def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    every = [_series(results, worm, effort) for worm in WORMS]
-    _draw(every, stem)
-    stiffer = (RADII_M[-1] / RADII_M[0]) ** 4
-    varied = [series for series in every if len(series.radii) > 1]
-    held = [
-        f"from {in_cm(series.held_m[0, 0])} to {in_cm(series.held_m[-1, 0])} cm ({series.worm.label})"
-        for series in varied
-        if len(series.held_m) > 1
-    ]
-    forces = [
-        f"from {in_unit(series.force_N[0])} to {in_unit(series.force_N[-1])} N ({series.worm.label})"
-        for series in varied
-    ]
-    fates = [f"{series.worm.label}: {rhythm_words(series.outcomes[-1].rhythm)}" for series in varied]
-    walks = [series for series in varied if series.outcomes[-1].rhythm.is_one_wave]
-    verdict = (
-        "all keep the order 1-2-3"
-        if len(walks) == len(varied)
-        else "none keeps the order 1-2-3"
-        if not walks
-        else f"only {listed([series.worm.label for series in walks])} {_keep(walks)} the order 1-2-3"
+    readings = design.read(_points(effort), results)
+    _draw(readings, stem)
+    thinnest = {one.worm: one for one in readings if one.value == RADII_M[0]}
+    thickest = [one for one in readings if one.value == RADII_M[-1]]
+    keep = [one for one in thickest if one.walks]
+    # Names of numbers tell the radius in micrometres.
+    in_micrometres = [Reading(one.worm, 1e6 * one.value, one.walk, one.hold) for one in readings]
+    numbers = design.numbered(
+        in_micrometres,
+        {
+            "verdict_{value:.0f}um_{worm}": lambda one: words.rhythm(one.rhythm),
+            "force_{value:.0f}um_{worm}_N": lambda one: one.force_N,
+            "elongation_closed_first_{value:.0f}um_{worm}_m": lambda one: one.walked_m[0],
+        },
     )
-    numbers: dict[str, float | str | None] = {"bending_stiffness_ratio": stiffer}
-    for series in every:
-        for radius, outcome in zip(series.radii, series.outcomes, strict=True):
-            kind = f"{radius * 1e5:.0f}um_{series.worm.name}".replace("um", "0um")
-            numbers[f"verdict_{kind}"] = rhythm_words(outcome.rhythm)
-            numbers[f"force_{kind}_N"] = outcome.summary.contraction_force_median_N
-            numbers[f"elongation_closed_first_{kind}_m"] = kept(walked_elongation(outcome)[0])
-        for radius, elongation in zip(series.radii, series.held_m, strict=False):
-            kind = f"{radius * 1e5:.0f}um_{series.worm.name}".replace("um", "0um")
-            numbers[f"elongation_open_first_{kind}_m"] = kept(elongation[0])
+    open_loop = [one for one in in_micrometres if one.hold]
+    numbers |= design.numbered(open_loop, {"elongation_open_first_{value:.0f}um_{worm}_m": lambda one: one.held_m[0]})
+    tolerances = words.told(thinnest.values(), lambda one: f"{MM * one.worm.tolerance_m:g} mm")
     remarks = [
-        f"At {RADII_M[-1] * _MM:g} mm: {'; '.join(fates)}. The sensor tolerances are those of the presets, "
-        + listed([f"{w.case(None).config.sensor.tolerance_m * _MM:g} mm ({w.label})" for w in WORMS])
-        + ", which were found for the paper's radius."
+        f"At {MM * RADII_M[-1]:g} mm: {'; '.join(f'{one.worm.label}: {words.rhythm(one.rhythm)}' for one in thickest)}."
+        f" The sensor tolerances are those of the presets, {tolerances}, which were found for the paper's radius."
     ]
     if effort == "quick":
-        remarks.append(f"The quick effort varies the radius of {listed([s.worm.label for s in varied])} only.")
+        remarks.append(f"The quick effort varies the radius of {words.labels(thickest)} only.")
+
+    def held_change(one: Reading) -> str:
+        return f"from {words.in_cm(thinnest[one.worm].held_m[0])} to {words.in_cm(one.held_m[0])} cm"
+
+    def force_change(one: Reading) -> str:
+        return f"from {words.in_unit(thinnest[one.worm].force_N)} to {words.in_unit(one.force_N)} N"
+
     return Findings(
         answer=(
-            f"Strands of {RADII_M[-1] * _MM:g} in place of {RADII_M[0] * _MM:g} mm are {stiffer:.1f} times as stiff in "
-            f"bending. The elongation of segment 1 in open loop goes {listed(held)}. The median force in closed loop "
-            f"goes {listed(forces)}. At {RADII_M[-1] * _MM:g} mm, {verdict}."
+            f"Strands of {MM * RADII_M[-1]:g} in place of {MM * RADII_M[0]:g} mm are {_stiffness(RADII_M[-1]):.1f} "
+            "times as stiff in bending. The elongation of segment 1 in open loop goes "
+            f"{words.told([one for one in thickest if one.hold], held_change)}. The median force in closed loop goes "
+            f"{words.told(thickest, force_change)}. At {MM * RADII_M[-1]:g} mm, {len(keep)} of {len(thickest)} worms "
+            f"keep the order 1-2-3: {words.labels(keep)}."
         ),
         caption=(
             "Top: elongation (mean of six springs) over the strands' radius at the same mass, in closed loop (filled, "
@@ -148,87 +91,56 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             "contracted, and the rhythm, both in closed loop. One run a point. Bending stiffness goes with the fourth "
             "power of the radius."
         ),
-        table=_table(every),
+        table=tabulated(
+            readings,
+            {
+                "worm": lambda one: one.worm.label,
+                "radius (mm)": lambda one: f"{MM * one.value:g}",
+                "bending stiffness (1)": lambda one: f"{_stiffness(one.value):.2f}",
+                "open loop (cm)": lambda one: words.all_in_cm(one.held_m) if one.hold else words.NOTHING,
+                "closed loop (cm)": lambda one: words.all_in_cm(one.walked_m),
+                "deficit, first helix (%)": lambda one: words.in_percent(one.helix_deficit),
+                "median force (N)": lambda one: words.in_unit(one.force_N),
+                "rhythm": lambda one: words.rhythm(one.rhythm),
+            },
+        ),
         remarks=remarks,
-        numbers=numbers,
+        numbers={"bending_stiffness_ratio": _stiffness(RADII_M[-1]), **numbers},
     )
 
 
-def _keep(every: Sequence[_Series]) -> str:
-    return "keeps" if [series.worm for series in every] == [PAPERS] else "keep"
+def _draw(readings: Sequence[Reading], stem: Path) -> None:
+    def in_mm(one: Reading) -> float:
+        return MM * one.value
 
-
-def _table(every: Sequence[_Series]) -> Table:
-    rows = []
-    for series in every:
-        for i, (radius, outcome) in enumerate(zip(series.radii, series.outcomes, strict=True)):
-            rows.append(
-                [
-                    series.worm.label,
-                    f"{radius * _MM:g}",
-                    f"{(radius / RADII_M[0]) ** 4:.2f}",
-                    all_in_cm(series.held_m[i]) if i < len(series.held_m) else "–",
-                    all_in_cm(series.walked_m[i]),
-                    in_percent(outcome.summary.middle_deficit),
-                    in_unit(outcome.summary.contraction_force_median_N),
-                    rhythm_words(outcome.rhythm),
-                ]
-            )
-    header = [
-        "worm",
-        "radius (mm)",
-        "bending stiffness (1)",
-        "open loop (cm)",
-        "closed loop (cm)",
-        "deficit, first helix (%)",
-        "median force (N)",
-        "rhythm",
-    ]
-    return Table(header, rows)
-
-
-def _draw(every: Sequence[_Series], stem: Path) -> None:
-    n_segments = every[0].walked_m.shape[1]
-    walked = np.concatenate([series.walked_m.ravel() for series in every])
-    top = 1.1 * CM * max(walked[np.isfinite(walked)], default=0.1)
-    ticks = [radius * _MM for radius in RADII_M]
     with canvas(5.0) as figure:
         panels = figure.subplot_mosaic("abc;frr", height_ratios=[3.0, 2.2])
         tops = [panels[name] for name in "abc"]
-        for axes, series in zip(tops, every, strict=True):
-            x = [radius * _MM for radius in series.radii]
-            draw_segments(axes, x, CM * series.walked_m, marker=series.worm.marker)
-            draw_segments(
-                axes,
-                x[: len(series.held_m)],
-                CM * series.held_m,
-                hollow=True,
-                marker=series.worm.marker,
-                linestyle="--",
-                linewidth=1.0,
+        for axes, (worm, own) in zip(tops, design.by_worm(readings).items(), strict=True):
+            held = [one for one in own if one.hold]
+            plots.draw_over(axes, own, lambda one: CM * one.walked_m, at=in_mm, linestyle="-")
+            plots.draw_over(
+                axes, held, lambda one: CM * one.held_m, at=in_mm, hollow=True, linestyle="--", linewidth=1.0
             )
-            panel_title(axes, capitalised(series.worm.label))
-            axes.set_ylim(0.0, top)
+            axes.sharey(tops[0])
+            plots.label_panel(axes, words.capitalised(worm.label), "strand radius (mm)", "")
         tops[0].set_ylabel("elongation (cm)")
+        tops[0].set_ylim(bottom=0.0)
         force, rhythms = panels["f"], panels["r"]
-        for series in every:
-            force.plot([radius * _MM for radius in series.radii], series.force_N, **series.worm.look)
+        plots.draw_over(force, readings, lambda one: one.force_N, at=in_mm)
         force.set_ylim(bottom=0.0)
-        panel_title(force, "Force")
-        panel_title(rhythms, "Rhythm")
-        force.set_ylabel("median force (N)")
-        rows = [(s.worm.short, [(r * _MM, o.rhythm) for r, o in zip(s.radii, s.outcomes, strict=True)]) for s in every]
-        kinds = draw_rhythms(rhythms, rows)
-        for axes in (*tops, force, rhythms):
+        kinds = plots.draw_rhythms(rhythms, readings, at=in_mm)
+        plots.label_panel(force, "Force", "strand radius (mm)", "median force (N)")
+        plots.label_panel(rhythms, "Rhythm", "strand radius (mm)", "")
+        ticks = [MM * radius for radius in RADII_M]
+        for axes in panels.values():
             axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axes.set_xlim(ticks[0] - 0.1, ticks[-1] + 0.1)
-            axes.set_xlabel("strand radius (mm)")
         loops = [
-            look_handle("closed loop", marker="o"),
-            look_handle("open loop", hollow=True, marker="o", linestyle="--"),
+            plots.look_handle("closed loop", marker="o"),
+            plots.look_handle("open loop", hollow=True, marker="o", linestyle="--"),
         ]
-        worms = [look_handle(w.label, color=w.color, marker=w.marker, linestyle=w.line) for w in WORMS]
-        legend_below(figure, [*segment_handles(n_segments), *loops, *worms, *kinds], 4)
+        plots.legend_below(figure, [*plots.segment_handles(), *loops, *plots.worm_handles(), *kinds], 4)
         save_both(figure, stem)
 
 
@@ -236,6 +148,6 @@ RADIUS = Examination(
     name="radius",
     title="Radius of the strands",
     question="Thicker strands of the same mass resist bending more. What becomes of elongation, force and rhythm?",
-    cases=_cases,
+    cases=lambda effort: design.cases_of(_points(effort)),
     examine=_examine,
 )

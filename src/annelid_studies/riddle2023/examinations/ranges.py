@@ -10,25 +10,12 @@ from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
 from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations.side_by_side import (
-    PAPERS,
-    WORMS,
-    Worm,
-    all_in_cm,
-    held_elongation,
-    in_percent,
-    kept,
-    legend_below,
-    listed,
-    look_handle,
-    rhythm_words,
-    walked_elongation,
-)
+from annelid_studies.riddle2023.examinations import design, plots, words
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.words import PERCENT
+from annelid_studies.tables import tabulated
 from annelid_studies.worms import chain, one_after_the_other
 
 EQUAL = (0.566, 1.067)
@@ -44,171 +31,136 @@ def compiled_ranges() -> list[list[float]]:
     return [list(limits) for limits in body.rings.length_ranges(body.mesh.n_segments)]
 
 
-def _changes(equal: bool, held: bool) -> dict[str, Any]:
-    limits = {_FIELD: list(EQUAL) if equal else compiled_ranges()}
-    return {**one_after_the_other(), **limits} if held else limits
-
-
-def _case(worm: Worm, equal: bool, held: bool) -> Case:
-    return worm.case(_changes(equal, held))
-
-
-def _pairs(effort: Effort) -> list[tuple[Worm, bool]]:
-    """Worms and loops, open or not, that are compared at an effort."""
-    return [(worm, held) for worm in (WORMS if effort == "full" else WORMS[1:]) for held in (True, False)]
-
-
-def _cases(effort: Effort) -> Sequence[Case]:
-    return [_case(worm, equal, held) for worm, held in _pairs(effort) for equal in (False, True)]
+def _points(effort: Effort) -> list[Point]:
+    """Each worm with the ranges as compiled (value 0) and with equal ones (value 1)."""
+    points = []
+    for worm in WORMS if effort == "full" else WORMS[1:]:
+        for equal, limits in enumerate((compiled_ranges(), list(EQUAL))):
+            changes = {_FIELD: limits}
+            points.append(Point(worm, equal, worm.case(changes), worm.case({**one_after_the_other(), **changes})))
+    return points
 
 
 class _Row(NamedTuple):
-    """Deficits of one worm in one loop with both kinds of ranges; each as (first helix, mean of all springs)."""
+    """One worm in open or closed loop, with either kind of ranges."""
 
-    worm: Worm
-    held: bool
-    compiled: tuple[float, float]
-    equal: tuple[float, float]
+    loop: str
+    compiled: Reading
+    equal: Reading
 
     @property
-    def label(self) -> str:
-        return f"{self.worm.label},\n{'open' if self.held else 'closed'} loop"
+    def worm(self) -> Worm:
+        return self.compiled.worm
 
 
-def _deficits(outcome: Outcome, held: bool) -> tuple[float, float]:
-    read = held_elongation if held else walked_elongation
-    first_helix, mean = (middle_deficit(read(outcome, first_helix=reading)) for reading in (True, False))
-    return first_helix, mean
+def _elongation(loop: str, one: Reading, first_helix: bool) -> Array:
+    if loop == "open":
+        return design.held_elongation(one.hold, first_helix=first_helix)
+    return design.walked_elongation(one.walk, first_helix=first_helix)
+
+
+def _deficit(loop: str, one: Reading, first_helix: bool = False) -> float:
+    return middle_deficit(_elongation(loop, one, first_helix))
 
 
 def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    rows = [
-        _Row(
-            worm,
-            held,
-            _deficits(results[_case(worm, False, held)], held),
-            _deficits(results[_case(worm, True, held)], held),
-        )
-        for worm, held in _pairs(effort)
-    ]
+    readings = design.read(_points(effort), results)
+    pairs = list(zip(readings[::2], readings[1::2], strict=True))
+    rows = [_Row(loop, *pair) for pair in pairs for loop in ("open", "closed")]
     paper = published(chain().config)["middle_deficit"].value
     assert isinstance(paper, float)
     _draw(rows, paper, stem)
-    numbers: dict[str, float | str | None] = {}
-    for row in rows:
-        loop = "open" if row.held else "closed"
-        for kind, deficits in (("compiled", row.compiled), ("equal", row.equal)):
-            for reading, value in zip(("", "_mean"), deficits, strict=True):
-                numbers[f"deficit{reading}_{loop}_{kind}_{row.worm.name}"] = kept(value)
-    closed = next(row for row in rows if not row.held)
-    opened = [row for row in rows if row.held]
+    numbers = {
+        f"deficit{reading}_{row.loop}_{kind}_{row.worm.name}": _deficit(row.loop, one, first_helix)
+        for row in rows
+        for kind, one in (("compiled", row.compiled), ("equal", row.equal))
+        for reading, first_helix in (("", True), ("_mean", False))
+    }
+    first = rows[1]
+    helix, helix_equal, mean, mean_equal = (
+        words.in_percent(_deficit("closed", one, first_helix))
+        for first_helix in (True, False)
+        for one in (first.compiled, first.equal)
+    )
+    shares = [1.0 - one.equal.held_deficit / one.compiled.held_deficit for one in rows[::2]]
     return Findings(
-        answer=_answer(closed, opened),
+        answer=(
+            f"Deficit of {first.worm.label} in closed loop: {helix} % on the first helix with the ranges as compiled "
+            f"and {helix_equal} % with equal ones; over all springs, {mean} % and {mean_equal} %. In open loop, over "
+            f"all springs, equal ranges leave {_left(rows[::2])}. So the ranges make "
+            f"{words.span(shares, PERCENT, 0)} % of the deficit of a contraction held by itself"
+            f"{', which is most of it' if min(shares) > 0.5 else ', and the rest has other causes'}."
+        ),
         caption=(
             "How far segment 2 elongates less than segment 1, with the three length ranges as the engine of the "
             "paper's time compiled them and with equal ones. Left: first helix (closed loop: peak to peak), the "
-            f"paper's reading; the line is the paper's {in_percent(paper, 1)} %. Right: mean of the six springs. "
+            f"paper's reading; the line is the paper's {words.in_percent(paper, 1)} %. Right: mean of the six springs. "
             "One run a point, closed loop 5 s, open loop one contraction of 0.8 s a segment."
         ),
-        table=_table(results, rows),
-        remarks=[*_remarks(rows), *([f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else [])],
+        table=tabulated(
+            [(row.loop, one) for row in rows for one in (row.compiled, row.equal)],
+            {
+                "worm": lambda at: at[1].worm.label,
+                "loop": lambda at: at[0],
+                "ranges": lambda at: "equal" if at[1].value else "as compiled",
+                "first helix (cm)": lambda at: words.all_in_cm(_elongation(*at, first_helix=True)),
+                "deficit on it (%)": lambda at: words.in_percent(_deficit(*at, first_helix=True), 1),
+                "mean of springs (cm)": lambda at: words.all_in_cm(_elongation(*at, first_helix=False)),
+                "deficit (%)": lambda at: words.in_percent(_deficit(*at), 1),
+                "rhythm": lambda at: "as programmed" if at[0] == "open" else words.rhythm(at[1].rhythm),
+            },
+        ),
+        remarks=[
+            *_remarks(rows),
+            *([f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else []),
+        ],
         numbers=numbers,
     )
 
 
-def _answer(closed: _Row, opened: Sequence[_Row]) -> str:
-    (helix, mean), (helix_equal, mean_equal) = closed.compiled, closed.equal
-    parts = [
-        f"In closed loop {closed.worm.label} {'has' if closed.worm is PAPERS else 'have'} a deficit of "
-        f"{in_percent(helix)} % on the first helix with the ranges as compiled and {in_percent(helix_equal)} % with "
-        f"equal ones; over all springs, {in_percent(mean)} % and {in_percent(mean_equal)} %."
-    ]
-    left = [f"{in_percent(row.equal[1])} of {in_percent(row.compiled[1])} % ({row.worm.label})" for row in opened]
-    parts.append(f"In open loop, over all springs, equal ranges leave {listed(left)}.")
-    shares = [1.0 - row.equal[1] / row.compiled[1] for row in opened]
-    least = min(shares)
-    parts.append(
-        "So most of the deficit of a contraction held by itself comes from the range that the compiler gave segment 2."
-        if least > 0.5
-        else f"So the ranges make {in_percent(least)} to {in_percent(max(shares))} % of the deficit of a contraction "
-        "held by itself, and the rest has other causes."
+def _left(rows: Sequence[_Row]) -> str:
+    """What equal ranges leave of the deficit over all springs."""
+    return words.listed(
+        f"{words.in_percent(_deficit(row.loop, row.equal))} of {words.in_percent(_deficit(row.loop, row.compiled))} % "
+        f"({row.worm.label})"
+        for row in rows
     )
-    return " ".join(parts)
 
 
 def _remarks(rows: Sequence[_Row]) -> list[str]:
     low, high = zip(*compiled_ranges(), strict=True)
-    opened, closed = ({row.worm: row for row in rows if row.held is held} for held in (True, False))
-    left = [
-        f"{in_percent(row.equal[1])} of {in_percent(row.compiled[1])} % ({worm.label})" for worm, row in closed.items()
-    ]
-    beyond = [f"{in_percent(closed[worm].equal[1] - row.equal[1], 1)} ({worm.label})" for worm, row in opened.items()]
+    closed = [row.equal for row in rows[1::2]]
+    beyond = words.told(closed, lambda one: words.in_percent(one.deficit - one.held_deficit, 1))
     return [
         f"The ranges as compiled begin at {' / '.join(f'{value:g}' for value in low)} m and end at "
         f"{' / '.join(f'{value:g}' for value in high)} m for segments 1 / 2 / 3. A muscle's active force ends at a "
         f"length that follows from its range, and segment 2's begins {100 * (low[1] - (low[0] + low[2]) / 2):.1f} cm "
         "above the mean of its neighbours'.",
-        f"In closed loop, over all springs, equal ranges leave {listed(left)}. With equal ranges the deficit in closed "
-        f"loop exceeds that in open loop by {listed(beyond)} percentage points. Equal muscles "
-        "cannot make that difference; in closed loop segments contract while others still relax.",
+        f"In closed loop, over all springs, equal ranges leave {_left(rows[1::2])}. With equal ranges the deficit in "
+        f"closed loop exceeds that in open loop by {beyond} percentage points. Equal muscles cannot make that "
+        "difference; in closed loop segments contract while others still relax.",
     ]
-
-
-def _table(results: Results, rows: Sequence[_Row]) -> Table:
-    lines = []
-    for row in rows:
-        for equal in (False, True):
-            outcome = results[_case(row.worm, equal, row.held)]
-            read = held_elongation if row.held else walked_elongation
-            helix, mean = row.equal if equal else row.compiled
-            lines.append(
-                [
-                    row.worm.label,
-                    "open" if row.held else "closed",
-                    "equal" if equal else "as compiled",
-                    all_in_cm(read(outcome, first_helix=True)),
-                    in_percent(helix, 1),
-                    all_in_cm(read(outcome)),
-                    in_percent(mean, 1),
-                    "as programmed" if row.held else rhythm_words(outcome.rhythm),
-                ]
-            )
-    header = [
-        "worm",
-        "loop",
-        "ranges",
-        "first helix (cm)",
-        "deficit (%)",
-        "mean of springs (cm)",
-        "deficit (%)",
-        "rhythm",
-    ]
-    return Table(header, lines)
 
 
 def _draw(rows: Sequence[_Row], paper: float, stem: Path) -> None:
     with canvas(1.2 + 0.42 * len(rows)) as figure:
         panels = figure.subplots(1, 2, sharey=True, sharex=True)
-        titles = ("First helix", "Mean of six springs")
-        for reading, (axes, title) in enumerate(zip(panels, titles, strict=True)):
-            panel_title(axes, title)
+        for axes, title, first_helix in zip(panels, ("First helix", "Mean of six springs"), (True, False), strict=True):
+            plots.label_panel(axes, title, "segment 2 below segment 1 (%)", "")
             for i, row in enumerate(rows):
-                before, after = 100 * row.compiled[reading], 100 * row.equal[reading]
-                axes.plot([before, after], [-i, -i], color="0.7", linewidth=2.0, zorder=1)
-                look = {"marker": row.worm.marker, "color": row.worm.color, "markersize": 7.0, "linestyle": "none"}
-                axes.plot([before], [-i], **look)
-                axes.plot([after], [-i], **look, markerfacecolor="white", markeredgewidth=1.4)
+                compiled, equal = (PERCENT * _deficit(row.loop, one, first_helix) for one in (row.compiled, row.equal))
+                look = {**row.worm.look, "markersize": 7.0, "linestyle": "none"}
+                axes.plot([compiled, equal], [-i, -i], color="0.7", linewidth=2.0, zorder=1)
+                axes.plot([compiled], [-i], **look)
+                axes.plot([equal], [-i], **look, markerfacecolor="white", markeredgewidth=1.4)
             axes.axvline(0.0, color="0.4", linewidth=0.8)
-            axes.set_xlabel("segment 2 below segment 1 (%)")
             axes.grid(visible=False, axis="y")
-        panels[0].axvline(100 * paper, color="0.2", linewidth=1.0, linestyle="-.")
-        panels[0].set_yticks([-i for i in range(len(rows))], [row.label for row in rows])
+        line = panels[0].axvline(PERCENT * paper, color="0.2", linewidth=1.0, linestyle="-.", label="the paper")
+        panels[0].set_yticks([-i for i in range(len(rows))], [f"{row.worm.label},\n{row.loop} loop" for row in rows])
         panels[0].set_ylim(0.5 - len(rows), 0.5)
-        from matplotlib.lines import Line2D
-
-        line = Line2D([], [], color="0.2", linewidth=1.0, linestyle="-.", label="the paper")
         dots: dict[str, Any] = {"marker": "o", "linestyle": "none"}
-        legend_below(figure, [look_handle("as compiled", **dots), look_handle("equal", hollow=True, **dots), line])
+        kinds = [plots.look_handle("as compiled", **dots), plots.look_handle("equal", hollow=True, **dots)]
+        plots.legend_below(figure, [*kinds, line])
         save_both(figure, stem)
 
 
@@ -217,6 +169,6 @@ RANGES = Examination(
     title="Length ranges of the muscles",
     question="The engine of the paper's time gave each muscle a length range of its own. How much of the middle "
     "segment's deficit is left when all have the same?",
-    cases=_cases,
+    cases=lambda effort: design.cases_of(_points(effort)),
     examine=_examine,
 )

@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.body.actuators.muscle import Rings
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.style import panel_title, segment_colors
+from annelid.morphology import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 SCALED_RANGE = (0.75, 1.05)
 """Scaled lengths between which a ring's operating range lies: MuJoCo's default."""
@@ -101,13 +101,27 @@ def largest_difference(rings: Rings) -> float:
     return float(np.abs(engine_flv(length, velocity, rings) - closed_form_flv(length, velocity, rings)).max())
 
 
-def caption(rings: Rings, n_segments: int = 3) -> str:
-    """Says what the figure shows, with the numbers of the given muscle.
+def figure_5_muscle_surface(rings: Rings, stem: Path, n_segments: int = 3) -> str:
+    """Draws the engine's force over length and velocity, and cuts through it beside the documented formula.
 
     Args:
         rings: The muscle's parameters.
-        n_segments: Number of rings.
+        stem: Path of the two files without their suffixes.
+        n_segments: Number of rings, which may each have an operating range of its own.
+
+    Returns:
+        The caption, with the numbers of the given muscle.
     """
+    working = _working_range(rings.length_ranges(n_segments))
+    with canvas(3.5) as figure:
+        surface, cuts = figure.subplots(1, 2, width_ratios=[1.0, 1.05])
+        _draw_surface(surface, rings, working)
+        _draw_cuts(cuts, rings, working)
+        save_both(figure, stem)
+    return _caption(rings, n_segments)
+
+
+def _caption(rings: Rings, n_segments: int) -> str:
     ranges = rings.length_ranges(n_segments)
     optimal = [(high - low) / (SCALED_RANGE[1] - SCALED_RANGE[0]) for low, high in ranges]
     low, high = _working_range(ranges)
@@ -126,25 +140,6 @@ def caption(rings: Rings, n_segments: int = 3) -> str:
         f"{SETTLED_FORCE_N:g} N ends at {settled:.2f} L0, with rings {_span(settled_m, 2)} m long: its end is set by "
         f"length rather than by the peak force of {peak_N:.0f} N."
     )
-
-
-def figure_5_muscle_surface(rings: Rings, stem: Path, n_segments: int = 3) -> Path:
-    """Draws the engine's force over length and velocity, and cuts through it beside the documented formula.
-
-    Args:
-        rings: The muscle's parameters.
-        stem: Path of the two files without their suffixes.
-        n_segments: Number of rings, which may each have an operating range of its own.
-
-    Returns:
-        The path of the PNG file; the SVG file lies beside it.
-    """
-    working = _working_range(rings.length_ranges(n_segments))
-    with canvas(3.5) as figure:
-        surface, cuts = figure.subplots(1, 2, width_ratios=[1.0, 1.05])
-        _draw_surface(surface, rings, working)
-        _draw_cuts(cuts, rings, working)
-        return save_both(figure, stem)
 
 
 def _draw_surface(axes: Axes, rings: Rings, working: tuple[float, float]) -> None:

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.config import RunConfig, load_config
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.planar_scene import bent_rhombi, rhombi
 from annelid.draw.style import panel_title, segment_colors
 from annelid.errors import ConfigError
+from annelid.morphology import Array
 from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Records
 from annelid.simulation import build_plant
@@ -20,7 +20,6 @@ from annelid.simulation import build_plant
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 CAPTION = (
     "Three planar models of worm segments, each as its planar plant rests with the middle segment contracted: a) "
@@ -105,14 +104,14 @@ def spiral(center: Array, radius: float, turns: float = 2.25) -> Array:
     return center + radius * share[:, np.newaxis] * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def figure_1_planar_models(stem: Path) -> Path:
+def figure_1_planar_models(stem: Path) -> str:
     """Draws the three models with the middle segment contracted, each from its own plant.
 
     Args:
         stem: Path of the two files without their suffixes.
 
     Returns:
-        The path of the PNG file; the SVG file lies beside it.
+        The caption.
     """
     contracted = N_SEGMENTS // 2
     outlines = {
@@ -142,7 +141,8 @@ def figure_1_planar_models(stem: Path) -> Path:
             axes.set_ylim(-half_height, half_height)
             axes.set_aspect("equal")
             axes.axis("off")
-        return save_both(figure, stem)
+        save_both(figure, stem)
+    return CAPTION
 
 
 _PANELS = {

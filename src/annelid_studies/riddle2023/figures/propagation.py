@@ -21,7 +21,7 @@ from annelid.draw.camera import picture_axes
 from annelid.draw.canvas import WIDTH_IN, canvas, save_both
 from annelid.draw.planar_scene import rhombi as flat_rhombi
 from annelid.draw.style import panel_title
-from annelid.morphology import MeshGeometry
+from annelid.morphology import Array, MeshGeometry
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
-Array = NDArray[np.float64]
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
@@ -106,7 +105,7 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
     return _measure(recorded_posture(run, time_s))
 
 
-def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
+def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Sets rhombi that deform alone beside the same row of the compliant worm, with one segment contracted.
 
     Args:
@@ -115,7 +114,7 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
         time_s: Time of the posture, s.
 
     Returns:
-        Path of the PNG file; an SVG file lies beside it.
+        The caption.
 
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
@@ -138,13 +137,11 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
         _scale_bar(rigid, alone)
         panel_title(rigid, "a) without propagation: each rhombus alone")
         panel_title(compliant, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
-        return save_both(figure, stem)
+        save_both(figure, stem)
+    return _caption_2(posture, rows)
 
 
-def figure_2_caption(run: Run, time_s: float = TIME_S) -> str:
-    """Says what figure 2 shows, with the numbers measured."""
-    posture = recorded_posture(run, time_s)
-    rows = _side_by_side(posture)
+def _caption_2(posture: Posture, rows: _Rows) -> str:
     rest, alone, mesh = (float(lengths[0].sum()) for lengths in (rows.rest_m, rows.rigid_m, rows.compliant_m))
     own_alone, own_mesh = (float(m[0][rows.own] / rows.rest_m[0][rows.own]) for m in (rows.rigid_m, rows.compliant_m))
     beside = [k for k in (rows.own - 1, rows.own + 1) if 0 <= k < len(rows.rhombi)]
@@ -160,7 +157,7 @@ def figure_2_caption(run: Run, time_s: float = TIME_S) -> str:
     )
 
 
-def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
+def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Shows the worm with one segment contracted, a near and a far rhombus, and the deformation of all of them.
 
     Args:
@@ -169,7 +166,7 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
         time_s: Time of the posture, s.
 
     Returns:
-        Path of the PNG file; an SVG file lies beside it.
+        The caption.
 
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
@@ -199,13 +196,11 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> Path:
             axes.set_xlabel("distance from the contracted ring at rest (cm)")
         handles, labels = axial.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), columnspacing=1.4)
-        return save_both(figure, stem)
+        save_both(figure, stem)
+    return _caption_8(posture, measured)
 
 
-def figure_8_caption(run: Run, time_s: float = TIME_S) -> str:
-    """Says what figure 8 shows, with the numbers measured."""
-    posture = recorded_posture(run, time_s)
-    measured = _measure(posture)
+def _caption_8(posture: Posture, measured: Propagation) -> str:
     how = "rendered" if rendering_works() else "drawn from the recorded posture, not rendered"
     near, far = measured.near, measured.far
     distance, axial = np.abs(measured.plane_distance_m), measured.plane_axial

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.analysis.rhombi import nearest_frame
 from annelid.body import mesh_of
@@ -22,7 +22,7 @@ from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, postures_of, rende
 from annelid.draw.skeleton import Skeleton
 from annelid.draw.style import CONTRACTED, activation_color, panel_title
 from annelid.errors import RenderingUnavailable, RunFileError
-from annelid.morphology import MeshGeometry
+from annelid.morphology import Array, MeshGeometry
 from annelid.simulation.worm import compile_worm
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
-Array = NDArray[np.float64]
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""
 
@@ -209,22 +208,22 @@ def rhombus_outline(posture: Posture, rhombus: int) -> Array:
     return np.concatenate([*sides, sides[0][:1]])
 
 
-def figure_4_model(source: Run | RunConfig, stem: Path) -> Path:
+def figure_4_model(config: RunConfig, stem: Path) -> str:
     """Shows the model at rest, in the axial and the isometric view.
 
     Args:
-        source: A run of a 3D worm, or its configuration.
+        config: Configuration of a 3D worm.
         stem: Path of the two files to write, without suffix.
 
     Returns:
-        Path of the PNG file; an SVG file lies beside it.
+        The caption, with the numbers of the model.
 
     Raises:
         RunFileError: The worm is planar.
     """
     from matplotlib.lines import Line2D
 
-    posture = rest_posture(_config(source))
+    posture = rest_posture(config)
     with canvas(3.3) as figure:
         axial, isometric = figure.subplots(1, 2, width_ratios=[1.0, 1.42])
         show_worm(axial, posture, AXIAL_DEG, 2.8)
@@ -239,12 +238,8 @@ def figure_4_model(source: Run | RunConfig, stem: Path) -> Path:
             Line2D([], [], color=PIN_RGBA, label="pin", **style),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
-        return save_both(figure, stem)
-
-
-def figure_4_caption(source: Run | RunConfig) -> str:
-    """Says what figure 4 shows, with the numbers of the model."""
-    geometry = mesh_of(_worm(_config(source)).mesh)
+        save_both(figure, stem)
+    geometry = posture.geometry
     half = geometry.n_per_plane
     how = "rendered by MuJoCo" if rendering_works() else "drawn from the mesh's coordinates, not rendered"
     return (
@@ -261,10 +256,6 @@ def _worm(config: RunConfig) -> WormBody:
     if not isinstance(config.body, WormBody):
         raise RunFileError(f"{config.name} is a planar worm: this figure shows the 3D worm")
     return config.body
-
-
-def _config(source: Run | RunConfig) -> RunConfig:
-    return source if isinstance(source, RunConfig) else source.config
 
 
 def _lines(posture: Posture) -> tuple[Array, Array, Array]:

@@ -31,7 +31,7 @@ CAPTION = (
 )
 
 
-def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) -> Path:
+def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) -> str:
     """Draws the elongations of the robot, of the paper's model and of simulations as groups of bars.
 
     Args:
@@ -39,7 +39,7 @@ def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) ->
         stem: Path of the two files without their suffixes.
 
     Returns:
-        The path of the PNG file; the SVG file lies beside it.
+        The caption.
     """
     groups = _with_published(series)
     n_segments = max(len(elongation) for elongation in groups.values())
@@ -57,7 +57,8 @@ def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) ->
         names = [f"segment {segment}" for segment in range(1, n_segments + 1)]
         room = {"columnspacing": 1.2, "handlelength": 1.2, "borderaxespad": 0.1}
         absolute.legend(list(handles), names, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=n_segments, **room)
-        return save_both(figure, stem)
+        save_both(figure, stem)
+    return CAPTION
 
 
 def _with_published(series: Mapping[str, Sequence[float]]) -> dict[str, Sequence[float]]:

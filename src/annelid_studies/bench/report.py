@@ -1,4 +1,4 @@
-"""The benchmark in one picture: error against speed, cost against length, and where the time of a step goes."""
+"""The benchmark as a table, and in one picture: error against speed, cost against length, where a step's time goes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.draw.canvas import canvas, save_both
+from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title, segment_colors
+from annelid_studies.tables import terminal_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
+    from rich.table import Table as TerminalTable
 
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""
@@ -24,6 +27,48 @@ _LABELS = {"riddle2023": "paper's chain", "riddle2023-rods": "rods"}
 _FADED = "0.35"
 # Cold within the engine, warm around it.
 _SHARE_COLORS = ("#1b2a6b", "#3658a7", "#5f8fd0", "#35b5a0", "#8fd3c5", "#c5cdd6", "#e3b428", "#c2410c", "#7a2a0a")
+
+
+def bench_table(report: Mapping[str, Any]) -> TerminalTable:
+    """Lays out the cases of a benchmark for the terminal, one a row.
+
+    Args:
+        report: The content of ``bench.json``.
+    """
+    references = list(report["fronts"])
+    errors = [f"error, %, against {name}" for name in references]
+    header = ["case", "ms a step", "x real time", "memory, MB", *errors]
+    rows = [_row(entry, references) for entry in report["cases"]]
+    peer, caption = report["peer"] or {}, ""
+    if peer.get("real_time_factor"):
+        rows.append([f"PyElastica, {peer['rods']} free rods", *_numbers(peer)])
+    elif peer:
+        rows.append(["PyElastica", peer.get("failed") or "not installed"])
+        caption = f"for the peer: {peer['install']}" if "install" in peer else ""
+    return terminal_table(Table(header, rows), f"{report['machine']}, recording on", caption=caption)
+
+
+def _row(entry: Mapping[str, Any], references: Sequence[str]) -> list[str]:
+    name = f"{entry['name']} ({entry['level']})" if entry["level"] else entry["name"]
+    if "failed" in entry:
+        return [name, f"failed: {entry['failed']}"]
+    compared = entry.get("errors", {})
+    if compared and entry["rhythm"]["verdict"] != "ordered":
+        name = f"{name}: {entry['rhythm']['reason']}"
+    percents = [_percent(compared[reference]["largest"]) if reference in compared else "" for reference in references]
+    return [name, *_numbers(entry), _shown(entry["peak_memory_MB"], ".0f"), *percents]
+
+
+def _numbers(entry: Mapping[str, Any]) -> list[str]:
+    return [_shown(entry[key], ".3g") for key in ("step_mean_ms", "real_time_factor")]
+
+
+def _percent(error: float | None) -> str:
+    return _shown(None if error is None else 100.0 * error, ".2f")
+
+
+def _shown(value: float | None, digits: str) -> str:
+    return "-" if value is None else format(value, digits)
 
 
 def bench_figure(report: Mapping[str, Any], stem: str | Path) -> Path:

@@ -1,43 +1,38 @@
-"""Networks as Graphviz source, as a plain SVG, and as Markdown tables: text only, nothing to install.
-
-The SVG is a working drawing. `annelid.draw.figures` draws networks in the style of the papers.
-"""
+"""Networks as text: Graphviz source, a plain SVG, and Markdown tables, with nothing to install."""
 
 from __future__ import annotations
 
-import cmath
 import json
-import math
-import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from annelid.errors import ConfigError
+from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.text import printable
 
 if TYPE_CHECKING:
-    from annelid.nervous.network import Connection, Network
+    from annelid.nervous.network import Network
     from annelid.nervous.neurons import Neuron
 
-_RADIUS = 26.0
-_PITCH_X, _PITCH_Y = 190.0, 120.0
-_STUB = 34.0
-_BULGES = (0.12, 0.25, -0.12, -0.25, 0.4, -0.4, 0.6, -0.6)
-_STYLES = {
-    # Colour, Graphviz's arrowhead, the mark at the target's rim as a path of SVG, and the dashes.
-    "excitatory": ("#1b7837", "empty", "M-9 -4.5 L0 0 L-9 4.5 Z", ""),
-    "inhibitory": ("#b2182b", "dot", "M0 0 a4 4 0 1 0 -8 0 a4 4 0 1 0 8 0", ""),
-    "gap junction": ("#2166ac", "none", "M0 0 a2 2 0 1 0 -4 0 a2 2 0 1 0 4 0", "5 3"),
-    "rectified gap junction": ("#2166ac", "diamond", "M0 0 L-5.5 4.5 L-11 0 L-5.5 -4.5 Z", "5 3"),
-    "modulatory": ("#7b3294", "box", "M0 -4.5 V4.5 H-9 V-4.5 Z", "2 3"),
+_EDGES = {
+    "excitatory": "arrowhead=empty",
+    "inhibitory": "arrowhead=dot",
+    "modulatory": "arrowhead=box, style=dotted",
+    "gap junction": "arrowhead=none, style=dashed",
+    "rectified gap junction": "arrowhead=diamond, style=dashed",
 }
-_LEAD = "M-7 -3 L0 0 L-7 3 Z"
-_NUMBERED = re.compile(r"(.*?)_?(\d+)")
+"""What Graphviz draws for each effect."""
+_MOST_LABELLED = 40
+"""Connections beside which there is room for words."""
+_PX = 130.0
+"""Pixels from a neuron to the next; an inch has 96."""
+_PX_PER_PT = 96.0 / 72.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +67,8 @@ class Diagram:
 def draw_diagram(network: Network) -> Diagram:
     """Draws a network.
 
-    Open triangles excite, filled dots inhibit, squares modulate; gap junctions are dashed, rectified ones end in a
-    diamond. Spiking neurons are octagons, neurons with gated channels have a double rim.
+    Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
+    rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim.
 
     Args:
         network: Any network.
@@ -81,25 +76,9 @@ def draw_diagram(network: Network) -> Diagram:
     Returns:
         Its Graphviz source and its SVG.
     """
-    return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network))
-
-
-def effect_of(network: Network, connection: Connection) -> str:
-    """Returns what a connection does: a reversal potential above its target's rest excites, another inhibits."""
-    kind = connection.kind
-    if isinstance(kind, GapJunction):
-        return "rectified gap junction" if kind.rectified else "gap junction"
-    if isinstance(kind, ModulatorySynapse):
-        return "modulatory"
-    return "excitatory" if kind.reversal_mV > network.neurons[connection.target].rest_mV else "inhibitory"
-
-
-def strength_of(connection: Connection) -> str:
-    """Returns the words beside a connection: conductance, or what is modulated by which factor."""
-    kind = connection.kind
-    if isinstance(kind, ModulatorySynapse):
-        return f"{kind.quantity} × {kind.factor:.3g}"
-    return f"{kind.conductance_uS:.3g} uS"
+    labels = {name: name for name in network.neurons}
+    shapes = network_shapes(network, labels, strengths=len(network.connections) <= _MOST_LABELLED)
+    return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network.name, shapes))
 
 
 def markdown_tables(network: Network) -> str:
@@ -176,11 +155,9 @@ def _graphviz(network: Network) -> Iterator[str]:
         yield f"  {keys[name]} [label={_quoted(name)}, shape={shape}, peripheries={rims}];"
     for connection in network.connections:
         effect = effect_of(network, connection)
-        color, head, *_ = _STYLES[effect]
-        style = ", style=dashed" if "gap" in effect else ", style=dotted" if effect == "modulatory" else ""
         yield (
             f"  {keys[connection.source]} -> {keys[connection.target]} "
-            f'[label="{strength_of(connection)}", color="{color}", arrowhead={head}{style}];'
+            f'[label="{strength_of(connection)}", color="{COLORS[effect]}", {_EDGES[effect]}];'
         )
     for number, (name, targets) in enumerate(network.inputs.items()):
         yield f"  i{number} [label={_quoted(name)}, shape=plaintext];"
@@ -191,131 +168,35 @@ def _graphviz(network: Network) -> Iterator[str]:
     yield "}"
 
 
-def _places(names: Sequence[str]) -> dict[str, complex]:
-    """Columns where all names end in a number that several share, else a circle; x + i y, y downwards."""
-    matches = {name: _NUMBERED.fullmatch(name) for name in names}
-    columns: dict[int, list[str]] = {}
-    for name, match in matches.items():
-        if match is not None:
-            columns.setdefault(int(match[2]), []).append(name)
-    if all(matches.values()) and 1 < len(columns) < len(names):
-        # Every other one is set aside, so that a line to the next but one does not run through it.
-        return {
-            name: complex(_PITCH_X * (1.4 * column + 0.45 * (row % 2)), 0.8 * _PITCH_Y * row)
-            for column, number in enumerate(sorted(columns))
-            for row, name in enumerate(columns[number])
-        }
-    n = len(names)
-    radius = max(120.0, 1.1 * _PITCH_Y * n / (2.0 * math.pi)) if n > 1 else 0.0
-    return {name: cmath.rect(radius, math.pi + 2.0 * math.pi * i / n) for i, name in enumerate(names)}
-
-
-def _svg(network: Network) -> str:
-    """A document whose frame holds all shapes, drawn from back to front."""
-    places = _places(list(network.neurons))
-    shapes, inside = [], [0j]
-
-    def write(words: str, at: complex, size: float, anchor: str = "middle", more: str = "") -> None:
-        shapes.append(
-            f'<text {_xy(at)} font-size="{size:.1f}" text-anchor="{anchor}"{more}>{escape(_line(words))}</text>'
-        )
-        left = at - 0.6 * size * len(words) * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
-        inside.extend((left - 1j * size, left + 0.6 * size * len(words)))
-
-    pairs = Counter[frozenset[str]]()
-    for connection in network.connections:
-        ends = connection.source, connection.target
-        pairs[frozenset(ends)] += 1
-        others = [place for name, place in places.items() if name not in ends]
-        path = _parabola(places[ends[0]], places[ends[1]], others, pairs[frozenset(ends)])
-        effect = effect_of(network, connection)
-        color, _, _, dashes = _STYLES[effect]
-        start, bend, end = (f"{point.real:.1f} {point.imag:.1f}" for point in path)
-        shapes.append(
-            f'<path d="M{start} Q{bend} {end}" fill="none" stroke="{color}" stroke-width="1.3" '
-            f'stroke-dasharray="{dashes or "none"}" marker-end="url(#{effect.replace(" ", "-")})"/>'
-        )
-        middle = _along(path, 0.42)
-        inside.extend((path[0], middle, path[2]))
-        if len(network.connections) <= 40:
-            outline = f' fill="{color}" stroke="white" stroke-width="2.5" paint-order="stroke"'
-            write(strength_of(connection), middle, 8.0, more=outline)
-    leads = [(name, target, -1.0) for name, targets in network.inputs.items() for target in targets]
-    leads += [(name, source, 1.0) for name, source in network.outputs.items()]
-    taken = Counter[tuple[str, float]]()
-    for name, neuron, side in leads:
-        # Inputs come from the left, outputs leave to the right, several of a neuron one below the other.
-        rim = places[neuron] + complex(side * _RADIUS, 9.0 * taken[neuron, side])
-        taken[neuron, side] += 1
-        tail, tip = (rim, rim + _STUB) if side > 0 else (rim - _STUB, rim)
-        shapes.append(
-            f'<line x1="{tail.real:.1f}" y1="{tail.imag:.1f}" x2="{tip.real:.1f}" y2="{tip.imag:.1f}" stroke="#555" '
-            'marker-end="url(#lead)"/>'
-        )
-        write(name, rim + complex(side * (_STUB + 4.0), 3.0), 9.0, "start" if side > 0 else "end")
-    size = min(11.0, max(6.5, 80.0 / max((len(name) for name in places if name), default=1)))
-    octagon = [cmath.rect(1.0, math.pi / 8 + math.pi / 4 * i) for i in range(8)]
-    for name, neuron in network.neurons.items():
-        place = places[name]
-        for radius in (_RADIUS, _RADIUS - 4.0) if neuron.channels else (_RADIUS,):
-            corners = (place + radius * corner for corner in octagon)
-            points = " ".join(f"{corner.real:.1f},{corner.imag:.1f}" for corner in corners)
-            rim = f'polygon points="{points}"' if neuron.firing else f'circle {_xy(place, "c")} r="{radius:.1f}"'
-            shapes.append(f'<{rim} fill="white" stroke="black"/>')
-        write(name, place + 0.35j * size, size)
-        inside.extend((place - (1 + 1j) * _RADIUS, place + (1 + 1j) * _RADIUS))
-
-    left, top = (min(getattr(point, axis) for point in inside) - 14.0 for axis in ("real", "imag"))
-    right, bottom = (max(getattr(point, axis) for point in inside) + 14.0 for axis in ("real", "imag"))
-    frame = f'width="{right - left:.1f}" height="{bottom - top:.1f}"'
-    marks = {name: (mark, color) for name, (color, _, mark, _) in _STYLES.items()} | {"lead": (_LEAD, "#555")}
+def _svg(title: str, shapes: Sequence[Shape]) -> str:
+    left, right, bottom, top = (_PX * side for side in frame_of(shapes, _PX / 96.0))
+    frame = f'width="{right - left:.1f}" height="{top - bottom:.1f}"'
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" {frame} font-family="sans-serif" '
-            f'viewBox="{left:.1f} {top:.1f} {right - left:.1f} {bottom - top:.1f}">',
-            f"<title>{escape(_line(network.name))}</title>",
-            f'<rect x="{left:.1f}" y="{top:.1f}" {frame} fill="white"/>',
-            "<defs>",
-            *(
-                f'<marker id="{name.replace(" ", "-")}" markerUnits="userSpaceOnUse" orient="auto" overflow="visible">'
-                f'<path d="{mark}" stroke="{color}" fill="{"white" if name == "excitatory" else color}"/></marker>'
-                for name, (mark, color) in marks.items()
-            ),
-            "</defs>",
-            *shapes,
+            f'viewBox="{left:.1f} {-top:.1f} {right - left:.1f} {top - bottom:.1f}">',
+            f"<title>{escape(_line(title))}</title>",
+            f'<rect x="{left:.1f}" y="{-top:.1f}" {frame} fill="white"/>',
+            *map(_svg_element, shapes),
             "</svg>\n",
         ]
     )
 
 
-def _parabola(start: complex, end: complex, others: Sequence[complex], number: int) -> tuple[complex, complex, complex]:
-    """Rim, control point and rim of the ``number``-th connection of two neurons.
-
-    It bends to the right-hand side of its direction, so that both directions of a pair stay apart; where it would run
-    through another neuron it bends further, or to the other side.
-    """
-    if start == end:
-        aside = 0.6 * _RADIUS - 0.8j * _RADIUS
-        return start - aside.conjugate(), start - 1j * (3.2 * _RADIUS + 8.0 * number), start + aside
-    more = 14.0 * (number - 1) / abs(end - start)
-    bends = [(start + end) / 2 + (bulge + math.copysign(more, bulge)) * 1j * (end - start) for bulge in _BULGES]
-
-    def is_free(bend: complex) -> bool:
-        path = [_along((start, bend, end), i / 24) for i in range(25)]
-        return all(abs(point - other) >= 1.25 * _RADIUS for point in path for other in others)
-
-    bend = next(filter(is_free, bends), bends[0])
-    first, last = (end_ + _RADIUS * (bend - end_) / abs(bend - end_) for end_ in (start, end))
-    return first, bend, last
-
-
-def _along(path: tuple[complex, complex, complex], share: float) -> complex:
-    start, bend, end = path
-    return (1 - share) ** 2 * start + 2 * share * (1 - share) * bend + share**2 * end
-
-
-def _xy(point: complex, prefix: str = "") -> str:
-    return f'{prefix}x="{point.real:.1f}" {prefix}y="{point.imag:.1f}"'
+def _svg_element(shape: Shape) -> str:
+    if isinstance(shape, Words):
+        x, y = _PX * np.multiply(shape.place, (1.0, -1.0))
+        size = _PX_PER_PT * shape.size_pt
+        y += {"bottom": 0.0, "center": 0.35, "top": 0.75}[shape.along] * size
+        anchor = {"left": "start", "center": "middle", "right": "end"}[shape.across]
+        halo = ' stroke="white" stroke-width="2.5" paint-order="stroke"' if shape.halo else ""
+        words = escape(_line(shape.text))
+        return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:.1f}" text-anchor="{anchor}"{halo}>{words}</text>'
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in _PX * shape.points * (1.0, -1.0))
+    look = f'fill="{shape.fill or "none"}" stroke="{shape.color}" stroke-width="{_PX_PER_PT * shape.width_pt:.1f}"'
+    key = f' id="{escape(_line(shape.key))}"' if shape.key else ""
+    dashes = ' stroke-dasharray="5 3"' if shape.dashed else ""
+    return f'<{"polygon" if shape.fill else "polyline"} points="{points}" {look}{dashes}{key}/>'
 
 
 def _line(text: str) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
@@ -296,7 +297,7 @@ def _schema_of(content: h5py.File) -> int:
     attribute = content.attrs.get_id(SCHEMA)
     if attribute.dtype.kind not in "iu" or attribute.shape not in ((), (1,)):
         raise ValueError(f"its {SCHEMA} is not one whole number")
-    return content.attrs[SCHEMA].item()
+    return int(np.asarray(content.attrs[SCHEMA]).item())
 
 
 def _count(marks: xarray.Dataset, name: str, most: int) -> int:

@@ -1,0 +1,229 @@
+"""The drawing of a network as lines and words in a plane, which `annelid.nervous.diagram` and the figures show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from annelid.nervous.layout import RADIUS, STUB, Stub, arc_length, lay_out, points_at, rounded, with_resistor
+from annelid.nervous.neurons import Array
+from annelid.nervous.synapses import GapJunction, ModulatorySynapse
+
+if TYPE_CHECKING:
+    from annelid.nervous.network import Connection, Network
+
+Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
+# Dark and light in grey, hues far apart for colour-blind eyes.
+COLORS: dict[Effect, str] = {
+    "excitatory": "#c2410c",
+    "inhibitory": "#1b2a6b",
+    "modulatory": "#595959",
+    "gap junction": "#595959",
+    "rectified gap junction": "#595959",
+}
+_TRIANGLE, _DOT = 0.17, 0.065
+_HEADER = RADIUS + STUB + 0.16
+"""Height of a segment's name above its uppermost neuron."""
+_GREY = "#4d4d4d"
+_ROUND = 48
+"""Corners of what looks round."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line through points; with a fill it is closed.
+
+    Attributes:
+        points: In units of the distance between neighbouring neurons, y upwards, shape ``(n, 2)``.
+        color: Of the line.
+        width_pt: Its width, points.
+        fill: Colour of what it encloses; empty for an open line.
+        dashed: Whether the line is dashed.
+        key: Names the part of the network; empty for a part of another shape.
+    """
+
+    points: Array
+    color: str
+    width_pt: float = 1.3
+    fill: str = ""
+    dashed: bool = False
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Plain text at a place.
+
+    Attributes:
+        text: The words.
+        place: Shape ``(2,)``, in units of the distance between neighbouring neurons.
+        size_pt: Size of the letters, points.
+        across: Where the words begin, have their middle, or end: at the place.
+        along: Whether the words stand on the place, around it, or hang from it.
+        halo: Whether to clear what lies under the words.
+    """
+
+    text: str
+    place: Array
+    size_pt: float
+    across: Literal["left", "center", "right"] = "center"
+    along: Literal["bottom", "center", "top"] = "center"
+    halo: bool = False
+
+
+Shape = Line | Words
+
+
+def effect_of(network: Network, connection: Connection) -> Effect:
+    """Returns what a connection does: a reversal potential above its target's rest excites, another inhibits."""
+    kind = connection.kind
+    if isinstance(kind, GapJunction):
+        return "rectified gap junction" if kind.rectified else "gap junction"
+    if isinstance(kind, ModulatorySynapse):
+        return "modulatory"
+    return "excitatory" if kind.reversal_mV > network.neurons[connection.target].rest_mV else "inhibitory"
+
+
+def strength_of(connection: Connection) -> str:
+    """Returns the words beside a connection: conductance, or what is modulated by which factor."""
+    kind = connection.kind
+    if isinstance(kind, ModulatorySynapse):
+        return f"{kind.quantity} × {kind.factor:.3g}"
+    return f"{kind.conductance_uS:.3g} uS"
+
+
+def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bool) -> list[Shape]:
+    """Draws each neuron, connection, input and output of a network once.
+
+    Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i the place among the network's connections,
+    ``input-<name>-<neuron>`` and ``output-<name>``.
+
+    Args:
+        network: The network.
+        labels: What stands in each neuron, by its name.
+        strengths: Whether to write on each connection how strong it is.
+
+    Returns:
+        The shapes, from back to front.
+    """
+    layout = lay_out(network)
+    columns, paths, marks, numbers, front = [], [], [], [], []
+    for segment, names in layout.columns.items():
+        columns += _column(f"segment {segment}", np.array([layout.places[name] for name in names]))
+    for index, (link, route) in enumerate(zip(network.connections, layout.routes, strict=True)):
+        effect = effect_of(network, link)
+        path, *mark = connection_shapes(route, effect, f"{'gap' if 'gap' in effect else 'synapse'}-{index}")
+        paths.append(path)
+        marks += mark
+        if strengths:
+            # A gap junction has its resistor in the middle.
+            share = 0.2 if "gap" in effect else 0.4
+            place = points_at(route, share * arc_length(route)[-1:])[0]
+            numbers.append(Words(strength_of(link), place, 7.0, halo=True))
+    for stub in layout.inputs:
+        arrow = arrow_shapes(np.array([stub.outer, stub.rim]), f"input-{stub.name}-{stub.neuron}")
+        front += [*arrow, _name_of(stub)]
+    for stub in layout.outputs:
+        front += [*arrow_shapes(np.array([stub.rim, stub.outer]), f"output-{stub.name}"), _name_of(stub)]
+    for name, place in layout.places.items():
+        neuron = network.neurons[name]
+        spiking, gated = neuron.firing is not None, bool(neuron.channels)
+        front += neuron_shapes(place, labels[name], spiking=spiking, gated=gated, key=f"neuron-{name}")
+    return [*columns, *paths, *marks, *numbers, *front]
+
+
+def neuron_shapes(place: Array, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
+    """Draws a circle, or an octagon for a neuron that spikes, with a double rim if it has gated channels."""
+    size_pt = 9.0 if len(label) <= 3 else min(7.0, max(5.0, 65.0 / len(label)))
+    n_corners = 8 if spiking else _ROUND
+    rims: list[Shape] = [Line(_polygon(place, RADIUS, n_corners), "black", 1.3, "white", key=key)]
+    if gated:
+        rims.append(Line(_polygon(place, 0.84 * RADIUS, n_corners), "black", 0.8, "white"))
+    return [*rims, Words(label, place, size_pt)]
+
+
+def connection_shapes(route: Array, effect: Effect, key: str = "") -> list[Shape]:
+    """Draws a path, ``(n, 2)``, that ends in a triangle, a dot or a square, or has a resistor in its middle."""
+    color, tip = COLORS[effect], route[-1]
+    if effect == "gap junction":
+        return [Line(with_resistor(route), color, key=key)]
+    if effect == "rectified gap junction":
+        along = 0.9 * arc_length(route)[-1]
+        tip, back = points_at(route, np.array([along, along - 0.1]))
+        across = 0.55 * _left_of(tip - back)
+        return [
+            Line(with_resistor(route), color, key=key),
+            Line(np.array([tip, back + across, back - across]), color, 1.0, color),
+            Line(np.array([tip + across, tip - across]), color),
+        ]
+    length = _TRIANGLE if effect == "excitatory" else 2.0 * _DOT
+    along = arc_length(route)
+    end = along[-1] - length
+    body = points_at(route, np.append(along[along < end], end))
+    forward = (tip - body[-1]) / np.hypot(*(tip - body[-1]))
+    back, middle = tip - length * forward, tip - _DOT * forward
+    if effect == "inhibitory":
+        mark = Line(_polygon(middle, _DOT, _ROUND), color, 1.0, color)
+    elif effect == "excitatory":
+        across = 0.5 * length * _left_of(forward)
+        mark = Line(np.array([tip, back + across, back - across]), color, 1.2, "white")
+    else:
+        across = _DOT * _left_of(forward)
+        mark = Line(np.array([tip, middle + across, back, middle - across]), color, 1.2, "white")
+    return [Line(body, color, dashed=effect == "modulatory", key=key), mark]
+
+
+def arrow_shapes(path: Array, key: str = "") -> list[Shape]:
+    """Draws an input or an output from tail to head, ``(2, 2)``."""
+    forward = (path[1] - path[0]) / np.hypot(*(path[1] - path[0]))
+    back, across = path[1] - 0.08 * forward, 0.04 * _left_of(forward)
+    return [
+        Line(np.array([path[0], back]), _GREY, 1.0, key=key),
+        Line(np.array([path[1], back + across, back - across]), _GREY, 1.0, _GREY),
+    ]
+
+
+def frame_of(shapes: Iterable[Shape], unit_in: float) -> tuple[float, float, float, float]:
+    """Returns left, right, bottom and top of all shapes with a margin, if a unit is drawn ``unit_in`` inches long."""
+    corners = [np.zeros(2)]
+    for shape in shapes:
+        if isinstance(shape, Line):
+            corners += [shape.points.min(axis=0), shape.points.max(axis=0)]
+        else:
+            height = shape.size_pt / 72.0 / unit_in
+            width = 0.6 * height * len(shape.text)
+            left = {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
+            corners += [np.add(shape.place, (left, -height)), np.add(shape.place, (left + width, height))]
+    (left, bottom), (right, top) = np.min(corners, axis=0) - 0.15, np.max(corners, axis=0) + 0.15
+    return float(left), float(right), float(bottom), float(top)
+
+
+def _column(name: str, places: Array) -> list[Shape]:
+    """Draws a segment's background around its neurons, and its name above them."""
+    (left, bottom), (right, top) = places.min(axis=0) - 0.44, places.max(axis=0) + 0.44
+    middle = (left + right) / 2.0
+    corners = np.array([(middle, top), (left, top), (left, bottom), (right, bottom), (right, top), (middle, top)])
+    header = Words(name, np.array([middle, places.max(axis=0)[1] + _HEADER]), 9.0)
+    return [Line(rounded(corners, 0.2), "none", 0.0, "#f1f1f1"), header]
+
+
+def _name_of(stub: Stub) -> Words:
+    """Writes an input's or output's name, unless that is the neuron's, beyond its outer end."""
+    sideways, upwards = direction = (stub.outer - stub.rim) / STUB
+    across = "center" if abs(sideways) < 0.3 else "left" if sideways > 0 else "right"
+    along = "center" if abs(upwards) < 0.3 else "bottom" if upwards > 0 else "top"
+    label = "" if stub.name == stub.neuron else stub.name.replace("_", " ")
+    return Words(label, stub.outer + 0.06 * direction, 8.0, across, along)
+
+
+def _polygon(center: Array, radius: float, n_corners: int) -> Array:
+    """Returns the corners of a polygon around a circle, which its sides touch."""
+    turn = np.pi * (2 * np.arange(n_corners) + 1) / n_corners
+    return center + radius / np.cos(np.pi / n_corners) * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def _left_of(vector: Array) -> Array:
+    return np.array([-vector[1], vector[0]])

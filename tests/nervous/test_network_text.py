@@ -192,19 +192,26 @@ SVG = "{http://www.w3.org/2000/svg}"
 def test_svg_is_well_formed_and_holds_everything_within_its_frame(network):
     root = ElementTree.fromstring(network.diagram().svg)
     left, top, width, height = map(float, root.attrib["viewBox"].split())
-    assert len(root.findall(f"{SVG}path")) == len(network.connections)
-    for circle in root.findall(f"{SVG}circle"):
-        x, y, r = (float(circle.attrib[key]) for key in ("cx", "cy", "r"))
-        assert left <= x - r <= x + r <= left + width
-        assert top <= y - r <= y + r <= top + height
+    links = [line for line in root.findall(f"{SVG}polyline") if re.match("(gap|synapse)-", line.get("id", ""))]
+    assert len(links) == len(network.connections)
+    neurons = [rim for rim in root.findall(f"{SVG}polygon") if rim.get("id", "").startswith("neuron-")]
+    assert len(neurons) == len(network.neurons)
+    for shape in (*links, *neurons):
+        for x, y in corners(shape):
+            assert left <= x <= left + width
+            assert top <= y <= top + height
+
+
+def corners(shape):
+    return [tuple(map(float, point.split(","))) for point in shape.attrib["points"].split()]
 
 
 def test_every_neuron_of_a_worm_has_a_place_of_its_own_in_the_svg():
     root = ElementTree.fromstring(peristalsis_network(4).diagram().svg)
-    centers = {(c.attrib["cx"], c.attrib["cy"]) for c in root.findall(f"{SVG}circle") if float(c.attrib["r"]) > 10}
-    assert len(centers) == 16
+    rims = [rim for rim in root.findall(f"{SVG}polygon") if rim.get("id", "").startswith("neuron-")]
+    assert len({rim.get("points") for rim in rims}) == 16
     labels = [t.text for t in root.findall(f"{SVG}text")]
-    assert {"contraction_1", "relay_4", "stretch_3", "kick"} <= set(labels)
+    assert {"contraction_1", "relay_4", "stretch 3", "kick"} <= set(labels)
 
 
 def test_saving_and_showing_a_diagram(tmp_path):

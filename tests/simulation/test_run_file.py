@@ -109,8 +109,8 @@ NEWER_THAN_0_1 = {
 
 
 def test_a_file_of_annelid_0_1_is_read(run: Run, tmp_path: Path) -> None:
-    own = {"body.strands.joint_damping_Nms_per_rad": 0.07, "body.mesh.n_segments": 4, "arena.friction": 0.4}
-    config = load_config("riddle2023-fast", {"body": {"kind": "worm"}, "arena": {}} | own)
+    strands = {"joint_damping_Nms_per_rad": 0.07}
+    config = load_config({"body": {"kind": "worm", "strands": strands}, "arena": {"friction": 0.4}})
     tree = config.model_dump(mode="json")
     for path, fields in NEWER_THAN_0_1.items():
         section = reduce(getitem, filter(None, path.split(".")), tree)

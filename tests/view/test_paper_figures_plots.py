@@ -16,6 +16,8 @@ from annelid.config import Rings, WormBody, load_config
 from annelid.draw.figures import network_diagram
 from annelid.errors import ConfigError
 from annelid.nervous import Network
+from annelid.nervous.diagram import effect_of
+from annelid.nervous.layout import lay_out
 from annelid.nervous.neurons import Neuron, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse, Synapse
@@ -238,7 +240,7 @@ def test_a_segment_has_seven_synapses() -> None:
 
 
 def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: Network) -> None:
-    diagram = network_diagram.lay_out(network)
+    diagram = lay_out(network)
     for link, route in zip(network.connections, diagram.routes, strict=True):
         radii = [np.linalg.norm(route - place, axis=1) for place in diagram.places.values()]
         nearest = {name: distance.min() for name, distance in zip(diagram.places, radii, strict=True)}
@@ -249,7 +251,7 @@ def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: 
 
 
 def test_no_two_connections_share_a_path_and_no_two_neurons_a_place(network: Network) -> None:
-    diagram = network_diagram.lay_out(network)
+    diagram = lay_out(network)
     middles = np.array([route[len(route) // 2] for route in diagram.routes])
     for points in (middles, np.array(list(diagram.places.values()))):
         gaps = np.linalg.norm(points[:, np.newaxis] - points, axis=2) + 10.0 * np.eye(len(points))
@@ -257,16 +259,16 @@ def test_no_two_connections_share_a_path_and_no_two_neurons_a_place(network: Net
 
 
 def test_segments_are_columns_from_left_to_right() -> None:
-    diagram = network_diagram.lay_out(peristalsis_network(12))
+    diagram = lay_out(peristalsis_network(12))
     assert list(diagram.columns) == list(range(1, 13))
     x = np.array([[diagram.places[name][0] for name in names] for names in diagram.columns.values()])
     assert np.all(x[:-1].max(axis=1) < x[1:].min(axis=1))
-    assert network_diagram.lay_out(own_network()).columns == {}
+    assert lay_out(own_network()).columns == {}
 
 
 def test_effects_come_from_reversal_and_rest() -> None:
     network = own_network()
-    effects = [network_diagram.effect(network, link) for link in network.connections]
+    effects = [effect_of(network, link) for link in network.connections]
     assert effects[:3] == ["inhibitory", "inhibitory", "excitatory"]
     assert effects[-2:] == ["gap junction", "rectified gap junction"]
 

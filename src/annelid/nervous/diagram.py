@@ -1,22 +1,22 @@
-"""Networks as Graphviz source, as a plain SVG, and as Markdown tables: text only, nothing to install.
+"""Networks as shapes in a plane, and these as SVG; further as Graphviz source and Markdown tables.
 
-The SVG is a working drawing. `annelid.draw.figures` draws networks in the style of the papers.
+All of it is text, nothing to install. `annelid.draw.figures.network_diagram` paints the same shapes with matplotlib.
 """
 
 from __future__ import annotations
 
-import cmath
 import json
-import math
-import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
 
 from annelid.errors import ConfigError
+from annelid.nervous.layout import RADIUS, STUB, Stub, arc_length, lay_out, points_at, rounded, with_resistor
+from annelid.nervous.neurons import Array
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.text import printable
 
@@ -24,20 +24,74 @@ if TYPE_CHECKING:
     from annelid.nervous.network import Connection, Network
     from annelid.nervous.neurons import Neuron
 
-_RADIUS = 26.0
-_PITCH_X, _PITCH_Y = 190.0, 120.0
-_STUB = 34.0
-_BULGES = (0.12, 0.25, -0.12, -0.25, 0.4, -0.4, 0.6, -0.6)
-_STYLES = {
-    # Colour, Graphviz's arrowhead, the mark at the target's rim as a path of SVG, and the dashes.
-    "excitatory": ("#1b7837", "empty", "M-9 -4.5 L0 0 L-9 4.5 Z", ""),
-    "inhibitory": ("#b2182b", "dot", "M0 0 a4 4 0 1 0 -8 0 a4 4 0 1 0 8 0", ""),
-    "gap junction": ("#2166ac", "none", "M0 0 a2 2 0 1 0 -4 0 a2 2 0 1 0 4 0", "5 3"),
-    "rectified gap junction": ("#2166ac", "diamond", "M0 0 L-5.5 4.5 L-11 0 L-5.5 -4.5 Z", "5 3"),
-    "modulatory": ("#7b3294", "box", "M0 -4.5 V4.5 H-9 V-4.5 Z", "2 3"),
+Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
+COLORS: Mapping[Effect, str] = {
+    "excitatory": "#1b7837",
+    "inhibitory": "#b2182b",
+    "modulatory": "#7b3294",
+    "gap junction": "#2166ac",
+    "rectified gap junction": "#2166ac",
 }
-_LEAD = "M-7 -3 L0 0 L-7 3 Z"
-_NUMBERED = re.compile(r"(.*?)_?(\d+)")
+_HEADS = {
+    "excitatory": "empty",
+    "inhibitory": "dot",
+    "modulatory": "box",
+    "gap junction": "none",
+    "rectified gap junction": "diamond",
+}
+"""Graphviz's arrowheads."""
+_MOST_LABELLED = 40
+"""Connections beside which there is room for words in the SVG."""
+_HEADER = RADIUS + STUB + 0.16
+"""Height of a segment's name above its uppermost neuron."""
+_TRIANGLE, _DOT, _ARROW = 0.17, 0.065, (0.0625, 0.03)
+_GREY = "#4d4d4d"
+_BACK, _PATHS, _MARKS, _RIMS, _FRONT = range(5)
+_PIXELS = 96.0
+"""Of the SVG, per distance between neighbouring neurons."""
+_PT = 96.0 / 72.0
+_CIRCLE = 48
+"""Corners of what looks round."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line through points; with a fill it is closed.
+
+    Attributes:
+        points: In units of the distance between neighbouring neurons, y upwards, ``(n, 2)``.
+        color: Of the line.
+        width_pt: Its width, points.
+        fill: Colour of what it encloses.
+        dashed: Whether it is.
+        layer: What lies in a higher layer is drawn over it.
+        key: Its id in the drawing; empty for parts of something else.
+    """
+
+    points: Array
+    color: str
+    width_pt: float = 1.3
+    fill: str = ""
+    dashed: bool = False
+    layer: int = _PATHS
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Plain text at a place, ``(2,)``, which lies on the named sides of it; behind it the ground may be cleared."""
+
+    text: str
+    place: Array
+    size_pt: float
+    across: Literal["left", "center", "right"] = "center"
+    along: Literal["bottom", "center", "top"] = "center"
+    color: str = "black"
+    clears: bool = False
+    layer: int = _FRONT
+
+
+Shape = Line | Words
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +126,8 @@ class Diagram:
 def draw_diagram(network: Network) -> Diagram:
     """Draws a network.
 
-    Open triangles excite, filled dots inhibit, squares modulate; gap junctions are dashed, rectified ones end in a
-    diamond. Spiking neurons are octagons, neurons with gated channels have a double rim.
+    Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
+    rectified ones with a diode. Spiking neurons are octagons, neurons with gated channels have a double rim.
 
     Args:
         network: Any network.
@@ -81,10 +135,143 @@ def draw_diagram(network: Network) -> Diagram:
     Returns:
         Its Graphviz source and its SVG.
     """
-    return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network))
+    strengths = [
+        strength_of(link) if len(network.connections) <= _MOST_LABELLED else "" for link in network.connections
+    ]
+    shapes = network_shapes(network, {name: name for name in network.neurons}, strengths, COLORS)
+    return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network.name, shapes))
 
 
-def effect_of(network: Network, connection: Connection) -> str:
+def network_shapes(
+    network: Network, labels: Mapping[str, str], strengths: Sequence[str], colors: Mapping[Effect, str]
+) -> list[Shape]:
+    """Draws each neuron, connection, input and output of a network once.
+
+    Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i the place among the network's connections,
+    ``input-<name>-<neuron>`` and ``output-<name>``.
+
+    Args:
+        network: The network.
+        labels: What stands in each neuron, by its name.
+        strengths: What stands on each connection; empty for nothing.
+        colors: Colours of the connections.
+
+    Returns:
+        The shapes, from back to front.
+    """
+    layout = lay_out(network)
+    shapes: list[Shape] = []
+    for segment, names in layout.columns.items():
+        shapes += _column(f"segment {segment}", np.array([layout.places[name] for name in names]))
+    for index, (link, route, words) in enumerate(zip(network.connections, layout.routes, strengths, strict=True)):
+        effect = effect_of(network, link)
+        shapes += connection_shapes(route, effect, colors[effect], f"{'gap' if 'gap' in effect else 'synapse'}-{index}")
+        if words:
+            # A gap junction has its resistor in the middle.
+            along = (0.2 if "gap" in effect else 0.4) * arc_length(route)[-1:]
+            shapes.append(Words(words, points_at(route, along)[0], 7.0, clears=True, layer=_MARKS))
+    for stub in layout.inputs:
+        shapes += _stub(stub, f"input-{stub.name}-{stub.neuron}")
+    for stub in layout.outputs:
+        shapes += _stub(stub, f"output-{stub.name}")
+    for name, place in layout.places.items():
+        neuron = network.neurons[name]
+        spiking, gated = neuron.firing is not None, bool(neuron.channels)
+        shapes += neuron_shapes(place, labels[name], spiking=spiking, gated=gated, key=f"neuron-{name}")
+    return sorted(shapes, key=lambda shape: shape.layer)
+
+
+def neuron_shapes(place: Array, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
+    """Draws a circle, or an octagon for a neuron that spikes, with a double rim if it has gated channels."""
+    size = 9.0 if len(label) <= 3 else min(7.0, max(5.0, 65.0 / len(label)))
+    n_corners = 8 if spiking else _CIRCLE
+    rims = [Line(_polygon(place, RADIUS, n_corners), "black", 1.3, "white", layer=_RIMS, key=key)]
+    if gated:
+        rims.append(Line(_polygon(place, 0.84 * RADIUS, n_corners), "black", 0.8, "white", layer=_RIMS))
+    return [*rims, Words(label, place, size)]
+
+
+def _polygon(center: Array, radius: float, n_corners: int) -> Array:
+    turn = np.pi * (2 * np.arange(n_corners) + 1) / n_corners
+    return center + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def connection_shapes(route: Array, effect: Effect, color: str, key: str = "") -> list[Shape]:
+    """Draws a path, ``(n, 2)``, that ends in a triangle, a dot or a square, or has a resistor in its middle."""
+    gap = "gap" in effect
+    length = 0.0 if gap else _TRIANGLE if effect == "excitatory" else 2.0 * _DOT
+    tip = route[-1]
+    body = with_resistor(route) if gap else route[np.linalg.norm(route - tip, axis=1) >= length - 1e-12]
+    shapes: list[Shape] = [Line(body, color, dashed=effect == "modulatory", key=key)]
+    if effect == "rectified gap junction":
+        along = 0.9 * arc_length(route)[-1]
+        tip, back = points_at(route, np.array([along, along - 0.1]))
+        across = 0.55 * np.array([-(tip - back)[1], (tip - back)[0]])
+        diode = np.array([tip, back + across, back - across])
+        shapes += [
+            Line(diode, color, 1.0, color, layer=_MARKS),
+            Line(np.array([tip + across, tip - across]), color, layer=_MARKS),
+        ]
+    if gap:
+        return shapes
+    forward = (tip - body[-1]) / np.hypot(*(tip - body[-1]))
+    side = np.array([-forward[1], forward[0]])
+    back, middle = tip - length * forward, tip - _DOT * forward
+    if effect == "inhibitory":
+        return [*shapes, Line(_polygon(middle, _DOT, _CIRCLE), color, 1.0, color, layer=_MARKS)]
+    across = 0.5 * length * side if effect == "excitatory" else _DOT * side
+    corners = (
+        [tip, back + across, back - across] if effect == "excitatory" else [tip, middle + across, back, middle - across]
+    )
+    return [*shapes, Line(np.array(corners), color, 1.2, "white", layer=_MARKS)]
+
+
+def arrow_shapes(path: Array, key: str = "") -> list[Shape]:
+    """Draws an input or an output from tail to head, ``(2, 2)``."""
+    forward = (path[1] - path[0]) / np.hypot(*(path[1] - path[0]))
+    back, across = path[1] - _ARROW[0] * forward, _ARROW[1] * np.array([-forward[1], forward[0]])
+    return [
+        Line(np.array([path[0], back]), _GREY, 1.0, key=key),
+        Line(np.array([path[1], back + across, back - across]), _GREY, 1.0, _GREY, layer=_MARKS),
+    ]
+
+
+def _column(name: str, places: Array) -> list[Shape]:
+    """Draws a segment's background around its neurons, and its name above them."""
+    (left, bottom), (right, top) = places.min(axis=0) - 0.44, places.max(axis=0) + 0.44
+    middle = (left + right) / 2.0
+    corners = [(middle, top), (left, top), (left, bottom), (right, bottom), (right, top), (middle, top)]
+    return [
+        Line(rounded(np.array(corners), 0.2), "none", 0.0, "#f1f1f1", layer=_BACK),
+        Words(name, np.array([middle, top - 0.44 + _HEADER]), 9.0),
+    ]
+
+
+def _stub(stub: Stub, key: str) -> list[Shape]:
+    """Draws an input or an output with its name, unless that is the neuron's, at the outer end."""
+    sideways, upwards = stub.direction
+    across = "center" if abs(sideways) < 0.3 else "left" if sideways > 0 else "right"
+    along = "center" if abs(upwards) < 0.3 else "bottom" if upwards > 0 else "top"
+    label = "" if stub.name == stub.neuron else stub.name.replace("_", " ")
+    return [*arrow_shapes(stub.path, key), Words(label, stub.outer + 0.06 * stub.direction, 8.0, across, along)]
+
+
+def frame_of(shapes: Iterable[Shape], unit_in: float = 1.0) -> tuple[float, float, float, float]:
+    """Returns left, right, bottom and top of shapes with a margin, where a unit is so many inches."""
+    corners = [np.zeros(2)]
+    for shape in shapes:
+        if isinstance(shape, Line):
+            corners += [shape.points.min(axis=0), shape.points.max(axis=0)]
+        else:
+            size = shape.size_pt / 72.0 / unit_in
+            width = 0.6 * size * len(shape.text)
+            left = {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
+            corners += [np.add(shape.place, (left, -size)), np.add(shape.place, (left + width, size))]
+    (left, bottom), (right, top) = np.min(corners, axis=0) - 0.15, np.max(corners, axis=0) + 0.15
+    return float(left), float(right), float(bottom), float(top)
+
+
+def effect_of(network: Network, connection: Connection) -> Effect:
     """Returns what a connection does: a reversal potential above its target's rest excites, another inhibits."""
     kind = connection.kind
     if isinstance(kind, GapJunction):
@@ -176,11 +363,10 @@ def _graphviz(network: Network) -> Iterator[str]:
         yield f"  {keys[name]} [label={_quoted(name)}, shape={shape}, peripheries={rims}];"
     for connection in network.connections:
         effect = effect_of(network, connection)
-        color, head, *_ = _STYLES[effect]
         style = ", style=dashed" if "gap" in effect else ", style=dotted" if effect == "modulatory" else ""
         yield (
             f"  {keys[connection.source]} -> {keys[connection.target]} "
-            f'[label="{strength_of(connection)}", color="{color}", arrowhead={head}{style}];'
+            f'[label="{strength_of(connection)}", color="{COLORS[effect]}", arrowhead={_HEADS[effect]}{style}];'
         )
     for number, (name, targets) in enumerate(network.inputs.items()):
         yield f"  i{number} [label={_quoted(name)}, shape=plaintext];"
@@ -191,131 +377,39 @@ def _graphviz(network: Network) -> Iterator[str]:
     yield "}"
 
 
-def _places(names: Sequence[str]) -> dict[str, complex]:
-    """Columns where all names end in a number that several share, else a circle; x + i y, y downwards."""
-    matches = {name: _NUMBERED.fullmatch(name) for name in names}
-    columns: dict[int, list[str]] = {}
-    for name, match in matches.items():
-        if match is not None:
-            columns.setdefault(int(match[2]), []).append(name)
-    if all(matches.values()) and 1 < len(columns) < len(names):
-        # Every other one is set aside, so that a line to the next but one does not run through it.
-        return {
-            name: complex(_PITCH_X * (1.4 * column + 0.45 * (row % 2)), 0.8 * _PITCH_Y * row)
-            for column, number in enumerate(sorted(columns))
-            for row, name in enumerate(columns[number])
-        }
-    n = len(names)
-    radius = max(120.0, 1.1 * _PITCH_Y * n / (2.0 * math.pi)) if n > 1 else 0.0
-    return {name: cmath.rect(radius, math.pi + 2.0 * math.pi * i / n) for i, name in enumerate(names)}
-
-
-def _svg(network: Network) -> str:
+def _svg(title: str, shapes: Sequence[Shape]) -> str:
     """A document whose frame holds all shapes, drawn from back to front."""
-    places = _places(list(network.neurons))
-    shapes, inside = [], [0j]
-
-    def write(words: str, at: complex, size: float, anchor: str = "middle", more: str = "") -> None:
-        shapes.append(
-            f'<text {_xy(at)} font-size="{size:.1f}" text-anchor="{anchor}"{more}>{escape(_line(words))}</text>'
-        )
-        left = at - 0.6 * size * len(words) * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
-        inside.extend((left - 1j * size, left + 0.6 * size * len(words)))
-
-    pairs = Counter[frozenset[str]]()
-    for connection in network.connections:
-        ends = connection.source, connection.target
-        pairs[frozenset(ends)] += 1
-        others = [place for name, place in places.items() if name not in ends]
-        path = _parabola(places[ends[0]], places[ends[1]], others, pairs[frozenset(ends)])
-        effect = effect_of(network, connection)
-        color, _, _, dashes = _STYLES[effect]
-        start, bend, end = (f"{point.real:.1f} {point.imag:.1f}" for point in path)
-        shapes.append(
-            f'<path d="M{start} Q{bend} {end}" fill="none" stroke="{color}" stroke-width="1.3" '
-            f'stroke-dasharray="{dashes or "none"}" marker-end="url(#{effect.replace(" ", "-")})"/>'
-        )
-        middle = _along(path, 0.42)
-        inside.extend((path[0], middle, path[2]))
-        if len(network.connections) <= 40:
-            outline = f' fill="{color}" stroke="white" stroke-width="2.5" paint-order="stroke"'
-            write(strength_of(connection), middle, 8.0, more=outline)
-    leads = [(name, target, -1.0) for name, targets in network.inputs.items() for target in targets]
-    leads += [(name, source, 1.0) for name, source in network.outputs.items()]
-    taken = Counter[tuple[str, float]]()
-    for name, neuron, side in leads:
-        # Inputs come from the left, outputs leave to the right, several of a neuron one below the other.
-        rim = places[neuron] + complex(side * _RADIUS, 9.0 * taken[neuron, side])
-        taken[neuron, side] += 1
-        tail, tip = (rim, rim + _STUB) if side > 0 else (rim - _STUB, rim)
-        shapes.append(
-            f'<line x1="{tail.real:.1f}" y1="{tail.imag:.1f}" x2="{tip.real:.1f}" y2="{tip.imag:.1f}" stroke="#555" '
-            'marker-end="url(#lead)"/>'
-        )
-        write(name, rim + complex(side * (_STUB + 4.0), 3.0), 9.0, "start" if side > 0 else "end")
-    size = min(11.0, max(6.5, 80.0 / max((len(name) for name in places if name), default=1)))
-    octagon = [cmath.rect(1.0, math.pi / 8 + math.pi / 4 * i) for i in range(8)]
-    for name, neuron in network.neurons.items():
-        place = places[name]
-        for radius in (_RADIUS, _RADIUS - 4.0) if neuron.channels else (_RADIUS,):
-            corners = (place + radius * corner for corner in octagon)
-            points = " ".join(f"{corner.real:.1f},{corner.imag:.1f}" for corner in corners)
-            rim = f'polygon points="{points}"' if neuron.firing else f'circle {_xy(place, "c")} r="{radius:.1f}"'
-            shapes.append(f'<{rim} fill="white" stroke="black"/>')
-        write(name, place + 0.35j * size, size)
-        inside.extend((place - (1 + 1j) * _RADIUS, place + (1 + 1j) * _RADIUS))
-
-    left, top = (min(getattr(point, axis) for point in inside) - 14.0 for axis in ("real", "imag"))
-    right, bottom = (max(getattr(point, axis) for point in inside) + 14.0 for axis in ("real", "imag"))
-    frame = f'width="{right - left:.1f}" height="{bottom - top:.1f}"'
-    marks = {name: (mark, color) for name, (color, _, mark, _) in _STYLES.items()} | {"lead": (_LEAD, "#555")}
+    left, right, bottom, top = (_PIXELS * side for side in frame_of(shapes))
+    frame = f'width="{right - left:.1f}" height="{top - bottom:.1f}"'
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" {frame} font-family="sans-serif" '
-            f'viewBox="{left:.1f} {top:.1f} {right - left:.1f} {bottom - top:.1f}">',
-            f"<title>{escape(_line(network.name))}</title>",
-            f'<rect x="{left:.1f}" y="{top:.1f}" {frame} fill="white"/>',
-            "<defs>",
-            *(
-                f'<marker id="{name.replace(" ", "-")}" markerUnits="userSpaceOnUse" orient="auto" overflow="visible">'
-                f'<path d="{mark}" stroke="{color}" fill="{"white" if name == "excitatory" else color}"/></marker>'
-                for name, (mark, color) in marks.items()
-            ),
-            "</defs>",
-            *shapes,
+            f'viewBox="{left:.1f} {-top:.1f} {right - left:.1f} {top - bottom:.1f}">',
+            f"<title>{escape(_line(title))}</title>",
+            f'<rect x="{left:.1f}" y="{-top:.1f}" {frame} fill="white"/>',
+            *map(_svg_element, shapes),
             "</svg>\n",
         ]
     )
 
 
-def _parabola(start: complex, end: complex, others: Sequence[complex], number: int) -> tuple[complex, complex, complex]:
-    """Rim, control point and rim of the ``number``-th connection of two neurons.
-
-    It bends to the right-hand side of its direction, so that both directions of a pair stay apart; where it would run
-    through another neuron it bends further, or to the other side.
-    """
-    if start == end:
-        aside = 0.6 * _RADIUS - 0.8j * _RADIUS
-        return start - aside.conjugate(), start - 1j * (3.2 * _RADIUS + 8.0 * number), start + aside
-    more = 14.0 * (number - 1) / abs(end - start)
-    bends = [(start + end) / 2 + (bulge + math.copysign(more, bulge)) * 1j * (end - start) for bulge in _BULGES]
-
-    def is_free(bend: complex) -> bool:
-        path = [_along((start, bend, end), i / 24) for i in range(25)]
-        return all(abs(point - other) >= 1.25 * _RADIUS for point in path for other in others)
-
-    bend = next(filter(is_free, bends), bends[0])
-    first, last = (end_ + _RADIUS * (bend - end_) / abs(bend - end_) for end_ in (start, end))
-    return first, bend, last
-
-
-def _along(path: tuple[complex, complex, complex], share: float) -> complex:
-    start, bend, end = path
-    return (1 - share) ** 2 * start + 2 * share * (1 - share) * bend + share**2 * end
-
-
-def _xy(point: complex, prefix: str = "") -> str:
-    return f'{prefix}x="{point.real:.1f}" {prefix}y="{point.imag:.1f}"'
+def _svg_element(shape: Shape) -> str:
+    if isinstance(shape, Words):
+        x, y = _PIXELS * shape.place * (1.0, -1.0)
+        size = _PT * shape.size_pt
+        y += {"bottom": 0.0, "center": 0.35, "top": 0.75}[shape.along] * size
+        anchor = {"left": "start", "center": "middle", "right": "end"}[shape.across]
+        look = f'font-size="{size:.1f}" text-anchor="{anchor}" fill="{shape.color}"'
+        if shape.clears:
+            look += ' stroke="white" stroke-width="2.5" paint-order="stroke"'
+        return f'<text x="{x:.1f}" y="{y:.1f}" {look}>{escape(_line(shape.text))}</text>'
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in _PIXELS * shape.points * (1.0, -1.0))
+    look = f'fill="{shape.fill or "none"}" stroke="{shape.color}" stroke-width="{_PT * shape.width_pt:.1f}"'
+    if shape.dashed:
+        look += ' stroke-dasharray="5 3"'
+    if shape.key:
+        look += f' id="{escape(_line(shape.key))}"'
+    return f'<{"polygon" if shape.fill else "polyline"} points="{points}" {look}/>'
 
 
 def _line(text: str) -> str:

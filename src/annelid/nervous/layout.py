@@ -6,17 +6,19 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.nervous import Connection, Network
-from annelid.protocols import Array
+from annelid.nervous.neurons import Array
+
+if TYPE_CHECKING:
+    from annelid.nervous.network import Connection, Network
 
 RADIUS = 0.27
 """Radius of a neuron, in units of the distance between neighbours."""
-_STUB = 0.42
-HEADER = RADIUS + _STUB + 0.16
-"""Height of a segment's name above its uppermost neuron."""
+STUB = 0.42
+"""Length of the line of an input or an output."""
 
 _COLUMN_GAP = 1.35
 _CROWDED = 0.4
@@ -42,14 +44,9 @@ class Stub:
     outer: Array
     direction: Array
 
-    @property
-    def label(self) -> str:
-        """Its name, unless that is the neuron's."""
-        return "" if self.name == self.neuron else self.name.replace("_", " ")
-
 
 @dataclass(frozen=True)
-class Diagram:
+class Layout:
     """Where everything of a network is drawn, in units of the distance between neighbouring neurons.
 
     Attributes:
@@ -67,7 +64,7 @@ class Diagram:
     columns: dict[int, list[str]]
 
 
-def lay_out(network: Network) -> Diagram:
+def lay_out(network: Network) -> Layout:
     """Places neurons and leads connections around them.
 
     Names that all end in ``_<n>`` make one column for each n, its neurons row by row from the top in their order; other
@@ -84,24 +81,7 @@ def lay_out(network: Network) -> Diagram:
         for name, neurons in network.inputs.items()
         for neuron in neurons
     ]
-    return Diagram(places, routes, tuple(inputs), tuple(outputs), columns)
-
-
-def bounds(diagram: Diagram) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of all there is, with room for the labels."""
-    label = 0.13
-    rim = RADIUS + 0.2
-    points = [place + sign * rim for place in diagram.places.values() for sign in (-1.0, 1.0)]
-    points += [*np.concatenate(diagram.routes)] if diagram.routes else []
-    for stub in (*diagram.inputs, *diagram.outputs):
-        width = label * len(stub.label)
-        sideways = stub.direction[0]
-        left = -width if sideways < -0.3 else -width / 2.0 if sideways < 0.3 else 0.0
-        points += [np.add(stub.outer, (left, -0.25)), np.add(stub.outer, (left + width, 0.25))]
-    corner = np.array(points).reshape(-1, 2)
-    (left, bottom), (right, top) = corner.min(axis=0) - 0.12, corner.max(axis=0) + 0.12
-    header = HEADER + 0.25 if diagram.columns else 0.0
-    return float(left), float(right), float(bottom), max(float(top), header)
+    return Layout(places, routes, tuple(inputs), tuple(outputs), columns)
 
 
 def role_of(name: str) -> str:
@@ -149,9 +129,9 @@ def _routes(network: Network, places: Mapping[str, Array], columns: Mapping[int,
         if link.source == link.target:
             pair = taken.setdefault(frozenset((link.source,)), [])
             pair.append(0.0)
-            yield self_loop(start, np.pi / 4.0 if columns else angle_of(start), len(pair))
+            yield _self_loop(start, np.pi / 4.0 if columns else _angle_of(start), len(pair))
         elif _closes_the_ring(link, places, columns):
-            yield return_path(start, end, min(place[1] for place in places.values()), n_returns)
+            yield _return_path(start, end, min(place[1] for place in places.values()), n_returns)
             n_returns += 1
         else:
             pair = frozenset((link.source, link.target))
@@ -159,12 +139,12 @@ def _routes(network: Network, places: Mapping[str, Array], columns: Mapping[int,
             # A bend counts from the same side for both directions, so that two paths never coincide.
             side = 1.0 if link.source < link.target else -1.0
             bends = _BENDS if shared[pair] == 1 else _BENDS[3:]
-            free = [bend for bend in bends if side * bend not in taken.get(pair, [])] or [1.1 + 0.3 * shared[pair]]
-            paths = [between_rims(bow(start, end, bend), start, end) for bend in free]
+            free = [bend for bend in bends if side * bend not in taken.get(pair, [])] or [1.1 + 0.3 * len(taken[pair])]
+            paths = [_between_rims(_bow(start, end, bend), start, end) for bend in free]
             arrivals = arrived.setdefault(link.target, [])
             costs = [10 * _n_hit(path, others) + _n_crowded(path[-1] - end, arrivals) for path in paths]
             chosen = int(np.argmin(costs))
-            arrivals.append(angle_of(paths[chosen][-1] - end))
+            arrivals.append(_angle_of(paths[chosen][-1] - end))
             taken.setdefault(pair, []).append(side * free[chosen])
             yield paths[chosen]
 
@@ -188,7 +168,7 @@ def _n_hit(path: Array, others: Array) -> int:
 
 
 def _n_crowded(arrival: Array, others: Sequence[float]) -> int:
-    return sum(angle_between(angle_of(arrival), other) < _CROWDED for other in others)
+    return sum(_angle_between(_angle_of(arrival), other) < _CROWDED for other in others)
 
 
 def _busy_directions(network: Network, places: Mapping[str, Array], routes: Sequence[Array]) -> dict[str, list[float]]:
@@ -196,10 +176,10 @@ def _busy_directions(network: Network, places: Mapping[str, Array], routes: Sequ
     busy: dict[str, list[float]] = {name: [] for name in places}
     for link, route in zip(network.connections, routes, strict=True):
         for name, end in ((link.source, route[0]), (link.target, route[-1])):
-            busy[name].append(angle_of(end - places[name]))
+            busy[name].append(_angle_of(end - places[name]))
     for name, place in places.items():
         gaps = [other - place for key, other in places.items() if key != name]
-        busy[name] += [angle_of(gap) for gap in gaps if np.hypot(*gap) < 1.2]
+        busy[name] += [_angle_of(gap) for gap in gaps if np.hypot(*gap) < 1.2]
     return busy
 
 
@@ -214,33 +194,33 @@ def _stub(
 ) -> Stub:
     """Leads an input (or ``up``, an output) away where there is room, near to down (up) or out of the circle."""
     place = places[neuron]
-    wanted = angle_of(place) if not columns and np.any(place) else (0.5 if up else -0.5) * np.pi
+    wanted = _angle_of(place) if not columns and np.any(place) else (0.5 if up else -0.5) * np.pi
 
     def merit(angle: float) -> float:
-        room = min((angle_between(angle, other) for other in busy[neuron]), default=np.pi)
+        room = min((_angle_between(angle, other) for other in busy[neuron]), default=np.pi)
         return min(room, 0.9) + 0.25 * np.cos(angle - wanted)
 
     angle = max(np.pi / 8.0 * np.arange(16), key=merit)
     busy[neuron].append(float(angle))
     direction = np.array([np.cos(angle), np.sin(angle)])
-    rim, outer = place + RADIUS * direction, place + (RADIUS + _STUB) * direction
+    rim, outer = place + RADIUS * direction, place + (RADIUS + STUB) * direction
     return Stub(name, neuron, np.array([rim, outer] if up else [outer, rim]), outer, direction)
 
 
-def bow(start: Array, end: Array, bend: float) -> Array:
+def _bow(start: Array, end: Array, bend: float) -> Array:
     """A parabola between two points whose middle is off the straight line by ``bend / 2`` of its length."""
     share = np.linspace(0.0, 1.0, 121)[:, np.newaxis]
     across = np.array([-(end - start)[1], (end - start)[0]])
     return (1 - share) * start + share * end + 2.0 * share * (1 - share) * bend * across
 
 
-def between_rims(path: Array, start: Array, end: Array) -> Array:
+def _between_rims(path: Array, start: Array, end: Array) -> Array:
     """The part of a path outside the neurons at its two ends."""
     outside = (np.linalg.norm(path - start, axis=1) >= RADIUS) & (np.linalg.norm(path - end, axis=1) >= RADIUS)
     return path[outside]
 
 
-def self_loop(place: Array, outwards: float, number: int) -> Array:
+def _self_loop(place: Array, outwards: float, number: int) -> Array:
     """Of a circle beside the neuron, the arc outside it."""
     radius = 0.2 + 0.08 * (number - 1)
     turn = outwards + np.linspace(-np.pi, np.pi, 121)
@@ -249,7 +229,7 @@ def self_loop(place: Array, outwards: float, number: int) -> Array:
     return loop[np.linalg.norm(loop - place, axis=1) >= RADIUS]
 
 
-def return_path(start: Array, end: Array, bottom: float, lane: int) -> Array:
+def _return_path(start: Array, end: Array, bottom: float, lane: int) -> Array:
     """A path with rounded corners that passes below all neurons, one lane further out for each before it."""
     aside, below = 0.62 + 0.22 * lane, bottom - 1.1 - 0.22 * lane
     corners = np.array(
@@ -262,10 +242,10 @@ def return_path(start: Array, end: Array, bottom: float, lane: int) -> Array:
             (end[0] - RADIUS, end[1]),
         ]
     )
-    return _rounded(corners, 0.18)
+    return rounded(corners, 0.18)
 
 
-def _rounded(corners: Array, radius: float) -> Array:
+def rounded(corners: Array, radius: float) -> Array:
     """Replaces the corners of a path by parabolas that begin and end ``radius`` away from them."""
     share = np.linspace(0.0, 1.0, 9)[:, np.newaxis]
     pieces = [corners[:1]]
@@ -297,11 +277,11 @@ def points_at(path: Array, along: Array) -> Array:
     return np.column_stack([np.interp(along, distance, path[:, axis]) for axis in (0, 1)])
 
 
-def angle_of(vector: Array) -> float:
+def _angle_of(vector: Array) -> float:
     """Direction of a vector, rad."""
     return float(np.arctan2(vector[1], vector[0]))
 
 
-def angle_between(one: float, other: float) -> float:
+def _angle_between(one: float, other: float) -> float:
     """Angle from one direction to another the shorter way round, rad, 0 .. π."""
     return abs((one - other + np.pi) % (2.0 * np.pi) - np.pi)

@@ -17,11 +17,12 @@ import mujoco
 import numpy as np
 
 from annelid.arena.contact import contact_options, touching
-from annelid.arena.panels import add_panels
-from annelid.arena.shapes import shape_of
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe, add_pipe_panels
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
-from annelid.config import Arena, Floor, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.worm import Worm, WormPlant
@@ -43,7 +44,7 @@ HARD = {
 """The engine takes no contact to be faster than two steps."""
 WALL_M = 0.03
 SDF_STEPS = 10
-Ground = Callable[[mujoco.MjSpec, Arena, float], None]
+Ground = Callable[[mujoco.MjSpec, ArenaKind, float], None]
 
 
 class StillGround(WormPlant):
@@ -52,7 +53,7 @@ class StillGround(WormPlant):
     def __init__(self, config: RunConfig, add_ground: Ground) -> None:
         assert config.arena is not None
         assert isinstance(config.body, WormBody)
-        far = Floor(**config.arena.model_dump(include=set(Arena.model_fields)), floor_gap_m=50.0)
+        far = Floor(**config.arena.model_dump(include=set(ArenaKind.model_fields)), floor_gap_m=50.0)
         spec = build_spec(config.model_copy(update={"arena": far}))
         add_ground(spec, config.arena, spec.stat.extent)
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -80,12 +81,19 @@ def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
 
 def panels(around: int) -> Ground:
     """Returns what adds a pipe of so many panels round it, or a height field."""
-    return lambda spec, arena, length_m: add_panels(spec, arena, length_m, around)
+
+    def add(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
+        if isinstance(arena, Pipe):
+            add_pipe_panels(spec, arena, length_m, around)
+        else:
+            arena.add_panels(spec, length_m)
+
+    return add
 
 
-def mesh_field(spec: mujoco.MjSpec, arena: Arena, length_m: float) -> None:
+def mesh_field(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
     """Adds a pipe's wall, closed and 3 cm thick, as a mesh whose distance field the engine computes."""
-    inner = shape_of(arena, length_m)
+    inner = arena.shape(length_m)
     assert inner is not None
     surface = surface_of(arena)
     outer = inner.vertices_m - WALL_M * surface.normal(inner.vertices_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import os
 import subprocess
 import sys
@@ -13,9 +14,10 @@ from pathlib import Path
 import pytest
 
 import annelid
+from annelid.config.kinds import every_kind
 
 SOURCE = Path(annelid.__file__).parent
-BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles", "output"}
+BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
 MAY_IMPORT = {
     "errors": {"text"},
     "protocols": set(),
@@ -24,22 +26,23 @@ MAY_IMPORT = {
     "terminal": {"text"},
     "textfiles": {"errors", "text"},
     "output": {"errors", "text"},
+    "registry": {"errors"},
     "engine": {"errors"},
     "morphology": set(),
-    "plausibility": {"config", "morphology"} | BASE,
+    "plausibility": {"config", "morphology", "body"} | BASE,
     "nervous": {"errors", "text", "textfiles"},
-    "config": {"errors", "text", "textfiles"},
+    "config": {"errors", "text", "textfiles", "registry"},
     "references": {"config"},
     "arena": {"config"} | BASE,
     "body": {"config", "morphology", "arena", "engine"} | BASE,
     "control": {"config", "nervous"} | BASE,
     "planar": {"config", "morphology"} | BASE,
     "simulation": {"config", "morphology", "plausibility", "arena", "body", "control", "planar", "nervous"} | BASE,
-    "analysis": {"config", "morphology", "arena", "control", "simulation"} | BASE,
+    "analysis": {"config", "morphology", "arena", "body", "control", "simulation"} | BASE,
     "draw": {"config", "engine", "morphology", "nervous", "arena", "body", "simulation", "analysis"} | BASE,
     "live": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis", "draw"} | BASE,
     "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "draw"} | BASE,
-    "experiment": {"config", "morphology", "plausibility", "body", "simulation", "analysis", "draw"} | BASE,
+    "experiment": {"config", "morphology", "plausibility", "arena", "body", "simulation", "analysis", "draw"} | BASE,
     "export": {"config", "references", "body", "simulation", "analysis", "draw", "live", "experiment"} | BASE,
     "cli": {
         "config",
@@ -55,6 +58,7 @@ MAY_IMPORT = {
     }
     | BASE,
 }
+SECTIONS = ("body", "arena", "controller", "turning", "rings", "formulation")
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}
 
@@ -64,10 +68,19 @@ def room_of(module: Path) -> str:
     return relative.parts[0].removesuffix(".py")
 
 
+def executed(node: ast.AST) -> Iterator[ast.AST]:
+    """All parts of a module that run some time, so not what stands there for type checkers only."""
+    for part in ast.iter_child_nodes(node):
+        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id == "TYPE_CHECKING":
+            continue
+        yield part
+        yield from executed(part)
+
+
 def imported(module: Path) -> set[str]:
-    """Full names of all that a module imports, wherever the statement stands."""
+    """Full names of all that a module imports, wherever the statement stands; what only types need does not count."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+    for node in executed(ast.parse(module.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -108,15 +121,6 @@ def modules_of(package: Path) -> dict[str, Path]:
     return {".".join(parts[:-1] if parts[-1] == "__init__" else parts): path for path, parts in names.items()}
 
 
-def executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All parts of a module that run some time, so not what stands there for type checkers only."""
-    for part in ast.iter_child_nodes(node):
-        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id == "TYPE_CHECKING":
-            continue
-        yield part
-        yield from executed(part)
-
-
 def test_no_circle_of_imports() -> None:
     modules = modules_of(SOURCE) | modules_of(SOURCE.with_name("annelid_studies"))
     needed: dict[str, set[str]] = {name: set() for name in modules}
@@ -132,6 +136,26 @@ def test_no_circle_of_imports() -> None:
         order.prepare()
     except CycleError as error:
         pytest.fail(f"a circle of imports: {' <- '.join(error.args[1])}")
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: str(path.relative_to(SOURCE)))
+def test_no_kind_is_told_apart_outside_its_module(module: Path) -> None:
+    """Behaviour comes from the kind itself: nobody asks which one it is."""
+    home = {kind.__name__: Path(inspect.getfile(kind)).resolve() for kind in every_kind()}
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        if isinstance(node, ast.Call) and called in ("isinstance", "issubclass"):
+            asked = {part.id for part in ast.walk(node.args[1]) if isinstance(part, ast.Name)} & home.keys()
+        elif isinstance(node, ast.Compare):
+            kinds = [
+                part
+                for part in (node.left, *node.comparators)
+                if isinstance(part, ast.Attribute) and part.attr == "kind"
+            ]
+            asked = {text for part in kinds if (text := ast.unparse(part)).split(".")[-2].lstrip("_") in SECTIONS}
+        else:
+            continue
+        assert all(home.get(name) == module.resolve() for name in asked), f"line {node.lineno}: {asked}"
 
 
 def test_every_room_has_its_rule() -> None:

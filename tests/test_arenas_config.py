@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from annelid.config import Floor, Pipe, RunConfig, arena_names, arena_summary, arena_text, load_config
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe
+from annelid.config import RunConfig, arena_names, arena_summary, arena_text, load_config
 from annelid.config.arena import SHARED
 from annelid.config.checking import whole_path
 from annelid.errors import ConfigError
@@ -61,12 +63,12 @@ def test_a_unit_may_be_left_out_where_one_field_remains() -> None:
 
 def test_a_missing_unit_that_leaves_two_fields_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     class Twofold(Floor):
-        reach_m: float = 1.0
-        reach_deg: float = 1.0
+        span_m: float = 1.0
+        span_deg: float = 1.0
 
-    monkeypatch.setattr("annelid.config.checking._sections_of", lambda annotation: [Twofold])
-    with pytest.raises(ConfigError, match=r"arena\.reach is ambiguous: name one of arena\.reach_m, arena\.reach_deg"):
-        whole_path("arena.reach", {"arena": {"kind": "floor"}})
+    monkeypatch.setattr("annelid.config.checking.sections_in", lambda annotation: [Twofold])
+    with pytest.raises(ConfigError, match=r"arena\.span is ambiguous: name one of arena\.span_m, arena\.span_deg"):
+        whole_path("arena.span", {"arena": {"kind": "floor"}})
 
 
 def test_a_file_may_describe_an_arena(tmp_path: Path) -> None:

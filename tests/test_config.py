@@ -8,19 +8,11 @@ from typing import Any
 
 import pytest
 
-from annelid.config import (
-    PlanarWorm,
-    RunConfig,
-    WormBody,
-    field_paths,
-    fields_of,
-    load_config,
-    parse_assignments,
-    preset_names,
-    preset_text,
-)
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, field_paths, fields_of, load_config, parse_assignments, preset_names, preset_text
 from annelid.config.sections import Section
 from annelid.errors import ConfigError
+from annelid.planar.sections import PlanarWorm
 
 
 def leaves(tree: dict[str, Any], prefix: str = "") -> set[str]:
@@ -206,3 +198,20 @@ def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:
     broken.write_text("duration_s = = 3", encoding="utf-8")
     with pytest.raises(ConfigError, match="not valid TOML"):
         load_config(broken)
+
+
+@pytest.mark.parametrize(
+    "name", ["SnsController", "RobustSns", "Rods", "Floor", "PlanarWorm", "Mesh", "Contraction", "Arena"]
+)
+def test_names_of_the_first_edition_are_found_with_a_warning(name: str) -> None:
+    import annelid.config
+
+    with pytest.warns(DeprecationWarning, match=rf"annelid\.config\.{name} is now annelid\."):
+        assert issubclass(getattr(annelid.config, name), annelid.config.Section)
+
+
+def test_an_unknown_name_of_the_configuration_is_no_attribute() -> None:
+    import annelid.config
+
+    with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
+        _ = annelid.config.Nothing

@@ -14,17 +14,12 @@ from hypothesis import strategies as st
 
 import annelid as package
 from annelid.analysis import rhythm_score
-from annelid.config import LEVELS, RunConfig, WormBody, arena_names, load_config, preset_names
+from annelid.body.estimates import bearable_force_N, rhombus_of, touching_ring_m
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, RunConfig, arena_names, load_config, preset_names
 from annelid.errors import ConfigError
 from annelid.morphology import helical_mesh, rhombus
-from annelid.plausibility import (
-    bearable_force_N,
-    check,
-    refuse_nonsense,
-    rhombus_of,
-    tolerance_window_m,
-    touching_ring_m,
-)
+from annelid.plausibility import check, refuse_nonsense, tolerance_window_m
 
 WORMS = [name for name in preset_names() if isinstance(load_config(name).body, WormBody)]
 Changes = dict[str, Any]

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from annelid.body import mesh_of
-from annelid.config import Rods, WormBody, fields_of, load_config
+from annelid.body.formulations.rods import Rods
+from annelid.body.worm import WormBody
+from annelid.config import fields_of, load_config
 from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examinations.pins import DAMPING_TIME_S, tie_stiffness_N_per_m
 

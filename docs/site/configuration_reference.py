@@ -13,6 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from annelid.config import LEVELS, RunConfig, Section, toml_value, unit_of
+from annelid.config.checking import sections_in
 
 INTRODUCTION = """# Configuration
 
@@ -55,13 +56,6 @@ def sections_of(model: type[Section], path: str) -> Iterator[tuple[str, type[Sec
         below = f"{path}.{name}" if path else name
         for section in sections_in(field.annotation):
             yield from sections_of(section, below)
-
-
-def sections_in(annotation: Any) -> list[type[Section]]:
-    """Returns the sections that an annotation admits, those of a list of sections too."""
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return [annotation]
-    return [section for argument in get_args(annotation) for section in sections_in(argument)]
 
 
 def _is_field(annotation: Any) -> bool:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from annelid.config import load_config
-from annelid.config.controllers import ControllerSection
+from annelid.config import ControllerKind, kinds_of, load_config
 from annelid.protocols import Records, Signal
 from annelid.simulation import build_controller, build_plant
 from annelid.simulation.recorder import loop_signals
-from configuration_reference import sections_in
 
 BODIES = {
     "riddle2023-rods": "rods",
@@ -77,8 +75,7 @@ def _of_controllers() -> Iterator[tuple[str, Signal]]:
     """Controllers of every kind on one body each, then what turning adds."""
     base = load_config("riddle2023-rods")
     plant = build_plant(base)
-    for section in sections_in(ControllerSection):
-        kind = section.model_fields["kind"].default
+    for kind in kinds_of(ControllerKind):
         controller = {"kind": kind, **WITH_ALL_SIGNALS.get(kind, {})}
         config = load_config("riddle2023-rods", {"controller": controller})
         yield from ((kind, signal) for signal in _signals(build_controller(config, plant)))

@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from typing import Any
 
     from annelid.analysis import gait, summary
+    from annelid.body.estimates import Finding
     from annelid.config import RunConfig, load_config, preset_names
     from annelid.experiment.sweep import sweep
     from annelid.nervous import Network
-    from annelid.plausibility import Finding, check
+    from annelid.plausibility import check
     from annelid.protocols import Controller, Plant, Sensation
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
     from annelid.simulation.batch import BatchResult, simulate_batch

@@ -307,3 +307,10 @@ def _rhombi(n_planes: int, half: int) -> Indices:
         (front_plane + 1) * half + (strand - 1) % half,
     )
     return np.stack(corners, axis=-1).reshape(-1, 4)
+
+
+def norm(vectors: Array) -> Array:
+    """Returns the lengths of vectors, ``(.., 3)``, along the last axis."""
+    squares = vectors * vectors
+    # In this order the last bit is that of numpy's einsum and of a dot product.
+    return np.sqrt((squares[..., 0] + squares[..., 2]) + squares[..., 1])

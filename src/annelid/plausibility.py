@@ -1,86 +1,25 @@
 """What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances held against one another.
 
 Everything here follows from the configuration alone, in closed form, in under a millisecond and without the engine.
-
-How much the mesh resists: where a ring of the length L = m c is drawn in (m crossings, c apart), the rhombi round it
-close. With h, the hypotenuse of a rhombus' two diagonals at rest, they keep ``c = h sin(a)`` and springs of the length
-``x = h cos(a)``, a being half the angle at which strands meet. Each strand of bending stiffness EI is bent by the
-change of a over about one side s of the rhombus, and the springs of rate k and rest length x0 are drawn out. With the
-virtual work of the ring's tension T, ``T dL = d(energy)``, this is
-
-    T(a) = 1.3 EI (a0 - a) / (s^2 cos(a)) + k (x - x0) tan(a)
-
-The number of strands drops out. The factor 1.3 is fitted to the one ring that the authors simulated in a load frame
-(E 2 GPa, radius 2.99 mm), whose curve the estimate then follows within 15 % from 10 to 100 mm of its diameter. The end
-rings bear about a fifth less, and with the paper's soft strands the estimate is low by up to a half. So it is good to a
-factor of two, and nothing is refused on its account unless it is exceeded by more. Measured, rings of that mesh
-collapse at 14 to 16 N; the estimate at a third of a0 is 16.8 N.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from math import cos, hypot, inf, log, pi, radians, sin, sqrt, tan
-from typing import Literal
+from math import cos, degrees, hypot, log, pi, radians, sqrt, tan
+from typing import TYPE_CHECKING
 
-from annelid.config import (
-    AdaptiveSns,
-    Chain,
-    Floor,
-    PressureSns,
-    Rings,
-    Rods,
-    RunConfig,
-    ServoRings,
-    SnsController,
-    WormBody,
-)
+from annelid.body.estimates import Finding, rhombus_of, softened
+from annelid.body.worm import WormBody
 from annelid.errors import ConfigError
-from annelid.morphology import Rhombus, rhombus
 
-HARDLY = 0.02
-"""Share of its length at rest below which a ring has hardly been shortened."""
-COLLAPSED = 0.2
-"""Ring length over that at rest below which a ring counts as collapsed; in all presets it stays above 0.3."""
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+
 NUMERICAL_SHARE = 1 / 3
 """Share of the muscles' work lost to the integrator above which a run is doubtful."""
 IDLE_SHARE = 1e-3
 """Share of its greatest force that an actuator must reach in a contraction."""
-
-_BENDING = 1.3
-_UNSURE = 2.0
-_SHRUNK = 2 / 3
-"""Length over that at rest to which actuators may draw a ring before anything is activated."""
-_MOST_OVER = 200.0
-"""Largest force of a muscle at rest length over what the mesh bears; the paper's is 100 times that."""
-_LOWEST_MUSCLE, _SPAN_OF_MUSCLE = 0.75, 0.3
-"""The engine lays a muscle's length range from 0.75 to 1.05 of its optimal length."""
-_RK4_DAMPED, _RK4_SWUNG = 2.78, 2.83
-"""Largest products of step and rate, or frequency, at which the explicit Runge-Kutta method is stable."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something wrong with a configuration.
-
-    Attributes:
-        field: Dotted path of the field to change.
-        value: Its value.
-        problem: What is wrong, in a sentence without a full stop.
-        instead: What to set instead, with a number.
-        severity: "error" where the run can mean nothing and is refused, "warning" where it is doubtful.
-    """
-
-    field: str
-    value: object
-    problem: str
-    instead: str
-    severity: Literal["error", "warning"]
-
-    def __str__(self) -> str:
-        """Returns one sentence."""
-        return f"{self.field} = {_text(self.value)}: {self.problem}; {self.instead}"
 
 
 def check(config: RunConfig) -> list[Finding]:
@@ -94,7 +33,8 @@ def check(config: RunConfig) -> list[Finding]:
     """
     if not isinstance(config.body, WormBody):
         return []
-    found = [*_mesh(config.body), *_rings(config.body), *_materials(config.body), *_steps(config), *_senses(config)]
+    body = config.body
+    found = [*_mesh(body), *body.rings.findings(body), *_materials(body), *_steps(config), *_senses(config)]
     first: dict[tuple[str, str], Finding] = {}
     for finding in found:
         # Rings with ranges of their own may share a fault.
@@ -116,35 +56,6 @@ def refuse_nonsense(config: RunConfig) -> tuple[str, ...]:
     if errors:
         raise ConfigError(". ".join(errors))
     return tuple(str(finding) for finding in found)
-
-
-def rhombus_of(body: WormBody) -> Rhombus:
-    """Returns the rhombus of a body at rest."""
-    mesh = body.mesh
-    return rhombus(mesh.n_helices, mesh.radius_m, mesh.angular_rate_rad_per_m, mesh.elements_per_side)
-
-
-def touching_ring_m(body: WormBody) -> float:
-    """Returns the length of a ring at which the strands of neighbouring crossings touch, m."""
-    return body.mesh.n_helices // 2 * 2.0 * body.strands.radius_m
-
-
-def bearable_force_N(body: WormBody, share: float = 1 / 3) -> float:
-    """Estimates the tension under which a ring closes, N: see the page's head.
-
-    Args:
-        body: The worm's body.
-        share: Opening of the rhombi up to which it is drawn in, over that at rest.
-    """
-    shape, strands, springs = rhombus_of(body), body.strands, body.springs
-    stiffness = strands.bending_rigidity_Nm2
-    rest, opening = shape.opening_rad, share * shape.opening_rad
-    bending = _BENDING * stiffness * (rest - opening) / (shape.side_m**2 * cos(opening))
-    length = hypot(shape.across_m, shape.along_m) * cos(opening)
-    stretch = length - (springs.rest_length_m or shape.along_m)
-    if springs.tension_only:
-        stretch = max(0.0, stretch)
-    return bending + springs.stiffness_N_per_m * stretch * tan(opening)
 
 
 def _mesh(body: WormBody) -> Iterator[Finding]:
@@ -197,147 +108,6 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
         )
 
 
-def _rings(body: WormBody) -> Iterator[Finding]:
-    rings, n = body.rings, body.mesh.n_segments
-    ranges = dict.fromkeys(rings.length_ranges(n))
-    if isinstance(rings, ServoRings):
-        forces = rings.force_limits(n)
-        for low, high in ranges:
-            strongest = _strongest((low, high), rings.length_ranges(n), forces)
-            yield from _servo(body, rings, low, high, strongest)
-    elif rings.minimum_length < 1.0 < rings.maximum_length:
-        forces = rings.peak_forces(n)
-        for low, high in ranges:
-            strongest = _strongest((low, high), rings.length_ranges(n), forces)
-            yield from _muscle(body, rings, low, high, strongest)
-
-
-def _strongest(span: tuple[float, float], spans: list[tuple[float, float]], forces: list[float]) -> float:
-    return max(force for own, force in zip(spans, forces, strict=True) if own == span)
-
-
-def _servo(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:
-    """The cables' range against the ring at rest, and their force against the mesh."""
-    rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
-    paths = 1 if rings.layout == "whole" else 2
-    field, fitting = "body.rings.length_range_m", f"set [{0.65 * rest:.3g}, {rest:.3g}]"
-    if low >= rest:
-        problem = f"a ring is {rest:.3g} m long at rest, so that even the shortest cable of {low:.3g} m pulls 0 N"
-        yield Finding(field, [low, high], problem, fitting, "error")
-        return
-    idle = min(force_N, rings.stiffness_N_per_m * max(0.0, rest - high) / paths)
-    if idle > 0.1 * bearable:
-        severity = "error" if idle > _UNSURE * bearable and high < _SHRUNK * rest else "warning"
-        problem = (
-            f"a ring is {rest:.3g} m long at rest, so that the longest cable of {high:.3g} m pulls {idle:.3g} N before "
-            f"anything is activated, where the mesh bears about {bearable:.2g} N"
-        )
-        yield Finding(field, [low, high], problem, fitting, severity)
-    elif low > 0.98 * rest:
-        problem = f"a ring is {rest:.3g} m long at rest, so that a cable of {low:.3g} m hardly pulls"
-        yield Finding(field, [low, high], problem, fitting, "warning")
-    elif high > 1.5 * rest:
-        problem = f"a ring is {rest:.3g} m long at rest, so that most of the winding from {high:.3g} m is slack"
-        yield Finding(field, [low, high], problem, fitting, "warning")
-    pull = rings.stiffness_N_per_m * max(0.0, rest - low) / paths
-    yield from _weak(body, "stiffness_N_per_m", rings.stiffness_N_per_m, pull)
-    yield from _weak(body, _FORCE_FIELDS[rings.kind], force_N, force_N)
-    if low < COLLAPSED * rest and force_N > _UNSURE * bearable:
-        yield _crushes(f"body.rings.{_FORCE_FIELDS[rings.kind]}", force_N, bearable, low / rest)
-
-
-def _muscle(body: WormBody, rings: Rings, low: float, high: float, force_N: float) -> Iterator[Finding]:
-    """The muscle's lengths without force against the ring at rest, and its force against the mesh."""
-    rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
-    optimal = (high - low) / _SPAN_OF_MUSCLE
-    none = low + (rings.minimum_length - _LOWEST_MUSCLE) * optimal
-    at_rest = _LOWEST_MUSCLE + (rest - low) / optimal
-    active, passive = active_share(at_rest, rings), passive_share(at_rest, rings)
-    field, fitting = "body.rings.length_range_m", f"set [{0.59 * rest:.3g}, {1.11 * rest:.3g}]"
-    if force_N * passive > 0.1 * bearable:
-        # Its passive force ends at the optimal length.
-        shrunk = low + (1.0 - _LOWEST_MUSCLE) * optimal < _SHRUNK * rest
-        severity = "error" if force_N * passive > _UNSURE * bearable and shrunk else "warning"
-        problem = (
-            f"a ring is {rest:.3g} m long at rest, so that its muscle pulls {force_N * passive:.3g} N before anything "
-            f"is activated, where the mesh bears about {bearable:.2g} N"
-        )
-        yield Finding(field, [low, high], problem, fitting, severity)
-    elif active < 0.02:
-        where = f"at any length below {none:.3g} m" if at_rest < 1.0 else "beyond its longest length"
-        pull = f"its muscle pulls {force_N * active:.2g} N, and 0 N {where}"
-        problem = f"a ring is {rest:.3g} m long at rest, where {pull}"
-        yield Finding(field, [low, high], problem, fitting, "error" if at_rest < 1.0 else "warning")
-    elif force_N * active > _MOST_OVER * bearable:
-        yield Finding(
-            f"body.rings.{_FORCE_FIELDS[rings.kind]}",
-            force_N,
-            f"at rest length a muscle begins to pull with {force_N * active:.3g} N, {force_N * active / bearable:.0f} "
-            "times what the mesh bears: its ring may shoot beyond the length at which the force ends",
-            f"set at most {_MOST_OVER * bearable / active:.2g}",
-            "warning",
-        )
-    else:
-        yield from _weak(body, _FORCE_FIELDS[rings.kind], force_N, force_N * active)
-    shortest = _settled_m(body, rings, none, optimal, force_N)
-    if shortest < COLLAPSED * rest and force_N > _UNSURE * bearable:
-        yield _crushes(f"body.rings.{_FORCE_FIELDS[rings.kind]}", force_N, bearable, shortest / rest)
-
-
-def _weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
-    """The greatest force of an actuator against what hardly closes a ring."""
-    needed = bearable_force_N(body, 1.0 - HARDLY)
-    if force_N < needed / _UNSURE:
-        yield Finding(
-            f"body.rings.{field}",
-            value,
-            f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {100 * HARDLY:g} %",
-            f"set at least {_UNSURE * value * needed / force_N:.2g}" if force_N else "set more",
-            "warning",
-        )
-
-
-_FORCE_FIELDS = {"muscle": "peak_force_N", "servo": "force_limit_N"}
-
-
-def _crushes(field: str, force_N: float, bearable_N: float, share: float) -> Finding:
-    return Finding(
-        field,
-        force_N,
-        f"rings close under about {bearable_N:.2g} N, and nothing stops them above {100 * max(0.0, share):.0f} % of "
-        "their length at rest",
-        f"set at most {bearable_N:.2g}, or limit the length with body.rings.length_range_m",
-        "warning",
-    )
-
-
-def _settled_m(body: WormBody, rings: Rings, none_m: float, optimal_m: float, force_N: float) -> float:
-    """Length at which the muscle, fully activated, pulls no more than the mesh resists, m."""
-    shape = rhombus_of(body)
-    hypotenuse = hypot(shape.across_m, shape.along_m)
-    closed, open_ = 0.0, 1.0
-    for _ in range(30):
-        share = (closed + open_) / 2
-        ring = shape.n_per_plane * hypotenuse * sin(share * shape.opening_rad)
-        length = rings.minimum_length + (ring - none_m) / optimal_m
-        pull = force_N * active_share(length, rings)
-        closed, open_ = (closed, share) if pull > bearable_force_N(body, share) else (share, open_)
-    return shape.n_per_plane * hypotenuse * sin(closed * shape.opening_rad)
-
-
-def active_share(length: float, rings: Rings) -> float:
-    """Active force of a muscle over its peak, at a length in optimal lengths: the engine's two parabolas."""
-    reach = 1.0 - rings.minimum_length if length < 1.0 else rings.maximum_length - 1.0
-    away = min(1.0, abs(length - 1.0) / reach)
-    return 1.0 - 2.0 * away**2 if away < 0.5 else 2.0 * (1.0 - away) ** 2
-
-
-def passive_share(length: float, rings: Rings) -> float:
-    """Passive force of a muscle over its peak, at a length in optimal lengths."""
-    beyond = max(0.0, length - 1.0) / (0.5 * (rings.maximum_length - 1.0))
-    return rings.passive_peak * (0.5 * beyond**2 if beyond < 1.0 else beyond - 0.5)
-
-
 def _materials(body: WormBody) -> Iterator[Finding]:
     strands = body.strands
     density = strands.linear_density_kg_per_m / (pi * strands.radius_m**2)
@@ -374,81 +144,24 @@ def _steps(config: RunConfig) -> Iterator[Finding]:
     body, arena, step = config.body, config.arena, config.clock.physics_timestep_s
     assert isinstance(body, WormBody)
     assert arena is not None
-    if isinstance(body.formulation, Chain):
-        most = _chain_step(body, body.formulation)
-        if step > most:
-            yield Finding(
-                "clock.physics_timestep_s",
-                step,
-                f"the chain is integrated explicitly, which its joints and springs bear up to about {most:.2g} s",
-                f"set at most {most / 2:.1g}, or a larger body.formulation.armature_kg_m2",
-                "warning",
-            )
-        softest = body.formulation.pin_time_constant_s
-        if softest < 2.0 * step:
-            yield _softened("body.formulation.pin_time_constant_s", softest, "pins", step)
-    elif step > 0.04:
-        yield Finding(
-            "clock.physics_timestep_s",
-            step,
-            "rods are measured up to 0.04 s, where their edges stretch by 3 %",
-            "set at most 0.04",
-            "warning",
-        )
-    time_s = body.strands.material_damping_s or 0.0
-    if not isinstance(body.formulation, Chain) and 0.0 < time_s < 2.0 * step:
-        yield Finding(
-            "clock.physics_timestep_s",
-            step,
-            f"the step damps rods as one to two steps more of damping time do, and the material has {time_s:g} s",
-            f"set at most {time_s / 5:.1g}",
-            "warning",
-        )
+    yield from body.formulation.findings(config)
     # At one step the engine's floor is twice as soft as asked, which has been measured; at less nothing has.
     if arena.contact_time_constant_s < 0.5 * step:
-        yield _softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step)
-    if isinstance(arena, Floor):
+        yield softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step)
+    if arena.slope_rad:
         # On ground that rises ahead the skin slides towards the rear.
-        rise = arena.slope_deg * cos(radians(body.heading_deg))
+        rise = arena.slope_rad * cos(radians(body.heading_deg))
         backward = rise > 1e-9 and arena.backward_friction is not None
         field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-        steepness = tan(radians(abs(arena.slope_deg)))
+        steepness = tan(abs(arena.slope_rad))
         if steepness >= (friction or 0.0):
             yield Finding(
                 "arena.slope_deg",
-                arena.slope_deg,
+                round(degrees(arena.slope_rad), 9),
                 f"with arena.{field} = {friction:g} the worm slides down",
                 f"set arena.{field} above {steepness:.2g}",
                 "warning",
             )
-
-
-def _softened(field: str, value: float, what: str, step: float) -> Finding:
-    return Finding(
-        field,
-        value,
-        f"the engine cannot resolve this in steps of {step:g} s and makes the {what} as soft as with {2 * step:g} s",
-        f"set {2 * step:g}, or clock.physics_timestep_s = {value / 2:.1g}",
-        "warning",
-    )
-
-
-def _chain_step(body: WormBody, formulation: Chain) -> float:
-    """Largest stable step of the explicit integrator, s, from the joints' and the springs' own rates."""
-    strands, shape = body.strands, rhombus_of(body)
-    element = shape.side_m / body.mesh.elements_per_side
-    inertia = formulation.armature_kg_m2 + strands.linear_density_kg_per_m * element**3 / 12.0
-    stiffness = strands.bending_rigidity_Nm2 / element
-    # Neighbouring joints act on one element: four times the rate of one at the shortest wave.
-    swung = [(4.0 * stiffness / inertia) ** 0.5]
-    mass = strands.linear_density_kg_per_m * element * 2.0
-    if formulation.pins == "separate":
-        mass = body.pins.mass_kg
-    swung.append((4.0 * body.springs.stiffness_N_per_m / mass) ** 0.5)
-    explicit = formulation.integrator == "RK4"
-    damped = 4.0 * strands.joint_damping(stiffness) / inertia if explicit else 0.0
-    limit = _RK4_SWUNG if explicit else 2.0
-    return min(limit / max(swung), _RK4_DAMPED / damped if damped else inf)
 
 
 def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
@@ -471,10 +184,10 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
         by muscles all round.
     """
     body, arena = config.body, config.arena
-    if not isinstance(body, WormBody) or not isinstance(body.formulation, Rods) or not isinstance(body.rings, Rings):
+    if not isinstance(body, WormBody) or arena is None:
         return None
-    damping_s, tight = body.strands.material_damping_s, body.formulation.pins == "shared"
-    if arena is None or not damping_s or not tight or body.rings.layout != "whole":
+    damping_s, rings = body.strands.material_damping_s, body.rings
+    if not damping_s or not body.formulation.has_rigid_crossings or rings.muscle is None or rings.layout != "whole":
         return None
     # Beyond what was measured the lines that were fitted say nothing.
     if not body.springs.stiffness_N_per_m or not 0.05 <= damping_s <= 0.4:
@@ -490,7 +203,7 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
 
 def _senses(config: RunConfig) -> Iterator[Finding]:
     """The sensors' tolerance against what a segment can lengthen by, and its neighbours lift it by."""
-    if not isinstance(config.controller, SnsController | PressureSns | AdaptiveSns):
+    if "tolerance_m" not in config.controller.sensor_fields:
         return
     assert isinstance(config.body, WormBody)
     shape, tolerance = rhombus_of(config.body), config.sensor.tolerance_m
@@ -521,9 +234,3 @@ def _senses(config: RunConfig) -> Iterator[Finding]:
         problem = f"a contracting neighbour lifts a segment by up to {lift:.2g} m: sensors may never go on"
     if problem:
         yield Finding("sensor.tolerance_m", tolerance, problem, instead, "warning")
-
-
-def _text(value: object) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_text, value))}]"
-    return f"{value:g}" if isinstance(value, int | float) else str(value)

@@ -1,8 +1,11 @@
-"""Rich's console for text that may contain anything. Importing it loads rich."""
+"""Rich's console for text that may contain anything, and its progress bar. Importing it loads rich."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import rich.console
@@ -10,6 +13,9 @@ from rich.segment import Segment
 from rich.text import Text
 
 from annelid.text import printable
+
+REFRESH_S = 0.1
+"""How long a progress bar stays as it is, at least, s."""
 
 
 class Console(rich.console.Console):
@@ -27,3 +33,37 @@ class Console(rich.console.Console):
         """Yields what is written, in pieces."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=printable(segment.text))
+
+
+@contextmanager
+def progress_bar(*, forced: bool = False, transient: bool = False) -> Iterator[Callable[[str, float, str], None]]:
+    """Shows a progress bar on stderr as long as the block runs.
+
+    Args:
+        forced: Show it also where stderr is no terminal.
+        transient: Take it away at the end.
+
+    Yields:
+        What draws it: called with the text before the bar, the share that is done, and the text behind it.
+    """
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    bar = Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TextColumn("{task.fields[behind]}", markup=False),
+        console=Console(stderr=True, force_terminal=True if forced else None),
+        transient=transient,
+        # The caller refreshes it; a thread of its own would compete with the physics for the core.
+        auto_refresh=False,
+    )
+    with bar:
+        task, drawn = bar.add_task("", total=1.0, behind=""), -math.inf
+
+        def draw(before: str, share: float, behind: str) -> None:
+            nonlocal drawn
+            late = time.monotonic() - drawn > REFRESH_S
+            bar.update(task, description=before, completed=share, behind=behind, refresh=late)
+            drawn = time.monotonic() if late else drawn
+
+        yield draw

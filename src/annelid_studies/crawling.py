@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from annelid.config import ServoRings, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
@@ -109,11 +110,7 @@ def changes_for(gait: str, quantity: Quantity, value: float) -> dict[str, Any]:
         return {"arena.friction": value}
     n, before = int(value), body.mesh.n_segments
     rings = body.rings
-    field, forces = (
-        ("force_limit_N", rings.force_limits(before))
-        if isinstance(rings, ServoRings)
-        else ("peak_force_N", rings.peak_forces(before))
-    )
+    field, forces = rings.force_field, rings.forces(before)
     return {
         "body.mesh.n_segments": n,
         f"body.rings.{field}": [forces[0], *[forces[1]] * (n - 2), forces[-1]],

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.analysis.passage import Passage, passage_through, reach_of
+from annelid.analysis.passage import Passage, passage_through
 from annelid.analysis.track import Track
-from annelid.arena.course import course_of
+from annelid.arena.kinds.pipe import Pipe, course_of
 from annelid.body import mesh_of
-from annelid.config import Mesh, Pipe
+from annelid.body.worm import Mesh
 
 GEOMETRY = mesh_of(Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2))
 SPACING_M, RADIUS_M = 0.11, 0.12
@@ -72,7 +72,7 @@ def test_the_bore_is_that_at_the_ring() -> None:
     ],
 )
 def test_what_bends_or_narrows_lies_between_its_ends(pipe: Pipe, reach: tuple[float, float]) -> None:
-    assert reach_of(pipe) == pytest.approx(reach)
+    assert pipe.reach_m() == pytest.approx(reach)
 
 
 def passage_with(middle_m: list[float]) -> Passage:

@@ -9,16 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.arena.course import bore_of, course_of
-from annelid.arena.surface import PipeWall, surface_of
-from annelid.config import ArenaSection, Floor, Pipe, Rough, Steps
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe, PipeWall, bore_of, course_of
+from annelid.arena.kinds.relief import Rough, Steps
+from annelid.arena.surface import surface_of
+from annelid.config import ArenaKind
 from annelid.protocols import Array
 
 CREASED = {"rails", "steps", "tapering bend"}
 """Some points are as near to the floor as to a rail, or to two steps; a taper has a crease where it begins to curve."""
 REACH_M = 0.02
 """How near to the ground the skin is where it matters."""
-ARENAS: dict[str, ArenaSection] = {
+ARENAS: dict[str, ArenaKind] = {
     "floor": Floor(),
     "slope": Floor(slope_deg=12.0),
     "rails": Floor(rail_gap_m=0.5),
@@ -35,12 +37,12 @@ ARENAS: dict[str, ArenaSection] = {
 }
 
 
-def most_kinked(arena: ArenaSection) -> float:
+def most_kinked(arena: ArenaKind) -> float:
     """Share of points that may lie on a crease: none but for arenas that have one."""
     return 0.01 if arena in [ARENAS[name] for name in CREASED] else 0.0
 
 
-def places(arena: ArenaSection, seed: int = 0, n: int = 400) -> Array:
+def places(arena: ArenaKind, seed: int = 0, n: int = 400) -> Array:
     """Points within reach of the ground, on both sides of it."""
     rng = np.random.default_rng(seed)
     off = rng.uniform(-REACH_M, REACH_M, n)
@@ -56,14 +58,14 @@ def places(arena: ArenaSection, seed: int = 0, n: int = 400) -> Array:
     return on_ground + off[:, None] * surface.normal(on_ground)
 
 
-def gradient(arena: ArenaSection, points: Array, step: float = 1e-6) -> Array:
+def gradient(arena: ArenaKind, points: Array, step: float = 1e-6) -> Array:
     surface = surface_of(arena)
     ends = [surface.distance_m(points + step * e) - surface.distance_m(points - step * e) for e in np.eye(3)]
     return np.stack(ends, axis=-1) / (2 * step)
 
 
 @pytest.mark.parametrize("arena", ARENAS.values(), ids=ARENAS)
-def test_the_normal_is_the_gradient_of_the_distance_and_has_unit_length(arena: ArenaSection) -> None:
+def test_the_normal_is_the_gradient_of_the_distance_and_has_unit_length(arena: ArenaKind) -> None:
     points = places(arena)
     normal, numerical = surface_of(arena).normal(points), gradient(arena, points)
     assert np.linalg.norm(normal, axis=-1) == pytest.approx(1.0, abs=1e-12)
@@ -73,7 +75,7 @@ def test_the_normal_is_the_gradient_of_the_distance_and_has_unit_length(arena: A
 
 
 @pytest.mark.parametrize("arena", ARENAS.values(), ids=ARENAS)
-def test_a_point_of_the_surface_has_no_distance_and_its_normal_leads_away(arena: ArenaSection) -> None:
+def test_a_point_of_the_surface_has_no_distance_and_its_normal_leads_away(arena: ArenaKind) -> None:
     surface, points = surface_of(arena), places(arena, seed=1)
     feet = points - surface.distance_m(points)[:, None] * surface.normal(points)
     on_it = np.abs(surface.distance_m(feet)) < 1e-9
@@ -83,7 +85,7 @@ def test_a_point_of_the_surface_has_no_distance_and_its_normal_leads_away(arena:
 
 
 @pytest.mark.parametrize("arena", ARENAS.values(), ids=ARENAS)
-def test_no_point_of_the_surface_is_nearer_than_the_distance(arena: ArenaSection) -> None:
+def test_no_point_of_the_surface_is_nearer_than_the_distance(arena: ArenaKind) -> None:
     """Against the definition: the least distance to a dense sample of the surface itself."""
     surface, points = surface_of(arena), places(arena, seed=2, n=30)
     distance = surface.distance_m(points)

@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.body import mesh_of
-from annelid.body.actuation import stretch_sensors, winding_speed
-from annelid.config import Mesh, ServoRings, Springs, load_config
+from annelid.body.actuation import stretch_sensors
+from annelid.body.actuators.servo import ServoRings, winding_speed
+from annelid.body.worm import Mesh, Springs
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.simulation.worm import WormPlant
 

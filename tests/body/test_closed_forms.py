@@ -8,9 +8,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body.chain import add_chain
-from annelid.body.rods import add_rod, add_vertex, lumped_masses
-from annelid.config import Chain, Rods, Strands
+from annelid.body.formulations.chain import Chain
+from annelid.body.formulations.chain.capsules import add_chain
+from annelid.body.formulations.rods import Rods
+from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
+from annelid.body.worm import Strands
 
 LENGTH_M = 0.6
 ELEMENTS = 24

@@ -8,7 +8,8 @@ import pytest
 
 from annelid.body import build_spec, mesh_of
 from annelid.body.friction import add_diagonal_friction
-from annelid.config import WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 
 SIDE_M = 0.09
 FRICTION_N = 0.5

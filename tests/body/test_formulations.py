@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, mesh_of
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 
 RODS = {"kind": "rods"}

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, mesh_of
-from annelid.config import Mesh, load_config
+from annelid.body.worm import Mesh
+from annelid.config import load_config
 from annelid.morphology import helical_mesh
 
 Read = Callable[[mujoco.MjModel], Any]

@@ -11,9 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.body import mesh_of
-from annelid.body.chain import add_chain
-from annelid.body.rods import add_rod, add_vertex, lumped_masses, spring_row
-from annelid.config import Chain, Mesh, Rods, Strands, load_config
+from annelid.body.formulations.chain import Chain
+from annelid.body.formulations.chain.capsules import add_chain
+from annelid.body.formulations.rods import Rods
+from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses, spring_row
+from annelid.body.worm import Mesh, Strands
+from annelid.config import load_config
 from annelid.morphology import Array
 from annelid.simulation.worm import WormPlant
 

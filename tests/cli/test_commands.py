@@ -9,7 +9,8 @@ import mujoco
 import pytest
 from outcome import Command
 
-from annelid.config import Pipe, field_paths, load_config, preset_names
+from annelid.arena.kinds.pipe import Pipe
+from annelid.config import field_paths, load_config, preset_names
 from annelid.simulation.runfile import open_run
 
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from outcome import Command
 
 from annelid.cli import entry
 from annelid.errors import ConfigError, RunKilled
-from annelid.experiment.attempt import Files, Task, attempt
+from annelid.experiment.attempt import Task, attempt
 from annelid.experiment.sweep import Sweep
 from annelid.experiment.workers import Result, Workers
 
@@ -36,7 +37,7 @@ def _computed_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs are computed in this process, and results get no figure."""
 
     def submit(_: Workers, task: Task) -> Result:
-        future = Future[Files | None]()
+        future = Future[bytes | None]()
         try:
             future.set_result(attempt(task))
         except ConfigError as error:
@@ -73,11 +74,13 @@ def test_a_sweep_that_says_nothing_else_says_what_happened_to_its_runs(
 
 
 def test_a_sweep_tells_of_runs_that_a_guard_stopped(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    from annelid.experiment.sweep import SweepRun, swept
+    from annelid.experiment.store import Done
+    from annelid.experiment.sweep import swept
 
     def stopped(*words: object, **options: object) -> Sweep:
         done = swept(*words, **options)  # type: ignore[arg-type]
-        runs = tuple(SweepRun(run.point, "stopped", "too fast", run.outcome) for run in done.runs)
+        outcomes = [run.outcome for run in done.runs if run.outcome is not None]
+        runs = tuple(Done(replace(outcome, message="too fast")) for outcome in outcomes)
         return Sweep(done.plan, done.numbers, runs, done.folder)
 
     monkeypatch.setattr("annelid.experiment.sweep.swept", stopped)

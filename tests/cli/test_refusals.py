@@ -212,7 +212,7 @@ def test_a_full_disk_is_a_sentence(annelid: Command, finished: Path, monkeypatch
     def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "figure.png")
 
-    monkeypatch.setattr("annelid.draw.plots.figure7", full)
+    monkeypatch.setattr("annelid.draw.plots.save", full)
     done = annelid("plot", finished, "-o", "figure.png")
     assert done.exit_code == 2
     assert done.sentence() == f"figure.png: {os.strerror(errno.ENOSPC)}"

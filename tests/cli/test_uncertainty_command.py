@@ -58,6 +58,10 @@ def test_an_interrupted_study_names_the_command_that_goes_on(annelid: Command, m
     assert program == "annelid"
     annelid(*again)
     assert seen[0] == seen[1]
+    # A folder that was found for it is named, so that the command goes on there.
+    sentence = annelid("run", "riddle2023-rods", "--uncertainty", "3").sentence()
+    again = shlex.split(sentence.partition("go on with: ")[2])
+    assert again[-2:] == ["--out", str(seen[-1]["folder"])]
 
 
 @pytest.mark.parametrize(

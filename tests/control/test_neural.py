@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid import config as settings
+from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import AdaptiveController, SnsController
+from annelid.control.adaptive import AdaptiveSns
 from annelid.control.neural import design_of
-from annelid.control.robust import RobustController
+from annelid.control.robust import RobustController, RobustSns
+from annelid.control.sns import Sns
 from annelid.nervous import PeristalsisParameters
 from annelid.nervous.robust import RobustParameters
 from annelid.protocols import Sensation
@@ -23,16 +25,16 @@ SLOPE_PER_MV, RANGE_MV = 0.1, 15.0
 
 
 def built(kind: str, n_muscles: int = N, **changes: Any) -> Neural:
-    size, sensor = (N, n_muscles, 0.001), settings.StretchSensor()
+    size, sensor = (N, n_muscles, 0.001), SensorSection()
     changes |= {"activation_slope_per_mV": SLOPE_PER_MV, "range_mV": RANGE_MV}
     match kind:
         case "sns":
-            return SnsController(settings.SnsController(**changes), sensor, *size)
+            return SnsController(Sns(**changes), sensor, *size)
         case "adaptive":
-            section = settings.AdaptiveSns(network=settings.SnsController(**changes))
+            section = AdaptiveSns(network=Sns(**changes))
             return AdaptiveController(section, sensor, *size)
         case _:
-            return RobustController(settings.RobustSns(**changes), *size)
+            return RobustController(RobustSns(**changes), *size)
 
 
 def gives(controller: Neural, **potential_mV: list[float]) -> np.ndarray:
@@ -64,8 +66,8 @@ def test_linear_activation_is_clipped_at_the_range(kind: str) -> None:
 @pytest.mark.parametrize(
     ("kind", "section"),
     [
-        (PeristalsisParameters, settings.SnsController(range_mV=17.0, gate_time_constant_ms=120.0)),
-        (RobustParameters, settings.RobustSns(range_mV=17.0, turn_ms=500.0, bifurcation_mV=-2.0)),
+        (PeristalsisParameters, Sns(range_mV=17.0, gate_time_constant_ms=120.0)),
+        (RobustParameters, RobustSns(range_mV=17.0, turn_ms=500.0, bifurcation_mV=-2.0)),
     ],
 )
 def test_a_design_has_every_parameter_of_its_section(kind: Any, section: Any) -> None:
@@ -78,8 +80,8 @@ def test_a_design_has_every_parameter_of_its_section(kind: Any, section: Any) ->
 
 @pytest.mark.parametrize("slope_per_s", [0.0, 3.0])
 def test_a_stride_under_a_drive_is_its_steps_bit_for_bit(slope_per_s: float) -> None:
-    section = settings.AdaptiveSns(drive=0.3, drive_slope_per_s=slope_per_s, stretch_gain_per_m=5.0)
-    sensor = settings.StretchSensor(startup_hold_s=0.013)
+    section = AdaptiveSns(drive=0.3, drive_slope_per_s=slope_per_s, stretch_gain_per_m=5.0)
+    sensor = SensorSection(startup_hold_s=0.013)
     walked, strode = (AdaptiveController(section, sensor, N, N, 0.001) for _ in range(2))
     rest, zeros = np.full((N, 2), 0.1), np.zeros(N)
     for first in range(0, 60, 10):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid.config import PressureSns, StretchSensor, load_config
+from annelid.config import StretchSensor, load_config
 from annelid.control import SnsController
-from annelid.control.pressure import PressureController
+from annelid.control.pressure import PressureController, PressureSns
 from annelid.errors import ConfigError
 from annelid.nervous import peristalsis_network
 from annelid.nervous.pressure import PressureParameters, pressure_network

@@ -11,9 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis.paper import published
-from annelid.config import Contraction, Program, RunConfig, SnsController, load_config, parse_assignments
+from annelid.config import RunConfig, load_config, parse_assignments
 from annelid.control import ProgramController
-from annelid.control.program import program_activation
+from annelid.control.program import Contraction, Program, program_activation
+from annelid.control.sns import Sns
 from annelid.draw.table import field_lines
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
@@ -138,7 +139,7 @@ def test_a_bad_contraction_is_refused_in_one_sentence(contraction: dict[str, Any
         (programmed(ONE, ramp_s=-1.0), r"controller\.ramp_s = -1\.0: must be at least 0"),
         (programmed(ONE, gate_time_constant_ms=300.0), "belongs to another kind. Valid here: contractions, kind"),
         ({"controller.contractions": [ONE]}, "belongs to another kind"),
-        ({"controller.kind": "programme"}, "must be one of 'sns', 'program'"),
+        ({"controller.kind": "programme"}, "must be one of 'sns', 'adaptive', 'phase-chain', 'program'"),
         ({"controller.kind": "program", "controller.contractions": 3}, "must be a list"),
     ],
 )
@@ -174,7 +175,7 @@ def test_a_section_of_another_kind_keeps_nothing_of_the_preset_s(tmp_path: Path)
     again.write_text(f'extends = "{file.as_posix()}"\n[controller]\nramp_s = 0.1\n', encoding="utf-8")
     assert load_config(again).controller == expected.model_copy(update={"ramp_s": 0.1})
     back = load_config({"extends": file.as_posix(), "controller": {"kind": "sns", "kick_nA": 2.0}})
-    assert back.controller == SnsController(kick_nA=2.0)
+    assert back.controller == Sns(kick_nA=2.0)
 
 
 def test_it_is_listed_saved_and_not_laid_beside_the_paper() -> None:

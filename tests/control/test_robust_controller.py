@@ -13,8 +13,8 @@ from hypothesis.extra.numpy import arrays
 
 from annelid import load_config, open_run, simulate
 from annelid.analysis import rhythm_score
-from annelid.config import DescendingDrive, RobustSns, RunConfig
-from annelid.control.robust import RobustController
+from annelid.config import RunConfig
+from annelid.control.robust import DescendingDrive, RobustController, RobustSns
 from annelid.errors import ConfigError
 from annelid.nervous.robust import ROLES, neuron_names
 from annelid.protocols import SIDES, Records, Sensation, Stateful, StridingController

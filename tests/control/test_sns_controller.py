@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid import config
+from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import CopySettings, SnsController
+from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.nervous import neuron_names
 from annelid.protocols import Controller, Records, Sensation, Stateful, StridingController, Watched
@@ -18,8 +19,8 @@ REST_M = 0.07
 
 def controller(n_segments=3, n_muscles=None, timestep_s=0.001, sensor=None, **fields) -> SnsController:
     return SnsController(
-        config.SnsController(**fields),
-        sensor or config.StretchSensor(startup_hold_s=0.0),
+        Sns(**fields),
+        sensor or SensorSection(startup_hold_s=0.0),
         n_segments,
         n_muscles or n_segments,
         timestep_s,
@@ -109,7 +110,7 @@ def test_both_halves_of_a_ring_get_the_same():
 
 @pytest.mark.parametrize("scheme", ["euler", "toolbox", "heun"])
 def test_restored_controller_continues_bit_for_bit(scheme):
-    sensor = config.StretchSensor(hysteresis_m=0.003, startup_hold_s=0.02)
+    sensor = SensorSection(hysteresis_m=0.003, startup_hold_s=0.02)
     rng = np.random.default_rng(0)
     felt = [sensation(i * 1e-3, rng.uniform(0, OFF, 3)) for i in range(400)]
     one = controller(sensor=sensor, scheme=scheme)
@@ -134,7 +135,7 @@ def sensor_2(one: SnsController) -> float:
 
 
 def test_a_sensor_held_on_by_hysteresis_is_part_of_the_state():
-    sensor = config.StretchSensor(tolerance_m=0.010, hysteresis_m=0.003, startup_hold_s=0.0)
+    sensor = SensorSection(tolerance_m=0.010, hysteresis_m=0.003, startup_hold_s=0.0)
     near, between = sensation(0.0, [OFF, 0.0, OFF]), sensation(0.001, [OFF, 0.012, OFF])
     one, restored = controller(sensor=sensor), controller(sensor=sensor)
     one.step(near)
@@ -205,7 +206,7 @@ chunk_sizes = st.lists(st.integers(1, 30), min_size=1, max_size=8)
     seed=st.integers(0, 999),
 )
 def test_a_stride_is_bitwise_so_many_steps(chunks, hold_s, tolerance_m, hysteresis_m, timestep_s, scheme, seed):
-    section = config.StretchSensor(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=hold_s)
+    section = SensorSection(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=hold_s)
     one, other = (controller(timestep_s=timestep_s, sensor=section, scheme=scheme, kick_nA=2.0) for _ in range(2))
     assert isinstance(one, StridingController)
     rng = np.random.default_rng(seed)
@@ -232,16 +233,16 @@ def test_copies_with_settings_of_their_own_are_bitwise_single_controllers(chunks
     rng = np.random.default_rng(seed)
     sections = [
         (
-            config.SnsController(kick_nA=rng.uniform(0, 2), sensor_current_nA=rng.uniform(10, 25)),
-            config.StretchSensor(
+            Sns(kick_nA=rng.uniform(0, 2), sensor_current_nA=rng.uniform(10, 25)),
+            SensorSection(
                 tolerance_m=rng.uniform(0, 0.02), hysteresis_m=rng.choice([0.0, 0.005]), startup_hold_s=hold_s
             ),
         )
         for _ in range(n_copies)
     ]
     singles = [SnsController(sns, sensor, 3, 3, 0.001) for sns, sensor in sections]
-    batch = controller(sensor=config.StretchSensor(startup_hold_s=hold_s))
-    each = CopySettings.of(sections)
+    batch = controller(sensor=SensorSection(startup_hold_s=hold_s))
+    each = CopySettings.of(single.own for single in singles)
     first = [one.get_state() for one in singles]
     states = {name: np.stack([state[name] for state in first]) for name in first[0]} | {"n_steps": np.array(0)}
     taken = 0

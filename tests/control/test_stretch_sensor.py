@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid import config
+from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import StretchSensor
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
@@ -14,7 +14,7 @@ REST_M = np.full((3, 6), 0.07)
 
 
 def sensor(tolerance_m=0.01, hysteresis_m=0.0, startup_hold_s=0.0, n_segments=3) -> StretchSensor:
-    section = config.StretchSensor(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=startup_hold_s)
+    section = SensorSection(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=startup_hold_s)
     return StretchSensor(section, n_segments)
 
 

@@ -10,12 +10,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid import config
-from annelid.config import TimedWave, check_config, load_config
-from annelid.config.turning import TurningSection
+from annelid.config import check_config, load_config
+from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import SnsController, TimedController
-from annelid.control.steering import half_scales, heading_angle, wrapped
-from annelid.control.turning import TurningController, build_steering
+from annelid.control.sns import Sns
+from annelid.control.steering import (
+    ConstantTurning,
+    CourseTurning,
+    HeadingTurning,
+    TouchTurning,
+    TurningKind,
+    half_scales,
+    heading_angle,
+    wrapped,
+)
+from annelid.control.turning import TurningController
+from annelid.control.waves import TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched
 
@@ -53,7 +63,7 @@ def felt(
     )
 
 
-def turned(section: TurningSection, pattern: Controller | None = None, n_segments: int = N) -> TurningController:
+def turned(section: TurningKind, pattern: Controller | None = None, n_segments: int = N) -> TurningController:
     return TurningController(pattern or wave(n_segments), section, n_segments, 2 * n_segments, STEP_S)
 
 
@@ -62,15 +72,15 @@ def wave(n_segments: int = N) -> TimedController:
 
 
 def sns(n_segments: int = N) -> SnsController:
-    held = config.StretchSensor(startup_hold_s=0.0)
-    return SnsController(config.SnsController(), held, n_segments, 2 * n_segments, STEP_S)
+    held = SensorSection(startup_hold_s=0.0)
+    return SnsController(Sns(), held, n_segments, 2 * n_segments, STEP_S)
 
 
-SECTIONS: list[TurningSection] = [
-    config.ConstantTurning(modulation=0.7),
-    config.HeadingTurning(heading_deg=30.0),
-    config.CourseTurning(waypoints=((-1.0, 0.5), (-2.0, 0.0))),
-    config.TouchTurning(),
+SECTIONS: list[TurningKind] = [
+    ConstantTurning(modulation=0.7),
+    HeadingTurning(heading_deg=30.0),
+    CourseTurning(waypoints=((-1.0, 0.5), (-2.0, 0.0))),
+    TouchTurning(),
 ]
 
 
@@ -92,13 +102,13 @@ def journey(n_steps: int) -> list[Sensation]:
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.kind)
 class TestEveryKind:
-    def test_has_all_capabilities(self, section: TurningSection) -> None:
+    def test_has_all_capabilities(self, section: TurningKind) -> None:
         one = turned(section)
         for capability in (Records, Stateful, StridingController, Watched):
             assert isinstance(one, capability)
 
     @pytest.mark.parametrize("pattern", [wave, sns])
-    def test_a_stride_is_so_many_steps_bit_for_bit(self, section: TurningSection, pattern: Any) -> None:
+    def test_a_stride_is_so_many_steps_bit_for_bit(self, section: TurningKind, pattern: Any) -> None:
         walked, strode = turned(section, pattern()), turned(section, pattern())
         for first in range(0, 400, 10):
             here = journey(400)[first]
@@ -108,7 +118,7 @@ class TestEveryKind:
         assert before.keys() == after.keys()
         assert all(np.array_equal(before[name], after[name], equal_nan=True) for name in before)
 
-    def test_goes_on_from_a_saved_state_bit_for_bit(self, section: TurningSection) -> None:
+    def test_goes_on_from_a_saved_state_bit_for_bit(self, section: TurningKind) -> None:
         one, other = turned(section, sns()), turned(section, sns())
         way = journey(300)
         for here in way[:150]:
@@ -117,20 +127,20 @@ class TestEveryKind:
         for here in way[150:]:
             assert np.array_equal(one.step(here), other.step(here))
 
-    def test_resets_to_what_it_was(self, section: TurningSection) -> None:
+    def test_resets_to_what_it_was(self, section: TurningKind) -> None:
         one = turned(section, sns())
         fresh = [one.step(here) for here in journey(100)]
         one.reset(0)
         assert np.array_equal(fresh, [one.step(here) for here in journey(100)])
 
-    def test_a_mirrored_journey_mirrors_the_activation(self, section: TurningSection) -> None:
+    def test_a_mirrored_journey_mirrors_the_activation(self, section: TurningKind) -> None:
         mirrored = mirror_of(section)
         one, other = turned(section), turned(mirrored)
         for here in journey(500):
             a, b = one.step(here), other.step(mirrored_feeling(here))
             assert np.allclose(a.reshape(-1, 2), b.reshape(-1, 2)[:, ::-1], rtol=0.0, atol=1e-12)
 
-    def test_names_what_it_reads(self, section: TurningSection) -> None:
+    def test_names_what_it_reads(self, section: TurningKind) -> None:
         one = turned(section, sns())
         one.step(felt())
         named, values = one.recordable(), one.read(frame=False)
@@ -141,12 +151,12 @@ class TestEveryKind:
         assert named.coords["half"] == ["left", "right"]
 
 
-def mirror_of(section: TurningSection) -> TurningSection:
-    if isinstance(section, config.ConstantTurning):
+def mirror_of(section: TurningKind) -> TurningKind:
+    if isinstance(section, ConstantTurning):
         return section.model_copy(update={"modulation": -section.modulation})
-    if isinstance(section, config.HeadingTurning):
+    if isinstance(section, HeadingTurning):
         return section.model_copy(update={"heading_deg": -section.heading_deg})
-    if isinstance(section, config.CourseTurning):
+    if isinstance(section, CourseTurning):
         return section.model_copy(update={"waypoints": tuple((x, -y) for x, y in section.waypoints)})
     return section
 
@@ -167,7 +177,7 @@ def test_a_modulation_takes_from_one_side_only(modulation: float) -> None:
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.floats(0.0, 0.05), min_size=5, max_size=5))
 def test_zero_modulation_is_the_plain_nervous_system_bit_for_bit(lengthenings_m: list[float]) -> None:
-    plain, turning = sns(), turned(config.ConstantTurning(modulation=0.0), sns())
+    plain, turning = sns(), turned(ConstantTurning(modulation=0.0), sns())
     for k, longer_m in enumerate(lengthenings_m):
         here = felt(k * 0.02, longer_m=longer_m)
         assert np.array_equal(plain.stride(here, 20), turning.stride(here, 20))
@@ -175,7 +185,7 @@ def test_zero_modulation_is_the_plain_nervous_system_bit_for_bit(lengthenings_m:
 
 @pytest.mark.parametrize("modulation", [-1.0, -0.4, 0.6])
 def test_the_pattern_keeps_its_rhythm_and_one_side_its_size(modulation: float) -> None:
-    plain, turning = wave(), turned(config.ConstantTurning(modulation=modulation, descending_time_constant_s=1e-3))
+    plain, turning = wave(), turned(ConstantTurning(modulation=modulation, descending_time_constant_s=1e-3))
     settled = 50
     for k in range(600):
         whole, scaled = plain.step(felt(k * STEP_S)).reshape(-1, 2), turning.step(felt(k * STEP_S)).reshape(-1, 2)
@@ -185,15 +195,15 @@ def test_the_pattern_keeps_its_rhythm_and_one_side_its_size(modulation: float) -
 
 def test_every_segment_takes_its_share_and_a_negative_one_bends_the_other_way() -> None:
     shares = (1.0, 0.0, -0.5)
-    section = config.ConstantTurning(modulation=0.8, shares=shares, descending_time_constant_s=1e-3)
-    scales = build_steering(section, N, STEP_S).advance(felt(), 100)
+    section = ConstantTurning(modulation=0.8, shares=shares, descending_time_constant_s=1e-3)
+    scales = section.build(N, STEP_S).advance(felt(), 100)
     assert scales.tolist() == [pytest.approx([0.2, 1.0]), [1.0, 1.0], pytest.approx([1.0, 0.6])]
     with pytest.raises(ConfigError, match=r"turning.shares has 3 entries: must have 6, one a segment"):
         load_config("riddle2025", {"turning.shares": list(shares)})
 
 
 def test_descending_neurons_follow_with_their_time_constant() -> None:
-    steering = build_steering(config.ConstantTurning(modulation=1.0, descending_time_constant_s=0.05), 1, STEP_S)
+    steering = ConstantTurning(modulation=1.0, descending_time_constant_s=0.05).build(1, STEP_S)
     for k in range(1, 200):
         left, right = steering.advance(felt(), 1)[0]
         assert left == pytest.approx(np.exp(-k * STEP_S / 0.05), rel=1e-9)
@@ -203,33 +213,33 @@ def test_descending_neurons_follow_with_their_time_constant() -> None:
 class TestSteering:
     @pytest.mark.parametrize("error_deg", [-40.0, -10.0, 10.0, 40.0])
     def test_it_turns_towards_the_wanted_heading(self, error_deg: float) -> None:
-        steering = build_steering(config.HeadingTurning(heading_deg=error_deg, gain_per_rad=1.0), 1, STEP_S)
+        steering = HeadingTurning(heading_deg=error_deg, gain_per_rad=1.0).build(1, STEP_S)
         left, right = steering.advance(felt(heading_deg=25.0), 20_000)[0]
         assert right - left == pytest.approx(np.radians(error_deg), rel=1e-6)
 
     def test_it_takes_the_shorter_way_round(self) -> None:
-        steering = build_steering(config.HeadingTurning(heading_deg=170.0, gain_per_rad=0.3), 1, STEP_S)
+        steering = HeadingTurning(heading_deg=170.0, gain_per_rad=0.3).build(1, STEP_S)
         steering.advance(felt(heading_deg=0.0), 1)
         left, right = steering.advance(felt(heading_deg=-170.0), 50_000)[0]
         assert right - left == pytest.approx(-0.3 * np.radians(20.0), rel=1e-6)
 
     def test_a_steady_rate_of_turning_is_taken_off(self) -> None:
         rate_deg_per_s, slow = 5.0, 2.0
-        section = config.HeadingTurning(gain_per_rad=0.0, rate_gain_s=2.0, rate_time_constant_s=slow)
-        steering = build_steering(section, 1, STEP_S)
+        section = HeadingTurning(gain_per_rad=0.0, rate_gain_s=2.0, rate_time_constant_s=slow)
+        steering = section.build(1, STEP_S)
         scales = np.ones(2)
         for k in range(12_000):
             scales = steering.advance(felt(heading_deg=wrapped_deg(rate_deg_per_s * k * STEP_S + 150.0)), 1)[0]
         assert scales[1] - scales[0] == pytest.approx(-2.0 * np.radians(rate_deg_per_s), rel=0.01)
 
     def test_the_largest_modulation_is_never_exceeded(self) -> None:
-        section = config.HeadingTurning(heading_deg=90.0, gain_per_rad=50.0, largest_modulation=0.4)
-        left, right = build_steering(section, 1, STEP_S).advance(felt(), 20_000)[0]
+        section = HeadingTurning(heading_deg=90.0, gain_per_rad=50.0, largest_modulation=0.4)
+        left, right = section.build(1, STEP_S).advance(felt(), 20_000)[0]
         assert (left, right) == (pytest.approx(0.6), 1.0)
 
     def test_waypoints_are_taken_in_order_and_left_behind(self) -> None:
-        section = config.CourseTurning(waypoints=((-1.0, -1.0), (-3.0, 1.0)), reach_m=0.2, gain_per_rad=0.5)
-        steering = build_steering(section, 1, STEP_S)
+        section = CourseTurning(waypoints=((-1.0, -1.0), (-3.0, 1.0)), reach_m=0.2, gain_per_rad=0.5)
+        steering = section.build(1, STEP_S)
         towards = []
         for front in ((0.0, 0.0), (-0.95, -0.95), (-2.95, 1.05)):
             left, right = steering.advance(felt(front_m=front), 50_000)[0]
@@ -239,13 +249,13 @@ class TestSteering:
         assert second < 0.0
 
     def test_a_vehicle_with_a_turning_radius_converges_on_its_heading(self) -> None:
-        way = drive(config.HeadingTurning(heading_deg=60.0), duration_s=60.0)
+        way = drive(HeadingTurning(heading_deg=60.0), duration_s=60.0)
         assert way[-1, 2] == pytest.approx(60.0, abs=1.0)
         assert way[:, 2].max() < 75.0
 
     def test_a_vehicle_with_a_turning_radius_passes_its_waypoints(self) -> None:
         waypoints = ((-2.0, -0.8), (-4.0, 0.0))
-        way = drive(config.CourseTurning(waypoints=waypoints), duration_s=60.0)
+        way = drive(CourseTurning(waypoints=waypoints), duration_s=60.0)
         for waypoint in waypoints:
             assert np.hypot(*(way[:, :2] - waypoint).T).min() < 0.3
 
@@ -254,9 +264,9 @@ def wrapped_deg(angle_deg: float) -> float:
     return float(np.degrees(wrapped(np.radians(angle_deg))))
 
 
-def drive(section: TurningSection, duration_s: float) -> np.ndarray:
+def drive(section: TurningKind, duration_s: float) -> np.ndarray:
     """Positions (m) and heading (deg) of a point that crawls at 0.1 m/s and turns with a radius of 1.5 m at least."""
-    steering, dt = build_steering(section, 1, STEP_S), 0.01
+    steering, dt = section.build(1, STEP_S), 0.01
     x, y, heading = 0.0, 0.0, 0.0
     way = []
     for k in range(round(duration_s / dt)):
@@ -272,8 +282,8 @@ def drive(section: TurningSection, duration_s: float) -> np.ndarray:
 class TestTouch:
     """The published rule, worked out by hand at steps of 10 ms: rate 0.1 a step."""
 
-    def scales(self, *forces_N: float, section: config.TouchTurning | None = None) -> list[list[float]]:
-        steering = build_steering(section or config.TouchTurning(), 1, 0.01)
+    def scales(self, *forces_N: float, section: TouchTurning | None = None) -> list[list[float]]:
+        steering = (section or TouchTurning()).build(1, 0.01)
         return [
             steering.advance(felt(left_N=max(-f, 0.0), right_N=max(f, 0.0)), 1)[0].round(9).tolist() for f in forces_N
         ]
@@ -309,14 +319,14 @@ class TestTouch:
         assert left[6:] == [0.4] * 1294
 
     def test_the_rate_does_not_depend_on_the_step(self) -> None:
-        steering = build_steering(config.TouchTurning(), 1, STEP_S)
+        steering = TouchTurning().build(1, STEP_S)
         assert steering.advance(felt(right_N=15.0), 50)[0, 0] == pytest.approx(0.5)
 
 
 class TestRefusals:
     def test_whole_rings(self) -> None:
         with pytest.raises(ConfigError, match=r"needs half-rings: 6 muscles, not 3"):
-            TurningController(wave(), config.ConstantTurning(), N, N, STEP_S)
+            TurningController(wave(), ConstantTurning(), N, N, STEP_S)
 
     @pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2022-planar"])
     def test_a_worm_without_halves(self, preset: str) -> None:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from worms import CHEAP
 
 from annelid.arena.course import AHEAD, LEFT, UP
-from annelid.config import Floor, Pipe
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe
 from annelid.environments import WormEnv
 from annelid.environments.episode import Episode
 from annelid.environments.task import task_of

@@ -14,10 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from worms import CHEAP, same
 
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
-from annelid.environments.reward import Deed, reward_terms
-from annelid.environments.task import Weights
+from annelid.environments.task import Deed, Weights, reward_terms
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
 
 TERMS = ("reward_progress", "reward_effort", "reward_slip", "reward_success", "reward_failure")

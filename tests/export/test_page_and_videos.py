@@ -74,4 +74,4 @@ def test_formats_are_listed_as_the_help_says() -> None:
     from annelid.export import FORMATS
 
     lines = re.findall(r"^    ((?:\w+ )+) +\w", export_command.__doc__ or "", re.MULTILINE)
-    assert [name for line in lines if line.split()[0] in FORMATS for name in line.split()] == list(FORMATS)
+    assert sorted(name for line in lines if line.split()[0] in FORMATS for name in line.split()) == list(FORMATS)

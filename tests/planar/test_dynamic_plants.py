@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid.config import Boxerbaum2012Body, Clock, Daltorio2013Body, load_config
+from annelid.config import Clock, load_config
 from annelid.planar import Boxerbaum2012Plant, Daltorio2013Plant
+from annelid.planar.boxerbaum2012 import Boxerbaum2012Body
+from annelid.planar.daltorio2013 import Daltorio2013Body
 from annelid.planar.dynamic import DynamicPlanarPlant
 from annelid.protocols import Plant, Records, Sensation, Stateful, Watched
 from annelid.simulation.assemble import build_plant

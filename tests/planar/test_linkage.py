@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.config import Boxerbaum2012Body, Daltorio2013Body
-from annelid.planar.boxerbaum2012 import boxerbaum_linkage
-from annelid.planar.daltorio2013 import daltorio_linkage
+from annelid.planar.boxerbaum2012 import Boxerbaum2012Body, boxerbaum_linkage
+from annelid.planar.daltorio2013 import Daltorio2013Body, daltorio_linkage
 from annelid.planar.linkage import Linkage
 
 WORMS = {

@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.config import Clock, PlanarBody
+from annelid.config import Clock
 from annelid.errors import ConfigError
 from annelid.planar import Riddle2022Plant
+from annelid.planar.riddle2022 import PlanarBody
 from annelid.protocols import Plant, Records, Stateful
 
 CLOCK = Clock(control_timestep_s=0.001, physics_timestep_s=0.001)

@@ -5,10 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from annelid import config
+from annelid.config import Clock
+from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import SnsController
+from annelid.control.sns import Sns
 from annelid.nervous import Scheme
 from annelid.planar import Riddle2022Plant
+from annelid.planar.riddle2022 import PlanarBody
 from annelid.protocols import Sensation
 
 TIMESTEP_S = 0.001
@@ -16,11 +19,11 @@ TIMESTEP_S = 0.001
 
 def contraction_times_ms(n, tau_ms, gain, duration_s, scheme: Scheme = "euler", start=None) -> list[np.ndarray]:
     """Times at which each segment's contraction neuron overtakes its expansion neuron, between samples."""
-    clock = config.Clock(control_timestep_s=TIMESTEP_S, physics_timestep_s=TIMESTEP_S)
-    plant = Riddle2022Plant(config.PlanarBody(n_segments=n, gain=gain), clock)
+    clock = Clock(control_timestep_s=TIMESTEP_S, physics_timestep_s=TIMESTEP_S)
+    plant = Riddle2022Plant(PlanarBody(n_segments=n, gain=gain), clock)
     controller = SnsController(
-        config.SnsController(gate_time_constant_ms=tau_ms, activation="linear", scheme=scheme),
-        config.StretchSensor(tolerance_m=0.0001),
+        Sns(gate_time_constant_ms=tau_ms, activation="linear", scheme=scheme),
+        SensorSection(tolerance_m=0.0001),
         n,
         n,
         TIMESTEP_S,

@@ -24,7 +24,7 @@ from annelid.cli import app
 from annelid.config import find_cluster
 from annelid.config.cluster import Slurm
 from annelid.errors import ClusterError, ConfigError
-from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Files, Task, attempt
+from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, attempt
 from annelid.experiment.case import Case
 from annelid.experiment.cluster import slurm_cluster
 from annelid.experiment.store import Store, case_key
@@ -70,7 +70,7 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheduler: socket.soc
 
 
 def computed(task: Task) -> Result:
-    future = Future[Files | None]()
+    future = Future[bytes | None]()
     future.set_result(attempt(task))
     return future
 
@@ -228,18 +228,18 @@ class Away(Workers):
 
 
 @pytest.fixture(scope="module")
-def sent(tmp_path_factory: pytest.TempPathFactory) -> list[Files]:
+def sent(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     """What an honest worker sends of `CASE` and of `OTHER`."""
     store = Store(tmp_path_factory.mktemp("runs"))
     found = []
     for case in (CASE, OTHER):
-        files = attempt(replace(store._task(case, "mark"), home="elsewhere"))
-        assert files is not None
-        found.append(files)
+        content = attempt(replace(store._task(case, "mark"), home="elsewhere"))
+        assert content is not None
+        found.append(content)
     return found
 
 
-def test_what_an_honest_worker_sends_is_kept(tmp_path: Path, sent: list[Files]) -> None:
+def test_what_an_honest_worker_sends_is_kept(tmp_path: Path, sent: list[bytes]) -> None:
     store = Store(tmp_path, Away(sent[0]))
     store.compute([CASE])
     assert {path.name for path in store.path(CASE).iterdir()} == {FILE_NAME, OUTCOME_NAME}
@@ -248,18 +248,21 @@ def test_what_an_honest_worker_sends_is_kept(tmp_path: Path, sent: list[Files]) 
 @pytest.mark.parametrize(
     "forged",
     [
-        lambda files, other: {**files, "../../evil": b"x"},
-        lambda files, other: {**files, "/annelid-evil": b"x"},
-        lambda files, other: {**files, "evil.py": b"x"},
-        lambda files, other: {**files, OUTCOME_NAME: b"{}"},
-        lambda files, other: {FILE_NAME: "text"},
-        lambda files, other: {FILE_NAME: b"no run"},
-        lambda files, other: other,
-        lambda files, other: {},
-        lambda files, other: 5,
+        lambda content, other: {"../../evil": content},
+        lambda content, other: {"/annelid-evil": content},
+        lambda content, other: {FILE_NAME: content, OUTCOME_NAME: b"{}"},
+        lambda content, other: [content],
+        lambda content, other: bytearray(content),
+        lambda content, other: "text",
+        lambda content, other: b"no run",
+        lambda content, other: content[:-1],
+        lambda content, other: b"",
+        lambda content, other: other,
+        lambda content, other: {},
+        lambda content, other: 5,
     ],
 )
-def test_what_a_worker_sends_is_the_run_that_was_asked_for(forged: Any, tmp_path: Path, sent: list[Files]) -> None:
+def test_what_a_worker_sends_is_the_run_that_was_asked_for(forged: Any, tmp_path: Path, sent: list[bytes]) -> None:
     store = Store(tmp_path / "a" / "b" / "runs", Away(forged(*sent)))
     with pytest.raises(ClusterError, match="a worker sent"):
         store.compute([CASE], failed={})
@@ -301,7 +304,7 @@ def test_texts_that_are_no_numbers_are_refused(content: bytes, tmp_path: Path) -
 
 
 def refused_numbers(folder: Path, content: bytes) -> None:
-    store = Store(folder, Away({OUTCOME_NAME: content}), keep="outcomes")
+    store = Store(folder, Away(content), keep="outcomes")
     with pytest.raises(ClusterError, match=r"a worker sent a") as refused:
         store.compute([CASE], failed={})
     assert len(str(refused.value)) < 500
@@ -312,11 +315,11 @@ def refused_numbers(folder: Path, content: bytes) -> None:
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """What an honest worker sends of `CASE` where only numbers are kept."""
     store = Store(tmp_path_factory.mktemp("numbers"), keep="outcomes")
-    files = attempt(replace(store._task(CASE, "mark"), home="elsewhere"))
-    assert files is not None
-    return files[OUTCOME_NAME]
+    content = attempt(replace(store._task(CASE, "mark"), home="elsewhere"))
+    assert content is not None
+    return content
 
 
 def test_honest_numbers_are_kept(tmp_path: Path, outcomes: bytes) -> None:
-    store = Store(tmp_path, Away({OUTCOME_NAME: outcomes}), keep="outcomes")
+    store = Store(tmp_path, Away(outcomes), keep="outcomes")
     assert store.compute([CASE])[case_key(CASE)].summary.duration_s == pytest.approx(0.1)

@@ -11,7 +11,7 @@ import pytest
 from pydantic.fields import FieldInfo
 
 from annelid.config import RunConfig, Section, load_config, parse_assignments
-from annelid.config.checking import field_paths
+from annelid.config.checking import field_paths, sections_in
 from annelid.errors import ConfigError
 from annelid.textfiles import toml_value
 
@@ -24,11 +24,7 @@ CHOICES = ["nothing", "x" * 100_000, *WORDS]
 
 def kinds_of(annotation: Any) -> list[type[Section]]:
     """The sections that a field may hold; none where it is no section."""
-    if isinstance(annotation, type) and issubclass(annotation, Section):
-        return [annotation]
-    if get_origin(annotation) is tuple:
-        return []
-    return [section for inner in get_args(annotation) for section in kinds_of(inner)]
+    return [] if get_origin(annotation) is tuple else sections_in(annotation)
 
 
 def literals(annotation: Any) -> bool:

@@ -10,7 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.config import Rings, ServoRings, load_config
+from annelid.body.actuators.muscle import Rings
+from annelid.body.actuators.servo import ServoRings
+from annelid.config import load_config
 from annelid.simulation.books import Bookkeeper
 from annelid.simulation.worm import WormPlant
 

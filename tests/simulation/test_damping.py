@@ -10,8 +10,10 @@ import pytest
 
 from annelid.body import build_spec, compile_spec
 from annelid.body.damping import damper_name, damper_rows
-from annelid.body.rods import add_rod, add_vertex, lumped_masses
-from annelid.config import Rods, Strands, WormBody, load_config, parse_assignments
+from annelid.body.formulations.rods import Rods
+from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
+from annelid.body.worm import Strands, WormBody
+from annelid.config import load_config, parse_assignments
 from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.plausibility import check

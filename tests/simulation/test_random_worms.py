@@ -16,7 +16,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.config import Chain, Floor, Pipe, Rough, RunConfig, ServoRings, WormBody, load_config
+from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.pipe import Pipe
+from annelid.arena.kinds.relief import Rough
+from annelid.body.formulations.chain import Chain
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.simulation import open_run, simulate
 
@@ -186,7 +191,7 @@ def _depth_m(place: np.ndarray, config: RunConfig) -> np.ndarray:
 def _idle(data: xr.Dataset, body: WormBody) -> str:
     """Names a muscle without force throughout a contraction of 0.25 s and more."""
     n, rings = body.mesh.n_segments, body.rings
-    greatest = rings.force_limits(n) if isinstance(rings, ServoRings) else rings.peak_forces(n)
+    greatest = rings.forces(n)
     time = data["time"].values
     for muscle in range(data.sizes["muscle"]):
         most = greatest[muscle * n // data.sizes["muscle"]]

@@ -12,7 +12,8 @@ import pytest
 import xarray
 
 from annelid import load_config, open_run, simulate, simulate_batch, summary
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.simulation.watch import Energies, Watch
 

@@ -12,7 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.config import LEVELS, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, load_config
 from annelid.errors import ConfigError
 from annelid_studies.bench import peer as peer_module
 from annelid_studies.bench import store as store_module

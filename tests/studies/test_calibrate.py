@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
 from annelid.experiment.calibration import frame
 from annelid.experiment.calibration.fit import Calibration, calibrate, identifiability, places
@@ -173,7 +174,6 @@ TRUE = {
 
 
 def test_a_fit_finds_the_worm_that_made_the_data() -> None:
-    pytest.importorskip("scipy")
     base = load_config("riddle2023-rods")
     made = cable_force(line(load_config("riddle2023-rods", TRUE)), 0.9)
     free = ("young_modulus", "dry_friction", "cable_friction")

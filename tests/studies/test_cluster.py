@@ -23,7 +23,6 @@ from annelid.errors import ClusterError, ConfigError, MissingDependency, RunKill
 from annelid.experiment.attempt import (
     DRAFTS,
     OUTCOME_NAME,
-    Files,
     Task,
     attempt,
     fetch_results,
@@ -77,7 +76,7 @@ class Here(Workers):
 
     def submit(self, task: Task) -> Result:
         self.tasks.append(task)
-        future = Future[Files | None]()
+        future = Future[bytes | None]()
         what = self._script.pop(0) if self._script else ""
         if what == "cancelled":
             future.cancel()
@@ -147,9 +146,9 @@ def test_a_run_that_two_workers_compute_is_there_once(tmp_path: Path) -> None:
     first = (store.path(planar()) / FILE_NAME).stat().st_mtime_ns
     attempt(task)
     attempt(replace(task, mark="another machine's"))
-    files = attempt(replace(task, mark="another machine's"))
-    assert files is not None
-    fetch_results(files, store.path(planar()), planar().config, "runs")
+    content = attempt(replace(task, mark="another machine's"))
+    assert content is not None
+    fetch_results(content, store.path(planar()), planar().config, "runs")
     assert (store.path(planar()) / FILE_NAME).stat().st_mtime_ns == first
     assert folders(store) == [store.path(planar())]
 
@@ -188,7 +187,18 @@ def test_failures_are_told_and_the_others_computed(tmp_path: Path) -> None:
     assert "overshoot" in str(failed[case_key(IMPOSSIBLE)])
 
 
-def die_at_seed_5(task: Task) -> Files | None:
+def test_what_became_of_every_case_is_told_in_their_order(tmp_path: Path) -> None:
+    told: list[str] = []
+    cases = [Case(PLANAR, {"body.gain": -1.0}), IMPOSSIBLE, planar()]
+    done = Store(tmp_path, Here([])).finish(cases, "runs", progress=lambda stage, *_: told.append(stage))
+    assert [(one.status, one.refused) for one in done] == [("failed", True), ("failed", False), ("complete", False)]
+    assert "body.gain = -1.0" in done[0].reason
+    assert "overshoot" in done[1].reason
+    assert done[2].reason == ""
+    assert told[-1] == "runs, 1 failed"
+
+
+def die_at_seed_5(task: Task) -> bytes | None:
     """Attempts a run, but is killed by that of seed 5."""
     if json.loads(task.config)["seed"] == 5:
         os._exit(1)

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from annelid.analysis.gait import Gait
-from annelid.config import ServoRings, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.tune.judge import Judged
@@ -31,8 +32,7 @@ MUSCLES, SERVOS = "riddle2025-muscles", "riddle2025"
 def test_longer_worms_have_rings_as_strong_as_the_second_and_ends_as_before(gait: str, n_segments: int) -> None:
     body = load_config(gait, changes_for(gait, "segments", n_segments)).body
     assert isinstance(body, WormBody)
-    rings = body.rings
-    forces = rings.force_limits(n_segments) if isinstance(rings, ServoRings) else rings.peak_forces(n_segments)
+    forces = body.rings.forces(n_segments)
     assert forces == [16.0, *[31.0] * (n_segments - 2), 16.0]
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from annelid.analysis import RhythmScore
 from annelid.body.assemble import build_spec
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome, outcome
 from annelid.experiment.store import case_key

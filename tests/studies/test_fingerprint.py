@@ -25,7 +25,7 @@ COMPUTING = sorted(
 
 def test_the_key_of_a_run_covers_all_that_computes_it_and_nothing_else() -> None:
     modules = modules_behind(*PHYSICS)
-    others = ("engine", "errors", "plausibility", "protocols", "text", "textfiles")
+    others = ("engine", "errors", "plausibility", "protocols", "registry", "text", "textfiles")
     rooms = {".".join(name.split(".")[:2]) for name in modules}
     assert rooms == {*PHYSICS, *(f"annelid.{room}" for room in others)}
     assert {name_of(path) for path in COMPUTING} <= modules
@@ -44,7 +44,7 @@ def test_a_module_is_found_by_its_import_wherever_it_stands(copied: Path) -> Non
     (copied / "added.py").write_text("SHARE = 0.5\n")
     forget()
     assert code_fingerprint(*PHYSICS) == before
-    rods = copied / "body" / "rods.py"
+    rods = copied / "body" / "formulations" / "rods" / "net.py"
     rods.write_text(
         rods.read_text() + "\n\ndef late() -> float:\n    from annelid import added\n\n    return added.SHARE\n"
     )
@@ -105,8 +105,8 @@ def test_the_key_of_a_stored_run(copied: Path, monkeypatch: pytest.MonkeyPatch) 
     key = case_key(case)
     for place, old, new, counts in (
         ("simulation/progress.py", '"""How far a run', '""" How far a run', False),
-        ("config/worm.py", "default=117.57", "default=117.58", True),
-        ("body/rods.py", "0.5 * ", "0.25 * ", True),
+        ("body/actuators/muscle.py", "default=117.57", "default=117.58", True),
+        ("body/formulations/rods/net.py", "0.5 * ", "0.25 * ", True),
         ("errors.py", "class AnnelidError", "UNIT = 1.0\n\n\nclass AnnelidError", True),
     ):
         file = copied / place

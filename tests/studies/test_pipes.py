@@ -10,7 +10,8 @@ import pytest
 
 from annelid import load_config, open_run, simulate
 from annelid.analysis.passage import Passage, passage_of
-from annelid.config import Pipe, RobustSns
+from annelid.arena.kinds.pipe import Pipe
+from annelid.control.robust import RobustSns
 from annelid.errors import RunFileError
 from annelid_studies.figures.pipes import Way
 from annelid_studies.pipes import (

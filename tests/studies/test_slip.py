@@ -9,7 +9,9 @@ import pytest
 
 from annelid.analysis.detector import Score
 from annelid.analysis.slip import SlipCost
-from annelid.config import PressureSns, SnsController, load_config
+from annelid.config import load_config
+from annelid.control.pressure import PressureSns
+from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.experiment.store import Store
 from annelid_studies.slip.detection import CASES, write_scores
@@ -36,7 +38,7 @@ def test_only_the_feedback_differs(preset: str) -> None:
     published = load_config(preset)
     assert (plain.body, plain.controller, plain.sensor) == (published.body, published.controller, published.sensor)
     assert plain.duration_s == DURATION_S
-    assert isinstance(plain.controller, SnsController)
+    assert isinstance(plain.controller, Sns)
     assert isinstance(extension.controller, PressureSns)
     assert isinstance(pressure.controller, PressureSns)
     assert plain.controller == extension.controller.network == pressure.controller.network

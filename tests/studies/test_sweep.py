@@ -21,9 +21,10 @@ from annelid.analysis.gait import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
 from annelid.experiment.attempt import attempt
+from annelid.experiment.space import unit_samples
 from annelid.experiment.sweep import Sweep, sweeping, swept
 from annelid.experiment.sweep.dataset import dataset_of
-from annelid.experiment.sweep.design import Plan, flattened, plan_of, unit_samples
+from annelid.experiment.sweep.design import Plan, flattened, plan_of
 from annelid.experiment.sweep.numbers import NUMBERS
 from annelid.experiment.sweep.results import failures, results_table, told_numbers, write_results
 from annelid.experiment.workers import Result, Workers
@@ -124,9 +125,10 @@ def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int
 
 
 @settings(deadline=None, max_examples=15)
-@given(n=st.integers(1, 50), seed=st.integers(0, 99))
-def test_a_latin_hypercube_has_one_sample_in_every_row_and_column(n: int, seed: int) -> None:
-    shares = unit_samples(study(RANGES, design="lhs", samples=n, seed=seed), 2)
+@given(n=st.integers(1, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
+def test_a_latin_hypercube_has_one_sample_in_every_stratum_of_every_variable(n: int, p: int, seed: int) -> None:
+    shares = unit_samples("lhs", n, p, seed)
+    assert shares.shape == (n, p)
     for column in shares.T:
         assert sorted(np.floor(column * n).astype(int).tolist()) == list(range(n))
 
@@ -250,9 +252,9 @@ def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
     good = data.sel({"body.gain": 1.31})
     assert set(good.status.values.ravel()) == {"complete"}
     assert len(set(good.run.values.ravel())) == good.run.size
-    for run in done.runs:
+    for point, run in zip(done.plan.points, done.runs, strict=True):
         if run.outcome is not None:
-            here = data.isel(dict(zip(done.plan.levels, run.point.place, strict=True)))
+            here = data.isel(dict(zip(done.plan.levels, point.place, strict=True)))
             assert here.ring_length_min_m == run.outcome.summary.ring_length_min_m
             told = here.elongation_mean_max_m.values
             assert told[~np.isnan(told)].tolist() == run.outcome.summary.elongation_mean_max_m

@@ -19,7 +19,7 @@ from annelid.analysis.gait import Gait
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import workers
-from annelid.experiment.case import Case, Work
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.space import Choice, Interval, from_unit, to_unit
 from annelid.experiment.store import Store, case_key
@@ -162,7 +162,7 @@ class NoStore(Store):
 
     def __init__(self, refused: str = "") -> None:
         super().__init__(Path("nowhere"))
-        self.asked: list[Work] = []
+        self.asked: list[Case] = []
         self._refused = refused
 
     def compute(self, cases: Any, *, failed: Any = None, **_: Any) -> Mapping[str, Outcome]:

@@ -23,7 +23,6 @@ from annelid.experiment.calibration.loop import read_loop
 from annelid.experiment.calibration.report import EQUAL_STIFFNESS
 from annelid.experiment.store import case_key
 from annelid.experiment.uncertainty import Spread, Uncertainty, VariantRun, read_spread, study, uncertainty
-from annelid.experiment.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
 from annelid.experiment.uncertainty.parameters import (
     ABSENT,
     CALIBRATION,
@@ -33,11 +32,16 @@ from annelid.experiment.uncertainty.parameters import (
     applicable,
     changes,
     draw,
-    hypercube,
 )
-from annelid.experiment.uncertainty.readings import readings
+from annelid.experiment.uncertainty.quantities import (
+    Quantity,
+    largest_difference,
+    order_of_convergence,
+    readings,
+    scatter,
+)
 from annelid.experiment.uncertainty.report import as_json, headline, remarks, with_error, write_uncertainty
-from annelid.experiment.uncertainty.study import Variant, combine, finer_steps, more_elements, plan
+from annelid.experiment.uncertainty.study import combine, finer_steps, more_elements, plan, variant
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import open_run
 from annelid_studies.worms import RODS
@@ -54,14 +58,6 @@ def spread(errors: Mapping[str, float], correlation: Any = None, exponent: float
 
 
 # The draw
-
-
-@settings(deadline=None, max_examples=50)
-@given(n=st.integers(2, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
-def test_a_hypercube_has_one_point_in_every_stratum_of_every_parameter(n: int, p: int, seed: int) -> None:
-    points = hypercube(n, p, np.random.default_rng(seed))
-    assert points.shape == (n, p)
-    assert (np.sort(np.floor(points * n), axis=0) == np.arange(n)[:, None]).all()
 
 
 @settings(deadline=None, max_examples=20)
@@ -215,7 +211,6 @@ def test_the_fit_that_comes_along_is_whole() -> None:
 
 @pytest.mark.slow
 def test_the_fit_that_comes_along_is_the_one_that_calibrate_makes() -> None:
-    pytest.importorskip("scipy")
     fit = calibrate(load_config(RODS, EQUAL_STIFFNESS), read_loop())
     known = read_spread()
     assert fit.names == known.names
@@ -379,20 +374,20 @@ def test_elements_end_where_the_mesh_does() -> None:
 def test_an_unchanged_variant_is_the_run_itself() -> None:
     for preset in (RODS, "wang", "riddle2023"):
         config = load_config(preset)
-        assert Variant(config, "drawn", {}).config == config
-        assert case_key(Variant(config, "drawn", {})) == case_key(Variant(config, "nominal", {}))
+        assert variant(config, "drawn", {}).config == config
+        assert case_key(variant(config, "drawn", {})) == case_key(variant(config, "nominal", {}))
 
 
 def test_a_plan_changes_only_what_it_says() -> None:
     config = load_config(RODS)
     known, _ = applicable(config, read_spread())
     variants = plan(config, 4, known)
-    assert [variant.kind for variant in variants] == ["nominal", *["drawn"] * 4, *["time step"] * 2, *["elements"] * 2]
-    for variant in variants:
-        sections = {path: getattr_path(variant.config, path) for path in variant.changes}
-        assert sections == variant.changes
-        back = {path: getattr_path(config, path) for path in variant.changes}
-        assert load_config(variant.config.model_dump(), back) == config
+    assert [one.kind for one in variants] == ["nominal", *["drawn"] * 4, *["time step"] * 2, *["elements"] * 2]
+    for one in variants:
+        sections = {path: getattr_path(one.config, path) for path in one.changes}
+        assert sections == one.changes
+        back = {path: getattr_path(config, path) for path in one.changes}
+        assert load_config(one.config.model_dump(), back) == config
 
 
 def getattr_path(config: RunConfig, path: str) -> Any:
@@ -550,7 +545,7 @@ def test_a_folder_in_use_is_refused_and_left_alone(tiny: Uncertainty, tmp_path: 
 def test_a_run_that_a_guard_stops_has_no_error_bars_but_its_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "plan", lambda config, n, spread: [Variant(config, "nominal", {})])
+    monkeypatch.setattr(study, "plan", lambda config, n, spread: [variant(config, "nominal", {})])
     config = load_config(RODS, SHORT | {"guard.edge_strain": 1e-6})
     with pytest.raises(SimulationStopped, match="strain"):
         uncertainty(config, 2, tmp_path / "run", jobs=1)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from annelid import simulate
 from annelid.analysis import RhythmScore, Summary
 from annelid.analysis.robot import ROBOT_ELONGATION_M
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.errors import ConfigError
 from annelid.experiment.outcome import Hold, Outcome, outcome
 from annelid.simulation.worm import WormPlant
@@ -131,16 +131,14 @@ def test_a_muscle_pulls_with_the_force_of_its_length(bench: Bench) -> None:
     pulled = bench(1, muscle(0.12))
     rings = papers_muscle()
     length = scaled_length(pulled.ring_length_m, rings.length_ranges(1)[0])
-    assert pulled.force_N == pytest.approx(
-        rings.peak_forces(1)[0] * float(engine_flv(length, 0.0, rings, 0.12)), rel=0.01
-    )
+    assert pulled.force_N == pytest.approx(rings.forces(1)[0] * float(engine_flv(length, 0.0, rings, 0.12)), rel=0.01)
     assert muscle_activation(pulled.force_N, pulled.ring_length_m) == pytest.approx(0.12, rel=0.01)
 
 
 def test_a_servo_ends_at_its_cable_where_rods_are_soft(bench: Bench) -> None:
     shortest = pulls.base_servos().length_ranges(1)[0][0]
     soft = bench(1, servo(), **stiffness_changes(0.5))
-    assert soft.force_N < 0.9 * pulls.base_servos().force_limits(1)[0]
+    assert soft.force_N < 0.9 * pulls.base_servos().forces(1)[0]
     assert soft.ring_length_m == pytest.approx(
         shortest + 2 * soft.force_N / pulls.base_servos().stiffness_N_per_m, abs=2e-3
     )

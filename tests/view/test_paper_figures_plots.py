@@ -12,7 +12,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
-from annelid.config import Rings, WormBody, load_config
+from annelid.body.actuators.muscle import Rings
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.draw.figures import network_diagram
 from annelid.errors import ConfigError
 from annelid.nervous import Network

@@ -10,7 +10,8 @@ import pytest
 
 from annelid.analysis.rhombi import actuated, rhombus_plane
 from annelid.body import mesh_of
-from annelid.config import WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.draw.camera import fitting_distance, picture_axes, picture_points
 from annelid.draw.scene import render_still
 from annelid.draw.skeleton import Skeleton

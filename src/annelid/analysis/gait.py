@@ -16,7 +16,7 @@ from annelid.analysis.forces import net_work, positive_work
 from annelid.analysis.rhythm import run_rhythm
 from annelid.analysis.track import fitted_circle, track_of
 from annelid.analysis.travel import first_heading
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.protocols import Array
 
 if TYPE_CHECKING:

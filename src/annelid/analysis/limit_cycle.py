@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from annelid.analysis.flow import ClosedLoop, Continuous, Copies, Flow, Switches, advance, first_share, travel
 from annelid.clock import StepRatio
-from annelid.config import RunConfig, SnsController, load_config
+from annelid.config import RunConfig, load_config
+from annelid.control.sns import paper_controller
 from annelid.errors import AnnelidError, ConfigError, suggest
 from annelid.protocols import Array, Controller, Plant, Stateful
 from annelid.simulation import build_controller, build_plant
@@ -140,10 +141,11 @@ def limit_cycle(
             or has too many states (`ClosedLoop`).
         NoLimitCycle: The worm does not oscillate, or not periodically.
     """
-    if not isinstance(config.controller, SnsController):
+    network = paper_controller(config.controller)
+    if network is None:
         raise ConfigError(f"controller.kind = {config.controller.kind!r} has no neurons whose rise could begin a cycle")
     flow, state, switches = flow_of(config, time, settle_s)
-    section = section_at(flow, neuron, 0.5 * config.controller.range_mV if threshold_mV is None else threshold_mV)
+    section = section_at(flow, neuron, 0.5 * network.range_mV if threshold_mV is None else threshold_mV)
     # The field's rounding, divided by its short step, leaves no more digits.
     tolerance = 1e-7 if time == "continuous" else 1e-9
     return find_limit_cycle(
@@ -184,7 +186,7 @@ def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0)
     # The same loop in forward Euler steps so short that they tell the vector field.
     tree = config.model_dump()
     tree["clock"] = {"control_timestep_s": _FIELD_STEP_S, "physics_timestep_s": _FIELD_STEP_S}
-    if isinstance(config.controller, SnsController):
+    if paper_controller(config.controller) is not None:
         tree["controller"]["scheme"] = "euler"
     # Time runs slower there, and must not come back into the hold.
     tree["sensor"]["startup_hold_s"] = 0.0

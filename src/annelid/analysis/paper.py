@@ -10,7 +10,9 @@ from importlib import resources
 from annelid.analysis.comparison import differing_fields, relative_difference
 from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.analysis.summary import Summary
-from annelid.config import PlanarBody, Rods, RunConfig, SnsController, WormBody, load_config, preset_names
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config, preset_names
+from annelid.control.sns import paper_controller
 from annelid.textfiles import parse_json
 
 PAPER_2023 = "Riddle et al. 2023"
@@ -50,19 +52,19 @@ def published(config: RunConfig) -> dict[str, Published]:
     ``riddle2023`` and its rods, the four-segment robot ``wang``, and the planar worms of ``riddle2022`` with the gate
     time constants and gains that go together.
     """
-    if not isinstance(config.controller, SnsController):
+    network = paper_controller(config.controller)
+    if network is None:
         return {}
     if _is_of_2023(config):
         return dict(_RIDDLE_2023)
     if config.name == "wang" and config.body.n_segments == len(ROBOT_ELONGATION_M):
         return dict(_ROBOT)
-    if config.name.startswith("riddle2022") and isinstance(config.body, PlanarBody):
-        key = (config.body.n_segments, config.controller.gate_time_constant_ms, config.body.gain)
-        if key in _PLANAR_PERIODS_S:
-            return {
-                "period_s": Published(_PLANAR_PERIODS_S[key], PAPER_2022, "the authors' code"),
-                "order": Published("1-2-3..", PAPER_2022, "Fig. 4"),
-            }
+    period_s = config.body.published_period_s(config)
+    if config.name.startswith("riddle2022") and period_s is not None:
+        return {
+            "period_s": Published(period_s, PAPER_2022, "the authors' code"),
+            "order": Published("1-2-3..", PAPER_2022, "Fig. 4"),
+        }
     return {}
 
 
@@ -123,18 +125,12 @@ def references(config: RunConfig) -> dict[str, Published]:
 
 def stands_for_the_papers(config: RunConfig) -> bool:
     """Tells whether a worm is of rods and of the paper's kind, to be compared with the paper's own formulation."""
-    return _is_of_2023(config) and _rods(config) is not None
+    return _is_of_2023(config) and isinstance(config.body, WormBody) and not config.body.formulation.is_papers
 
 
 def has_rigid_crossings(config: RunConfig) -> bool:
     """Tells whether a worm's strands share a vertex at each crossing."""
-    rods = _rods(config)
-    return rods is not None and rods.pins == "shared"
-
-
-def _rods(config: RunConfig) -> Rods | None:
-    body = config.body
-    return body.formulation if isinstance(body, WormBody) and isinstance(body.formulation, Rods) else None
+    return isinstance(config.body, WormBody) and config.body.formulation.has_rigid_crossings
 
 
 def changed_fields(config: RunConfig) -> list[str]:
@@ -164,7 +160,7 @@ def agreement(numbers: Summary) -> Agreement:
 
 def _is_of_2023(config: RunConfig) -> bool:
     named = config.name.startswith(FORMULATION) and config.body.n_segments == 3
-    return named and isinstance(config.controller, SnsController)
+    return named and paper_controller(config.controller) is not None
 
 
 _RIDDLE_2023 = {
@@ -182,14 +178,4 @@ _RIDDLE_2023 = {
 _ROBOT = {
     "order": Published("1-2-3-4", PAPER_2023, "Fig. 9"),
     "elongation_mean_max_m": Published(ROBOT_ELONGATION_M, PAPER_2023, "section 4"),
-}
-
-# (segments, tau_h,max in ms, gain): period in s.
-_PLANAR_PERIODS_S = {
-    (3, 300.0, 1.3): 2.625,
-    (6, 300.0, 1.3): 5.250,
-    (3, 200.0, 1.9): 1.867,
-    (6, 200.0, 1.9): 3.734,
-    (3, 100.0, 3.6): 1.124,
-    (6, 100.0, 3.6): 2.248,
 }

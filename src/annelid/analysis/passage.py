@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.track import Track, track_of
-from annelid.arena.course import bore_of, course_of
-from annelid.config import Pipe
+from annelid.config.arena import ArenaKind
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 
@@ -85,24 +84,19 @@ def passage_of(run: Run) -> Passage:
         RunFileError: The worm was not in a pipe, or `annelid.analysis.track.track_of` refuses the run.
     """
     arena = run.config.arena
-    if not isinstance(arena, Pipe):
+    if arena is None or arena.centre_line() is None:
         where = "a planar worm" if arena is None else f"a worm on a {arena.kind}"
         raise RunFileError(f"{run.path} holds {where}, and so no passage of a pipe")
     return passage_through(arena, track_of(run))
 
 
-def passage_through(pipe: Pipe, track: Track) -> Passage:
+def passage_through(pipe: ArenaKind, track: Track) -> Passage:
     """Reads a worm's way through a pipe from its track."""
+    centre_line, bore, reach_m = pipe.centre_line(), pipe.bore(), pipe.reach_m()
+    assert centre_line is not None
+    assert bore is not None
+    assert reach_m is not None
     planes = track.crossing_m.reshape(len(track.time_s), -1, track.n_per_plane, 3)
     centres = planes[:, list(track.ring_planes)].mean(axis=2)
-    arc = course_of(pipe).nearest(centres).arc_m
-    return Passage(track.time_s, arc, bore_of(pipe).at(arc)[0], reach_of(pipe))
-
-
-def reach_of(pipe: Pipe) -> tuple[float, float]:
-    """Arc lengths between which a pipe bends or changes its bore, m; both 0 for a plain straight one."""
-    joints = course_of(pipe).joints_m
-    parts = [(joints[0], joints[-1])] if joints else []
-    if pipe.profile != "even":
-        parts.append((pipe.profile_start_m, pipe.profile_start_m + pipe.profile_length_m))
-    return (min(first for first, _ in parts), max(last for _, last in parts)) if parts else (0.0, 0.0)
+    arc = centre_line.nearest(centres).arc_m
+    return Passage(track.time_s, arc, bore.at(arc)[0], reach_m)

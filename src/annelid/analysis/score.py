@@ -19,7 +19,7 @@ from annelid.analysis.rhythm import (
     segment_intervals,
     startup_end,
 )
-from annelid.config import SnsController
+from annelid.control.sns import paper_controller
 from annelid.protocols import Array
 
 if TYPE_CHECKING:
@@ -104,8 +104,8 @@ def rhythm_score(run: Run, after_s: float = 0.0) -> RhythmScore:
         ValueError: The run file holds no activation.
     """
     times, judged = _judged(run, "activation", after_s)
-    controller = run.config.controller
-    gate_ms = controller.gate_time_constant_ms if isinstance(controller, SnsController) else _DESIGN_GATE_MS
+    network = paper_controller(run.config.controller)
+    gate_ms = network.gate_time_constant_ms if network is not None else _DESIGN_GATE_MS
     activation = segment_activation(run.data["activation"].values, run.config.body.n_segments)
     return score(times, activation[judged], DESIGN_INTERVAL_S * gate_ms / _DESIGN_GATE_MS)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.morphology import heading_turn
 from annelid.protocols import Array
 

@@ -10,15 +10,17 @@ ground (docs/arenas.md).
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
-from annelid.config import Arena, Floor
+from annelid.config.arena import ArenaKind, Walls
+from annelid.protocols import Array
 
 PLANE_HALF_SIZE_M = 0.01
 """Of a moving plane as drawn; the engine's planes have no end."""
 HIDDEN_GROUP = 4
 
 
-def contact_options(arena: Arena) -> dict[str, list[float]]:
+def contact_options(arena: ArenaKind) -> dict[str, list[float]]:
     """Contact attributes that worm and floor share, so that neither dilutes the other's."""
     return {
         "friction": [arena.friction, 0.005, 0.0001],
@@ -27,9 +29,9 @@ def contact_options(arena: Arena) -> dict[str, list[float]]:
     }
 
 
-def has_moving_planes(arena: Arena) -> bool:
+def has_moving_planes(arena: ArenaKind) -> bool:
     """Tells whether the skin feels the ground through planes that move with it, not through a plane of the engine."""
-    return type(arena) is not Floor or arena.has_setae
+    return not arena.is_plane or arena.has_setae
 
 
 def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
@@ -45,7 +47,7 @@ def plane_name(skin: str) -> str:
     return f"ground_of_{skin}"
 
 
-def add_moving_planes(spec: mujoco.MjSpec, arena: Arena) -> None:
+def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
     """Adds one plane on a mocap body for every geom that can touch the ground, and pairs the two.
 
     Args:
@@ -54,7 +56,7 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: Arena) -> None:
     """
     options = contact_options(arena)
     slide, spin, roll = options.pop("friction")
-    walls = isinstance(arena, Floor) and arena.has_walls
+    walls = arena.walls != Walls()
     for geom in touching(spec):
         name = plane_name(geom.name)
         holder = spec.worldbody.add_body(name=name, mocap=True)
@@ -86,3 +88,25 @@ def set_friction(model: mujoco.MjModel, friction: float) -> None:
     """
     model.geom_friction[(model.geom_contype != 0) | (model.geom_conaffinity != 0), 0] = friction
     model.pair_friction[:, :2] = friction
+
+
+def add_box(spec: mujoco.MjSpec, arena: ArenaKind, place_m: Array, half_size_m: list[float], axes: Array) -> None:
+    """Adds a box that can be touched and is not drawn, to hold a worm in plain MuJoCo.
+
+    Args:
+        spec: The worm's spec.
+        arena: Contact settings.
+        place_m: Its middle, m, ``(3,)``.
+        half_size_m: Half of its three edges, m.
+        axes: Its axes as columns, ``(3, 3)``.
+    """
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=place_m,
+        quat=quaternion,
+        size=half_size_m,
+        group=HIDDEN_GROUP,
+        **contact_options(arena),
+    )

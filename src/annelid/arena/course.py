@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, inf, pi, radians, sin
+from math import inf, pi
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Pipe
 from annelid.protocols import Array
 
 AHEAD, LEFT, UP = (np.array(axis, dtype=float) for axis in ((-1, 0, 0), (0, -1, 0), (0, 0, 1)))
 """Directions of the worm at the start: it leads towards -x, its left is -y."""
-ENTRY_RAMP_M = 0.1
-"""Length over which the entry's clearance ends, from the worm's front on."""
-ROUNDING_M = 0.02
-"""Length over which the bore's slope changes where a taper begins or ends."""
 HELIX_STEPS = 8
 """Newton steps to the nearest point of a helix; quadratic, so that four would do near the pipe."""
 
@@ -185,31 +180,6 @@ def _chosen(feet: Sequence[Foot], piece: NDArray[np.intp]) -> Foot:
     return Foot(*chosen)
 
 
-def course_of(pipe: Pipe) -> Course:
-    """Returns a pipe's centre line in the coordinates of the worm's model; arc lengths count from the worm's front."""
-    start = pipe.bore_m * UP
-    if pipe.course == "straight":
-        return Course((Straight(start, AHEAD, -inf, inf),), ())
-    turn = radians(pipe.turn_deg)
-    rise = pipe.pitch_m / (2 * pi) if pipe.course == "helix" else 0.0
-    curve = _curve(start + pipe.straight_m * AHEAD, AHEAD, UP, pipe.radius_m, rise, turn, pipe.straight_m)
-    pieces: list[Straight | Curve] = [Straight(start, AHEAD, -inf, pipe.straight_m), curve]
-    if pipe.course == "s":
-        end = curve.at(np.array(curve.last_m))
-        pieces.append(_curve(end.point_m, end.tangent, UP, pipe.radius_m, 0.0, -turn, curve.last_m))
-    last = pieces[-1].at(np.array(pieces[-1].last_m))
-    pieces.append(Straight(last.point_m, last.tangent, pieces[-1].last_m, inf))
-    return Course(tuple(pieces), tuple(piece.last_m for piece in pieces[:-1]))
-
-
-def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, turn_rad: float, arc_m: float) -> Curve:
-    """Joins a curve smoothly to what ends at a point; the axis of a helix leans so far that its start is level."""
-    outwards = np.sign(turn_rad) * np.cross(tangent, up)
-    lean = atan2(rise, radius)
-    onwards, axis = cos(lean) * tangent - sin(lean) * up, sin(lean) * tangent + cos(lean) * up
-    return Curve(start - radius * outwards, outwards, onwards, axis, radius, rise, abs(turn_rad), arc_m)
-
-
 @dataclass(frozen=True)
 class Bore:
     """The radius of a pipe along its centre line: parabolas that join smoothly, constant beyond the ends.
@@ -230,34 +200,3 @@ class Bore:
         knot = np.clip(np.searchsorted(self.arc_m, inside) - 1, 0, len(self.arc_m) - 2)
         slope = np.interp(inside, self.arc_m, self.slope)
         return self.radius_m[knot] + (inside - self.arc_m[knot]) * (self.slope[knot] + slope) / 2, slope
-
-
-def bore_of(pipe: Pipe) -> Bore:
-    """Returns a pipe's bore: wider at the entry by the clearance, then as the profile says."""
-    parts = [_ramp(0.0, ENTRY_RAMP_M, -pipe.entry_clearance_m)]
-    change = pipe.narrowest_m - pipe.bore_m
-    if pipe.profile == "taper":
-        parts.append(_ramp(pipe.profile_start_m, pipe.profile_length_m, change))
-    if pipe.profile == "hourglass":
-        parts.append(_waist(pipe.profile_start_m, pipe.profile_length_m, change))
-    arc = np.unique(np.concatenate([knots for knots, _ in parts]))
-    slope = sum((np.interp(arc, *part, left=0.0, right=0.0) for part in parts), np.zeros(len(arc)))
-    rises = np.diff(arc) * (slope[1:] + slope[:-1]) / 2
-    radius = pipe.bore_m + pipe.entry_clearance_m + np.concatenate([[0.0], np.cumsum(rises)])
-    return Bore(arc, slope, radius)
-
-
-def _ramp(start: float, length: float, change: float) -> tuple[Array, Array]:
-    """Arc lengths and slopes of an even change of the radius with rounded ends."""
-    rounding = min(ROUNDING_M, length / 4)
-    slope = change / (length - rounding)
-    knots = np.array([start, start + rounding, start + length - rounding, start + length])
-    return knots, np.array([0.0, slope, slope, 0.0])
-
-
-def _waist(start: float, length: float, change: float) -> tuple[Array, Array]:
-    """Arc lengths and slopes of a parabolic waist with rounded ends, narrowest midway."""
-    rounding = min(ROUNDING_M, length / 4)
-    slope = 4.0 * change / length
-    knots = np.array([start, start + rounding, start + length - rounding, start + length])
-    return knots, np.array([0.0, slope, -slope, 0.0])

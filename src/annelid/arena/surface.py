@@ -9,9 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.course import UP, Bore, Course, bore_of, course_of
-from annelid.arena.relief import RoughGround, StepProfile
-from annelid.config import Arena, Floor, Pipe, Rough, Steps
+from annelid.config.arena import ArenaKind, Walls
 from annelid.protocols import Array
 
 SETTLED = 1e-10
@@ -55,7 +53,7 @@ class Surface(Protocol):
         ...
 
 
-class _Nearest(ABC):
+class Nearest(ABC):
     """A surface that finds distance and normal at once."""
 
     @abstractmethod
@@ -72,7 +70,7 @@ class _Nearest(ABC):
 
 
 @dataclass(frozen=True)
-class Plane(_Nearest):
+class Plane(Nearest):
     """An even surface.
 
     Attributes:
@@ -89,7 +87,7 @@ class Plane(_Nearest):
 
 
 @dataclass(frozen=True)
-class Round(_Nearest):
+class Round(Nearest):
     """An upright post without an upper end.
 
     Attributes:
@@ -103,13 +101,13 @@ class Round(_Nearest):
     def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Returns distances from it, m, and directions away from its axis."""
         away = points_m[..., :2] - self.axis_m
-        distance = _lengths(away)
+        distance = lengths(away)
         outwards = away / np.maximum(distance, 1e-12)[..., np.newaxis]
         return distance - self.radius_m, np.concatenate([outwards, np.zeros((*distance.shape, 1))], axis=-1)
 
 
 @dataclass(frozen=True)
-class Between(_Nearest):
+class Between(Nearest):
     """Free space within several surfaces, as a floor, two rails and posts.
 
     Attributes:
@@ -140,7 +138,7 @@ class Level(NamedTuple):
     is_distance: NDArray[np.bool_]
 
 
-class _Implicit(_Nearest):
+class Implicit(Nearest):
     """A surface known by a function that is positive in free space and zero on it."""
 
     @abstractmethod
@@ -151,7 +149,7 @@ class _Implicit(_Nearest):
         """Follows the normal from the point to the surface and takes the normal found there, until both agree."""
         points = points_m.reshape(-1, 3)
         value, gradient, done = self.level(points)
-        size = _lengths(gradient)
+        size = lengths(gradient)
         distance, normal = value / size, gradient / size[:, np.newaxis]
         open_ = np.flatnonzero(~done & (not first_order))
         for _ in range(MOST_ROUNDS):
@@ -160,7 +158,7 @@ class _Implicit(_Nearest):
             along = normal[open_]
             value, gradient, _ = self.level(points[open_] - distance[open_, np.newaxis] * along)
             change = value / (gradient * along).sum(axis=-1)
-            turned = gradient / _lengths(gradient)[:, np.newaxis]
+            turned = gradient / lengths(gradient)[:, np.newaxis]
             moved = (np.abs(change) > SETTLED) | (np.abs(turned - along).max(axis=-1) > SETTLED)
             distance[open_] += change
             normal[open_] = turned
@@ -168,98 +166,21 @@ class _Implicit(_Nearest):
         return distance.reshape(points_m.shape[:-1]), normal.reshape(points_m.shape)
 
 
-@dataclass(frozen=True)
-class PipeWall(_Implicit):
-    """The inside of a pipe.
-
-    Attributes:
-        course: Its centre line.
-        bore: Its radius along it.
-    """
-
-    course: Course
-    bore: Bore
-
-    def level(self, points_m: Array) -> Level:
-        """Returns how far points lie within the bore's radius at the nearest point of the centre line, m."""
-        foot = self.course.nearest(points_m)
-        away = points_m - foot.point_m
-        radial = _lengths(away)
-        on_line = radial == 0.0
-        outwards = np.where(on_line[:, np.newaxis], UP, away / np.where(on_line, 1.0, radial)[:, np.newaxis])
-        radius, slope = self.bore.at(foot.arc_m)
-        # The centre line's arc length grows faster than the way on the inner side of a curve.
-        stretch = np.maximum(1.0 - (away * foot.curvature_per_m).sum(axis=-1), 0.1)
-        gradient = (slope / stretch)[:, np.newaxis] * foot.tangent - outwards
-        return Level(radius - radial, gradient, slope == 0.0)
-
-
-@dataclass(frozen=True)
-class Hills(_Implicit):
-    """Rough ground.
-
-    Attributes:
-        ground: Its height.
-        level_m: Height z of the level ground before it, m.
-    """
-
-    ground: RoughGround
-    level_m: float
-
-    def level(self, points_m: Array) -> Level:
-        """Returns heights above the ground straight below, m."""
-        height, slope = self.ground.height(points_m[:, :2])
-        gradient = np.concatenate([-slope, np.ones((len(slope), 1))], axis=-1)
-        return Level(points_m[:, 2] - self.level_m - height, gradient, np.zeros(len(height), dtype=bool))
-
-
-@dataclass(frozen=True)
-class Stairs(_Nearest):
-    """A flight of steps with rounded edges.
-
-    Attributes:
-        profile: Its side view.
-        level_m: Height z of the level ground before it, m.
-    """
-
-    profile: StepProfile
-    level_m: float
-
-    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns distance and normal of the nearest tread, riser or rounding."""
-        distance, ahead, up = self.profile.nearest(-points_m[..., 0], points_m[..., 2] - self.level_m)
-        return distance, np.stack([-ahead, np.zeros(ahead.shape), up], axis=-1)
-
-
-def _lengths(vectors: Array) -> Array:
+def lengths(vectors: Array) -> Array:
+    """Returns the lengths of vectors, ``(..., 3)``."""
     return np.sqrt((vectors * vectors).sum(axis=-1))
 
 
-def ground_of(arena: Arena) -> Surface:
-    """Returns the surface of an arena without its guard rails and posts."""
-    if isinstance(arena, Pipe):
-        return PipeWall(course_of(arena), bore_of(arena))
-    assert isinstance(arena, Floor)
-    level = -arena.floor_gap_m
-    if isinstance(arena, Steps):
-        return Stairs(StepProfile(arena.start_m, arena.step_length_m, arena.step_height_m, arena.rounding_m), level)
-    if isinstance(arena, Rough):
-        return Hills(RoughGround.drawn(arena), level)
-    return Plane(UP, level)
-
-
-def walls_of(arena: Arena) -> tuple[Surface, ...]:
-    """Returns what stands upright in an arena: the left and the right guard rail, and the posts."""
-    if not isinstance(arena, Floor):
-        return ()
-    posts = tuple(Round(np.array([x, y]), radius) for x, y, radius in arena.posts or ())
-    if arena.rail_gap_m is None:
+def walls_of(walls: Walls) -> tuple[Surface, ...]:
+    """Returns the surfaces of what stands upright: the left and the right guard rail, and the posts."""
+    posts = tuple(Round(np.array([x, y]), radius) for x, y, radius in walls.posts)
+    if walls.rail_gap_m is None:
         return posts
     side = np.array([0.0, 1.0, 0.0])
-    return Plane(side, -arena.rail_gap_m / 2), Plane(-side, -arena.rail_gap_m / 2), *posts
+    return Plane(side, -walls.rail_gap_m / 2), Plane(-side, -walls.rail_gap_m / 2), *posts
 
 
-def surface_of(arena: Arena) -> Surface:
+def surface_of(arena: ArenaKind) -> Surface:
     """Returns the surface of a configured arena, in the coordinates of the worm's model (lowest line at z = 0)."""
-    ground, walls = ground_of(arena), walls_of(arena)
+    ground, walls = arena.ground(), walls_of(arena.walls)
     return Between((ground, *walls)) if walls else ground

@@ -1,15 +1,42 @@
-"""The 3D worm as a MuJoCo spec, in two formulations.
+"""The 3D worm: its sections, and its MuJoCo spec.
 
-`build_spec` is the one way in, and `compile_spec` makes the engine's model of it. The formulations (`rods`, `chain`)
-build the mesh with a site at every crossing; springs and ring muscles between those sites (`actuation`) are the same
-for both. `elimination` orders the engine's factor along the tube.
+`build_spec` is the one way to the engine, and `compile_spec` makes the engine's model of it. Kinds of formulation
+(`formulations`) build the mesh with a site at every crossing; springs and ring actuators (`actuators`) between those
+sites are the same for all. `elimination` orders the engine's factor along the tube. The sections (`worm`) are read
+without the engine, which is loaded on first use of the names below.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from annelid.engine import refuse_mixed_engine
+
+if TYPE_CHECKING:
+    from annelid.body.actuators import ActuatorKind
+    from annelid.body.assemble import build_spec, compile_spec, mesh_of
+    from annelid.body.formulations import FormulationKind
+    from annelid.body.formulations.rods import Rods
+    from annelid.body.worm import WormBody
 
 # Every use of the engine begins here, and a mixed one fails in ways that tell nothing.
 refuse_mixed_engine()
 
-from annelid.body.assemble import build_spec, compile_spec, mesh_of  # noqa: E402
+_HOME = {
+    "ActuatorKind": "actuators",
+    "FormulationKind": "formulations",
+    "Rods": "formulations.rods",
+    "WormBody": "worm",
+    "build_spec": "assemble",
+    "compile_spec": "assemble",
+    "mesh_of": "assemble",
+}
 
-__all__ = ["build_spec", "compile_spec", "mesh_of"]
+__all__ = ["ActuatorKind", "FormulationKind", "Rods", "WormBody", "build_spec", "compile_spec", "mesh_of"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'annelid.body' has no attribute {name!r}")
+    return getattr(import_module(f"annelid.body.{_HOME[name]}"), name)

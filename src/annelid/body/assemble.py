@@ -11,11 +11,10 @@ from annelid.arena.contact import add_moving_planes, has_moving_planes
 from annelid.arena.gravity import gravity_of
 from annelid.arena.scenery import add_scenery, add_walls
 from annelid.body.actuation import add_ring_actuators, add_springs
-from annelid.body.chain import add_chains
 from annelid.body.elimination import order_elimination
 from annelid.body.friction import add_joint_friction
-from annelid.body.rods import add_rods
-from annelid.config import Chain, Mesh, RunConfig, WormBody
+from annelid.body.worm import Mesh, WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh
 
@@ -80,10 +79,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{arena.friction_cone.upper()}")
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
-    if isinstance(body.formulation, Chain):
-        add_chains(spec, geometry, body, body.formulation, arena, vertices_touch=laid)
-    else:
-        add_rods(spec, geometry, body, body.formulation, arena, dampers=for_plant)
+    body.formulation.add(spec, geometry, body, arena, for_plant=for_plant, vertices_touch=laid)
     add_springs(spec, geometry, body.springs)
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:

@@ -20,7 +20,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from annelid.config import Strands
+from annelid.body.worm import Strands
 from annelid.morphology import Array
 
 AXES = "xyz"

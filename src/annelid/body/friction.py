@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from annelid.body.actuation import crossing_site
-from annelid.config import Joints
+from annelid.body.worm import Joints
 from annelid.morphology import MeshGeometry
 
 STICTION_IMPEDANCE = [0.9999, 0.9999, 0.001, 0.5, 2.0]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.assemble import build_spec, compile_spec
-from annelid.config import RunConfig, ServoRings, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -67,9 +68,9 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Keyframe] = ()) -> str:
             f"body.heading_deg = {config.body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
             "frames of turned rods: set it to 0, or run the worm with annelid"
         )
-    if isinstance(config.body.rings, ServoRings):
-        paid_out = np.array([actuator.actrange[1] for actuator in spec.actuators])
-        keyframes = (Keyframe(REST, act=paid_out), *keyframes)
+    at_rest = config.body.rings.act_at_rest(spec)
+    if len(at_rest):
+        keyframes = (Keyframe(REST, act=at_rest), *keyframes)
     for keyframe in keyframes:
         state = {name: value for name, value in asdict(keyframe).items() if name == "time" or len(value)}
         spec.add_key(**state)

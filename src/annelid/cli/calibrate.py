@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `calibrate`."""
 
 from __future__ import annotations
@@ -8,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.common import RIGID_PRESET, Assignments, Force, NamedPreset, config_of, overrides_of, refuse_existing
+from annelid.cli.common import (
+    RIGID_PRESET,
+    Assignments,
+    Force,
+    NamedPreset,
+    Quiet,
+    config_of,
+    overrides_of,
+    print_results,
+    refuse_existing,
+)
 from annelid.cli.entry import lock
 
 
@@ -25,7 +34,7 @@ def calibrate_command(
     data: Annotated[
         Path | None, typer.Option("--data", help="Measured loop to fit.  [default: the one of annelid]")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")] = False,
+    quiet: Quiet = False,
     force: Force = False,
 ) -> None:
     """Fit the rod worm to a measured load-frame loop.
@@ -53,7 +62,6 @@ def calibrate_command(
     from annelid.experiment.calibration.loop import read_loop
     from annelid.experiment.calibration.report import EQUAL_STIFFNESS, fit_tables, write_calibration
     from annelid.experiment.progress import study_progress
-    from annelid.terminal import Console
 
     report = output / "calibration.json"
     lock(output)
@@ -70,12 +78,9 @@ def calibrate_command(
             if progress is None
             else lambda loops, rms: progress(f"calibrating, {rms:.2f} N off after {loops} loops", 0, 0, 0.0),
         )
-    if not quiet:
-        for table in fit_tables(fit):
-            Console().print(table)
     loops = {
         "fitted": (fit.simulated.displacement_m, fit.simulated.force_N),
         "measured": (measured.displacement_m, measured.force_N),
     }
-    for path in (*write_calibration(fit, source, changes, report), load_frame_figure(loops, report.with_suffix(""))):
-        typer.echo(path)
+    written = *write_calibration(fit, source, changes, report), load_frame_figure(loops, report.with_suffix(""))
+    print_results(written, *fit_tables(fit), quiet=quiet)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import os
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from annelid.cli.entry import complain
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock, typed_command
 from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from annelid.config import RunConfig
+    from annelid.experiment.progress import StudyProgress
+    from annelid.experiment.store import Store
     from annelid.experiment.workers import Workers
     from annelid.simulation.runfile import Run
 
@@ -64,20 +69,69 @@ ClusterName = Annotated[
         " a Dask scheduler, or a TOML file with a table [cluster]: name only what you trust  [default: processes]",
     ),
 ]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
 
 
-def workers_for(cluster: str | None, jobs: int | None) -> AbstractContextManager[Workers | None]:
-    """Gives the workers of a cluster that the user names; None, for processes of this machine, where none is named.
+@contextmanager
+def study_runs(
+    output: Path, *, jobs: int | None, cluster: str | None, quiet: bool
+) -> Iterator[tuple[Workers | None, StudyProgress | None]]:
+    """Gives the workers of a study and its progress display, and keeps other writers out of its folder.
+
+    The workers are None, for processes of this machine, where no cluster is named.
+
+    Args:
+        output: Folder of the results; runs are kept in ``runs`` below it.
+        jobs: As the user gave it.
+        cluster: As the user gave it.
+        quiet: Without progress.
 
     Raises:
-        ConfigError: It names no cluster.
+        ConfigError: The folder is a file, or there is no such cluster.
+        RunFileError: Another process writes there.
+        typer.Exit: The user has interrupted it.
     """
     from annelid.config import find_cluster
     from annelid.experiment.cluster import workers_of
+    from annelid.experiment.progress import study_progress
 
-    return nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
+    lock(output)
+    named = nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
+    with going_on(output / "runs"), named as workers, study_progress(quiet=quiet) as progress:
+        yield workers, progress
+
+
+@contextmanager
+def kept_runs(
+    output: Path, *, jobs: int | None, cluster: str | None, quiet: bool
+) -> Iterator[tuple[Store, StudyProgress | None]]:
+    """Gives the store of a study's runs and its progress display, otherwise as `study_runs`."""
+    from annelid.experiment.store import Store
+
+    with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
+        yield Store(output / "runs", workers), progress
+
+
+@contextmanager
+def going_on(folder: Path, *further: str, kept: str = "finished runs are kept") -> Iterator[None]:
+    """Tells on Ctrl-C what is kept, and the command that goes on: the one that was given.
+
+    Args:
+        folder: Where it is kept.
+        further: Words that the command needs beside those that were given.
+        kept: What is kept.
+
+    Raises:
+        typer.Exit: The user has interrupted it.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        complain(f"interrupted: {kept} in {folder}; go on with: {typed_command(*further)}")
+        raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
@@ -115,14 +169,14 @@ def config_of(
     Raises:
         ConfigError: There is no such preset, file, level of fidelity or arena, or a value is out of range.
     """
-    from annelid.config import PlanarWorm, load_config
+    from annelid.config import load_config
 
     options = {"--segments": segments, "--fidelity": fidelity, "--uncertainty": uncertainty}
     refitting = [option for option, value in options.items() if value is not None]
     # An empty name, as from an unset variable of a shell, must not pass for none.
     source = (RIGID_PRESET if refitting else FIRST_PRESET) if preset is None else preset
     if segments is not None:
-        planar = isinstance(load_config(source).body, PlanarWorm)
+        planar = load_config(source).body.is_planar
         overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
     config = load_config(source, overrides, fidelity=fidelity, arena=arena)
     if preset is None and refitting:
@@ -147,6 +201,16 @@ def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
         raise RunFileError(f"{path} cannot be written: there is no folder {written}")
     if not os.access(written, os.W_OK):
         raise RunFileError(f"{path} cannot be written: {written} does not allow it")
+
+
+def print_results(paths: Iterable[object], *tables: Table, quiet: bool) -> None:
+    """Prints the tables of a study unless it is to be quiet, and the paths of its files."""
+    from annelid.terminal import Console
+
+    for table in () if quiet else tables:
+        Console().print(table)
+    for path in paths:
+        typer.echo(path)
 
 
 def print_table(run: Run) -> None:

@@ -1,12 +1,13 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The application that the commands join: how it starts, and how an error ends it."""
 
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from contextvars import ContextVar
 from io import TextIOWrapper
@@ -37,6 +38,8 @@ EXIT_INTERRUPTED = 130
 
 
 _locks: ContextVar[ExitStack] = ContextVar("_locks")
+_typed: ContextVar[tuple[str, ...]] = ContextVar("_typed", default=())
+"""The command and the words after it, as the user gave them."""
 
 
 class _Sentences(TyperGroup):
@@ -104,6 +107,7 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Reads the options, and refuses infinite ones and those that are not a number."""
+        _typed.set((*ctx.command_path.split()[1:], *args))
         rest = super().parse_args(ctx, args)
         for parameter in self.params:
             value = ctx.params.get(parameter.name)
@@ -112,6 +116,14 @@ class Command(TyperCommand):
                     f"{value} is not a finite number.", ctx=ctx, param_hint=f"'{parameter.opts[0]}'"
                 )
         return rest
+
+
+experiment = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm.")
+
+
+def study(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Returns a decorator that makes a function the command `annelid experiment NAME`, its parameters as Typer's."""
+    return experiment.command(name, cls=Command)
 
 
 app = typer.Typer(
@@ -203,6 +215,11 @@ def end_study(n_runs: int, failed: int, reasons: object, *, stopped: int = 0) ->
     counts = [f"{n} {what}" for n, what in ((failed, "failed"), (stopped, "were stopped by a guard")) if n]
     complain(f"of {n_runs} runs {' and '.join(counts)}: the reasons are in {reasons}")
     raise typer.Exit(EXIT_ALL_FAILED if failed == n_runs else EXIT_SOME_FAILED if failed else EXIT_STOPPED)
+
+
+def typed_command(*further: str) -> str:
+    """Returns the command line that the user gave, with further words."""
+    return shlex.join(["annelid", *_typed.get(), *further])
 
 
 def _complain_of_warning(message: Warning | str, *_: object, **__: object) -> None:

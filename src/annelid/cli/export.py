@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `export`."""
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ def export_command(
     \b
     csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
     mat      one MATLAB file: a variable for each signal; structs with units, labels and the configuration
-    parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]', as for mat)
+    parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
     mp4 gif  a video; annelid render has camera, speed and frame rate
     html     one page that needs nothing else: numbers, figures, configuration, what to cite
     mjcf     the model for plain MuJoCo, the last state as a keyframe

@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The commands on a finished run: `show`, `plot` and `render`."""
 
 from __future__ import annotations
@@ -69,21 +68,18 @@ def plot(
     annelid plot runs/riddle2023-001 -o figure7.pdf
     annelid plot runs/riddle2025-001 --figure track
     """
-    from annelid.draw.figures.track import track_figure
-    from annelid.draw.plots import figure7, plot_path
-    from annelid.errors import RunFileError, suggest
+    from annelid.draw.figures import RUN_FIGURES
+    from annelid.draw.plots import plot_path
     from annelid.simulation.runfile import open_run
 
-    figures = {"figure7": figure7, "track": track_figure}
-    if figure not in figures:
-        raise RunFileError(f"unknown figure {figure!r}: {suggest(figure, figures)}")
+    draw = RUN_FIGURES.find(figure)
     opened = open_run(run)
     if output is None:
         target = opened.path.parent / f"{figure}.png"
     else:
         target = plot_path(output)
         refuse_existing(target, force)
-    typer.echo(figures[figure](opened, target))
+    typer.echo(draw(opened, target))
 
 
 def render(

@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `run`."""
 
 from __future__ import annotations
@@ -7,7 +6,7 @@ import os
 import re
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,15 +17,17 @@ from annelid.cli.common import (
     Preset,
     Segments,
     config_of,
+    going_on,
     overrides_of,
+    print_results,
     print_table,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
-from annelid.cli.uncertainty import command_words, report_error_bars, run_with_error_bars
-from annelid.errors import SimulationStopped
+from annelid.errors import ConfigError, SimulationStopped
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
+    from annelid.experiment.uncertainty import Uncertainty
 
 
 def run_command(
@@ -99,6 +100,7 @@ def run_command(
     annelid run riddle2023-rods --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
     annelid run riddle2023-rods --uncertainty 8 --uncertainty-from calibration/calibration.json
     """
+    from annelid.config import load_config
     from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
@@ -113,28 +115,20 @@ def run_command(
     if resume is None:
         config = config_of(preset, overrides, segments, fidelity, arena, uncertainty)
     elif (preset, segments, fidelity, arena) == (None, None, None, None):
-        config = _config_to_continue(resume, overrides)
+        config = load_config(open_run(resume).config.model_dump(), overrides)
     else:
         raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments, --fidelity or --arena")
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
     folder = _locked_folder(out, config.name)
+    result = None
     try:
         if uncertainty is None:
-            result = None
             done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
         else:
-            result = run_with_error_bars(
-                config,
-                uncertainty,
-                folder,
-                source=uncertainty_from,
-                vary=vary,
-                jobs=jobs,
-                overwrite=force,
-                quiet=quiet,
-                given=command_words(preset, assignments, segments, fidelity, arena, duration, seed),
-            )
+            errors = _errors(vary)
+            with going_on(folder, *(["--out", str(folder)] if out is None else [])):
+                result = _run_with_error_bars(config, uncertainty, folder, uncertainty_from, errors, jobs, force, quiet)
             done = open_run(folder)
     except SimulationStopped as stop:
         raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
@@ -145,7 +139,9 @@ def run_command(
         raise typer.Exit(EXIT_INTERRUPTED)
     typer.echo(done.path)
     if result is not None:
-        report_error_bars(result, quiet=quiet)
+        from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
+
+        print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
     for path in draw_all(done, folder, video=video, quiet=quiet, complain=complain):
         typer.echo(path)
     if result is not None:
@@ -153,11 +149,40 @@ def run_command(
         end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
 
 
-def _config_to_continue(path: Path, overrides: dict[str, Any]) -> RunConfig:
-    from annelid.config import load_config
-    from annelid.simulation.runfile import open_run
+def _run_with_error_bars(
+    config: RunConfig,
+    n: int,
+    folder: Path,
+    source: Path | None,
+    errors: dict[str, float],
+    jobs: int | None,
+    overwrite: bool,
+    quiet: bool,
+) -> Uncertainty:
+    """Runs a worm and its variants behind one progress bar, as `annelid.experiment.uncertainty.uncertainty` does."""
+    from annelid.experiment.progress import in_stage, study_progress
+    from annelid.experiment.uncertainty import read_spread, uncertainty
 
-    return load_config(open_run(path).config.model_dump(), overrides)
+    spread = read_spread(source).but(errors)
+    with study_progress(quiet=quiet) as progress:
+        told = in_stage(progress, "error bars")
+        return uncertainty(config, n, folder, spread=spread, jobs=jobs, overwrite=overwrite, progress=told)
+
+
+def _errors(vary: list[str] | None) -> dict[str, float]:
+    """Reads relative errors, each ``PARAMETER=ERROR``.
+
+    Raises:
+        ConfigError: One is no number.
+    """
+    from annelid.config import parse_assignments
+
+    errors: dict[str, float] = {}
+    for name, value in parse_assignments(vary or []).items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ConfigError(f"--vary {name}={value}: the relative error must be a number, for example {name}=0.1")
+        errors[name] = float(value)
+    return errors
 
 
 def _locked_folder(out: Path | None, name: str) -> Path:

@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `sweep`."""
 
 from __future__ import annotations
@@ -9,15 +8,15 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.common import ClusterName, Jobs
-from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
+from annelid.cli.common import ClusterName, Jobs, Output, Quiet, going_on, print_results
+from annelid.cli.entry import end_study, lock
 
 
 def sweep_command(
     study: Annotated[
         Path | None, typer.Argument(metavar="STUDY.toml", help="What is varied, and how; --example prints one.")
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("sweep"),
+    output: Output = Path("sweep"),
     cluster: ClusterName = None,
     jobs: Jobs = None,
     samples: Annotated[
@@ -25,7 +24,7 @@ def sweep_command(
         typer.Option("--samples", min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]"),
     ] = None,
     example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Vary fields over a grid or in samples, on this machine or on a cluster.
 
@@ -57,28 +56,16 @@ def sweep_command(
     from annelid.experiment.sweep import swept
     from annelid.experiment.sweep.dataset import dataset_of
     from annelid.experiment.sweep.results import results_table, write_results
-    from annelid.terminal import Console
 
     loaded = load_study(study)
     if samples is not None:
         loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
     lock(output)
-    try:
-        with study_progress(quiet=quiet) as progress:
-            to_use = f"add --cluster {shlex.quote(str(study))}"
-            done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
-    except KeyboardInterrupt:
-        words = ["annelid", "sweep", str(study), "-o", str(output)]
-        words += [] if cluster is None else ["--cluster", cluster]
-        words += [] if jobs is None else ["--jobs", str(jobs)]
-        words += [] if samples is None else ["--samples", str(samples)]
-        complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {shlex.join(words)}")
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+    with going_on(output / "runs"), study_progress(quiet=quiet) as progress:
+        to_use = f"add --cluster {shlex.quote(str(study))}"
+        done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
     data = dataset_of(done)
     written = write_results(done, data)
-    if not quiet:
-        Console().print(results_table(done, data))
-    for path in written:
-        typer.echo(path)
+    print_results(written, results_table(done, data), quiet=quiet)
     failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
     end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)

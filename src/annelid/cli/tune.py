@@ -1,21 +1,30 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `tune`."""
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from annelid.cli.common import RIGID_PRESET, Assignments, ClusterName, Jobs, NamedPreset, overrides_of, workers_for
-from annelid.cli.entry import EXIT_ALL_FAILED, EXIT_INTERRUPTED, complain, end_study, lock
+from annelid.cli.common import (
+    RIGID_PRESET,
+    Assignments,
+    ClusterName,
+    Jobs,
+    NamedPreset,
+    Output,
+    Quiet,
+    kept_runs,
+    overrides_of,
+    print_results,
+)
+from annelid.cli.entry import EXIT_ALL_FAILED, complain, end_study, typed_command
 
 
 def tune_command(
     preset: NamedPreset = RIGID_PRESET,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")] = Path("tune"),
+    output: Output = Path("tune"),
     objective: Annotated[
         list[str] | None,
         typer.Option(
@@ -41,7 +50,7 @@ def tune_command(
     seed: Annotated[int, typer.Option("--seed", min=0, max=2**32 - 1, help="Of the optimiser.")] = 0,
     jobs: Jobs = None,
     cluster: ClusterName = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Search for a faster, cheaper or less slipping gait.
 
@@ -60,43 +69,25 @@ def tune_command(
     annelid run tune/best.toml
     """
     from annelid.experiment.case import Case
-    from annelid.experiment.progress import study_progress
-    from annelid.experiment.store import Store
     from annelid.experiment.tune.judge import objectives_of
     from annelid.experiment.tune.results import HISTORY, chosen, results_table, write_results
     from annelid.experiment.tune.search import Task, Trial, search
     from annelid.experiment.tune.space import variables_of
     from annelid.plausibility import refuse_nonsense
-    from annelid.terminal import Console
 
-    lock(output)
-    source, changes = preset, overrides_of(assignments, duration_s=duration)
-    objectives = objectives_of(objective or ["speed"])
-    base = Case(source, changes).config
+    changes, objectives = overrides_of(assignments, duration_s=duration), objectives_of(objective or ["speed"])
+    base = Case(preset, changes).config
     for doubt in refuse_nonsense(base):
         complain(f"warning: {doubt}")
     variables = variables_of(vary or [], base)
-    task = Task(source, changes, variables, objectives, trials, seed)
-    words = ["annelid", "tune", source, *(f"--objective={one.name}" for one in objectives)]
-    words += [word for text in vary or [] for word in ("--vary", text)]
-    words += [word for text in assignments or [] for word in ("--set", text)]
-    words += [*([f"--duration={duration:g}"] if duration is not None else []), f"--trials={trials}", f"--seed={seed}"]
+    task = Task(preset, changes, variables, objectives, trials, seed)
     found: list[Trial] = []
     written: list[Path] = []
-    try:
-        with workers_for(cluster, jobs) as workers, study_progress(quiet=quiet) as progress:
-            for generation in search(task, Store(output / "runs", workers), jobs=jobs, progress=progress):
-                found += generation
-                written = write_results(task, found, shlex.join(words), output)
-    except KeyboardInterrupt:
-        again = shlex.join([*words, "-o", str(output), *(["--jobs", str(jobs)] if jobs else [])])
-        again += f" --cluster {shlex.quote(cluster)}" if cluster else ""
-        complain(f"interrupted: finished runs are kept in {output / 'runs'}; go on with: {again}")
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    if not quiet:
-        Console().print(results_table(task, found))
-    for path in written:
-        typer.echo(path)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
+        for generation in search(task, store, jobs=jobs, progress=progress):
+            found += generation
+            written = write_results(task, found, typed_command(), output)
+    print_results(written, results_table(task, found), quiet=quiet)
     end_study(len(found), sum(trial.failed for trial in found), output / HISTORY)
     if chosen(task, found) is None:
         complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / HISTORY}")

@@ -1,21 +1,51 @@
-"""The 3D worm's ground: level or sloping floors, steps, rough ground, and pipes."""
+"""The 3D worm's ground: what all kinds of it have."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field
 
-from annelid.config.sections import Impedance, NonNegative, Positive, Section, Seed, kind_or
+from annelid.config.kinds import Kind
+from annelid.config.sections import Impedance, NonNegative, Positive
+from annelid.registry import Registry
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.arena.course import Bore, Course
+    from annelid.arena.shapes import Shape
+    from annelid.arena.surface import Surface
 
 Friction = Annotated[float, Field(ge=0.01, le=100)]
 Place = Annotated[float, Field(ge=-1e4, le=1e4)]
 Post = tuple[Place, Place, Annotated[float, Field(gt=0, le=100)]]
-Slope = Annotated[float, Field(ge=-60, le=60)]
+"""Of an upright round post: x, y and radius, m."""
 
 
-class Arena(Section):
-    """What every ground has: friction, gravity and the softness of contacts."""
+class Walls(NamedTuple):
+    """What stands upright on a ground.
+
+    Attributes:
+        rail_gap_m: Distance of two guard rails along x, the worm midway, m; None for none.
+        posts: x, y and radius of upright round posts, m.
+    """
+
+    rail_gap_m: float | None = None
+    posts: tuple[Post, ...] = ()
+
+
+class ArenaKind(Kind):
+    """Base of the arenas' sections: the fields of every ground, and what the body, the pictures and the tasks ask it.
+
+    Attributes:
+        is_closed: Whether its walls surround the worm; they are drawn so that one sees through them.
+    """
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("arena.kind", "annelid.arena.kinds")
+    default: ClassVar[str] = "floor"
+    is_closed: ClassVar[bool] = False
 
     friction: Friction = Field(default=1.0, description="coefficient of sliding friction")
     backward_friction: Friction | None = Field(
@@ -37,139 +67,58 @@ class Arena(Section):
         """Whether friction depends on the direction in which the skin slides."""
         return self.backward_friction not in (None, self.friction)
 
-
-SHARED = tuple(Arena.model_fields)
-"""Fields of every arena; a worm that is put elsewhere keeps those that the place does not state."""
-
-
-class Floor(Arena):
-    """A plane: level, or a slope that the worm climbs; between guard rails and with posts if wanted."""
-
-    kind: Literal["floor"] = "floor"
-    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
-    slope_deg: Slope = Field(
-        default=0.0,
-        description="how steeply it rises towards -x, where a worm with body.heading_deg = 0 leads; the model's axes "
-        "lie in the slope",
-    )
-    rail_gap_m: Positive | None = Field(
-        default=None, description="distance of two upright guard rails, the worm midway (not set: none)"
-    )
-    posts: Annotated[tuple[Post, ...], Field(max_length=1000)] | None = Field(
-        default=None,
-        description="x, y and radius of upright round posts, m; a worm with body.heading_deg = 0 starts along "
-        "0 <= x <= its length, leads towards -x, and its left is -y (not set: none)",
-    )
+    @property
+    def is_plane(self) -> bool:
+        """Whether its ground is one plane."""
+        return False
 
     @property
-    def has_walls(self) -> bool:
-        """Whether rails or posts stand on it."""
-        return self.rail_gap_m is not None or bool(self.posts)
+    def walls(self) -> Walls:
+        """What stands upright on it."""
+        return Walls()
+
+    @property
+    def slope_rad(self) -> float:
+        """How steeply the model's axes rise towards -x, rad."""
+        return 0.0
+
+    @property
+    @abstractmethod
+    def floor_depth_m(self) -> float:
+        """How far the floor that is drawn lies below the mesh's lowest line at the start, m."""
+
+    @abstractmethod
+    def ground(self) -> Surface:
+        """Returns its surface without what stands upright on it, in the coordinates of the worm's model."""
+
+    def centre_line(self) -> Course | None:
+        """Returns the centre line of a pipe, None where there is none."""
+        return None
+
+    def bore(self) -> Bore | None:
+        """Returns the radius along the centre line, None where there is none."""
+        return None
+
+    def reach_m(self) -> tuple[float, float] | None:
+        """Returns the arc lengths of a pipe between which it bends or changes its bore, None where there is no pipe."""
+        return None
+
+    def shape(self, length_m: float) -> Shape | None:
+        """Returns the shape of its ground to be drawn, None where a plane is.
+
+        Args:
+            length_m: Length of the worm, which stands or lies in it.
+        """
+        return None
+
+    def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
+        """Adds geoms that hold a worm in plain MuJoCo where the ground is not one plane; they are not drawn.
+
+        Args:
+            spec: The worm's spec.
+            length_m: Length of the worm.
+        """
 
 
-class Relief(Floor):
-    """A floor whose relief begins in front of the worm."""
-
-    start_m: NonNegative = Field(default=0.1, description="level ground between the worm's front and the relief")
-
-
-class Steps(Relief):
-    """A flight of steps that the worm climbs."""
-
-    kind: Literal["steps"] = "steps"  # type: ignore[assignment]
-    step_height_m: Positive = Field(default=0.02, description="height of each step")
-    step_length_m: Positive = Field(default=0.3, description="length of each step")
-    rounding_m: Positive = Field(default=0.008, description="radius of the steps' rounded edges and inner corners")
-
-    @model_validator(mode="after")
-    def _rounded_steps_fit(self) -> Self:
-        most = min(self.step_height_m, self.step_length_m) / 2
-        if self.rounding_m > most:
-            raise ValueError(
-                f"arena.rounding_m = {self.rounding_m:g}: must be at most {most:g}, half of a step's height and length"
-            )
-        return self
-
-
-class Rough(Relief):
-    """Rough ground: a random height with a Gaussian correlation."""
-
-    kind: Literal["rough"] = "rough"  # type: ignore[assignment]
-    roughness_m: Positive = Field(default=0.008, description="root mean square of the height")
-    correlation_m: Positive = Field(default=0.15, description="distance at which heights correlate by 1/e")
-    relief_seed: Seed = Field(default=0, description="seed of the random ground")
-
-    @model_validator(mode="after")
-    def _not_too_steep(self) -> Self:
-        if self.roughness_m > 0.2 * self.correlation_m:
-            raise ValueError(
-                f"arena.roughness_m = {self.roughness_m:g}: must be at most a fifth of arena.correlation_m = "
-                f"{self.correlation_m:g}, or the ground is no gentle surface"
-            )
-        return self
-
-
-class Pipe(Arena):
-    """A pipe: a centre line of straights and curves, and a bore that may change along it.
-
-    The worm starts inside the entry, which goes on behind it; the exit goes on too. The bore's lowest line at the entry
-    is that of the mesh. Lengths along the pipe count from the worm's front.
-    """
-
-    kind: Literal["pipe"] = "pipe"
-    bore_m: Positive = Field(default=0.16, description="radius of the bore, free for the worm's skin")
-    entry_clearance_m: NonNegative = Field(
-        default=0.003, description="how much wider the bore is where the worm starts, so that its strands fit in"
-    )
-    course: Literal["straight", "bend", "s", "helix"] = Field(
-        default="straight", description="the centre line: one bend, two opposite ones, or a rising helix"
-    )
-    straight_m: NonNegative = Field(default=0.2, description="straight pipe between the worm's front and the curve")
-    radius_m: Positive = Field(default=0.5, description="radius of the centre line's curves")
-    turn_deg: Annotated[float, Field(ge=-3600, le=3600)] = Field(
-        default=90.0, description="angle of each curve (helix: of the whole), positive to the worm's left"
-    )
-    pitch_m: NonNegative = Field(default=0.5, description="rise of the helix in a turn")
-    profile: Literal["even", "taper", "hourglass"] = Field(
-        default="even", description="the bore along the pipe: the same, narrowing for good, or narrowest midway"
-    )
-    narrowest_m: Positive = Field(default=0.13, description="radius of the narrowest bore of a taper or an hourglass")
-    profile_start_m: NonNegative = Field(default=0.2, description="where the bore begins to narrow")
-    profile_length_m: Positive = Field(default=0.5, description="length over which it changes")
-
-    @model_validator(mode="after")
-    def _a_pipe_that_can_be(self) -> Self:
-        if self.profile != "even" and self.narrowest_m >= self.bore_m:
-            raise ValueError(
-                f"arena.narrowest_m = {self.narrowest_m:g}: must be less than arena.bore_m = {self.bore_m:g}"
-            )
-        widest = self.bore_m + self.entry_clearance_m
-        if self.course == "bend" and abs(self.turn_deg) > 180:
-            raise ValueError(f"arena.turn_deg = {self.turn_deg:g}: a bend must be in -180 .. 180; a helix may go on")
-        if self.course == "s" and abs(self.turn_deg) > 135:
-            raise ValueError(f"arena.turn_deg = {self.turn_deg:g}: each curve of an s must be in -135 .. 135")
-        if self.course in ("bend", "s") and abs(self.turn_deg) > 135 and self.radius_m <= widest:
-            raise ValueError(
-                f"arena.radius_m = {self.radius_m:g}: must be more than {widest:g}, or the legs of the bend overlap"
-            )
-        if self.course == "helix":
-            if self.radius_m <= widest:
-                raise ValueError(
-                    f"arena.radius_m = {self.radius_m:g}: must be more than {widest:g} for a helix, or the pipe "
-                    "overlaps itself"
-                )
-            if abs(self.turn_deg) > 270 and self.pitch_m <= 2.2 * widest:
-                raise ValueError(
-                    f"arena.pitch_m = {self.pitch_m:g}: must be more than {2.2 * widest:g} for turns that lie above "
-                    "each other"
-                )
-        return self
-
-
-ArenaSection = Annotated[
-    Annotated[Floor, Tag("floor")]
-    | Annotated[Steps, Tag("steps")]
-    | Annotated[Rough, Tag("rough")]
-    | Annotated[Pipe, Tag("pipe")],
-    kind_or("floor"),
-]
+SHARED = tuple(name for name in ArenaKind.model_fields if name != "kind")
+"""Fields of every arena; a worm that is put elsewhere keeps those that the place does not state."""

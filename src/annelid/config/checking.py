@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from annelid.config.kinds import Kind, kinds_of
 from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import MOST_SHOWN, ConfigError, listed, shown
@@ -26,7 +27,7 @@ def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
     try:
         return section.model_validate(tree)
     except ValidationError as error:
-        raise ConfigError(_explain_all(error, section)) from None
+        raise ConfigError(_explain_all(error, section, tree)) from None
 
 
 def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
@@ -34,7 +35,7 @@ def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[st
     paths: dict[str, str] = {}
     for name, info in model.model_fields.items():
         if _is_branch(info.annotation):
-            for section in _sections_of(info.annotation):
+            for section in sections_in(info.annotation):
                 paths.update(field_paths(section, f"{prefix}{name}."))
         else:
             paths[f"{prefix}{name}"] = info.description or ""
@@ -67,15 +68,18 @@ def _fields_of_section(section: BaseModel, prefix: str) -> dict[str, str]:
 
 def _is_branch(annotation: Any) -> bool:
     """Tells a section from a field; a list of sections is one field, set as a whole."""
-    return get_origin(annotation) is not tuple and bool(_sections_of(annotation))
+    return get_origin(annotation) is not tuple and bool(sections_in(annotation))
 
 
-def _sections_of(annotation: Any) -> list[type[Section]]:
+def sections_in(annotation: Any) -> list[type[Section]]:
+    """Returns the sections that an annotation admits: every kind of a family, and those of a list of sections too."""
+    if isinstance(annotation, type) and issubclass(annotation, Kind):
+        return list(kinds_of(annotation).values())
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return [annotation]
     found: list[type[Section]] = []
     for argument in getattr(annotation, "__args__", ()):
-        found.extend(_sections_of(argument))
+        found.extend(sections_in(argument))
     return found
 
 
@@ -126,7 +130,7 @@ def unit_of(path: str) -> str:
 
 
 def _field_sections(section: type[BaseModel], field: str) -> list[type[Section]]:
-    return _sections_of(section.model_fields[field].annotation)
+    return sections_in(section.model_fields[field].annotation)
 
 
 def _kind_of(section: type[Section]) -> Any:
@@ -166,19 +170,19 @@ MOST_SENTENCE = 450
 """Characters of what is wrong with a configuration; the first thing is told in any case."""
 
 
-def _explain_all(error: ValidationError, root: type[Section]) -> str:
+def _explain_all(error: ValidationError, root: type[Section], tree: Any) -> str:
     """Joins what is wrong, as much of it as a sentence can hold."""
     sentences: dict[str, None] = {}
     for count, detail in enumerate(error.errors()):
-        sentence = _explain(detail, root)
+        sentence = _explain(detail, root, tree)
         if sentences and sum(map(len, [*sentences, sentence])) > MOST_SENTENCE:
             return f"{'; '.join(sentences)}; and {error.error_count() - count:,} more"
         sentences[sentence] = None
     return "; ".join(sentences)
 
 
-def _explain(detail: ErrorDetails, root: type[Section]) -> str:
-    parts, section = _place(detail["loc"], root)
+def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
+    parts, section = _place(detail["loc"], root, tree)
     kind, given = detail["type"], detail["input"]
     if kind == "extra_forbidden":
         unknown = str(detail["loc"][-1])
@@ -196,8 +200,8 @@ def _explain(detail: ErrorDetails, root: type[Section]) -> str:
     return f"{path or 'the configuration'} = {shown(given)}: {words}"
 
 
-def _place(loc: tuple[int | str, ...], root: type[Section]) -> tuple[list[str], type[BaseModel]]:
-    """Follows an error's location, which names kinds and types too, through the sections.
+def _place(loc: tuple[int | str, ...], root: type[Section], tree: Any) -> tuple[list[str], type[BaseModel]]:
+    """Follows an error's location, which may name types too, through the sections.
 
     Returns:
         The parts of the dotted path, without a last part that is no field; the section that it leads to.
@@ -208,11 +212,16 @@ def _place(loc: tuple[int | str, ...], root: type[Section]) -> tuple[list[str], 
     for part in loc:
         names = {info.alias or name: name for name, info in section.model_fields.items()}
         if part in names and not members:
-            members = _field_sections(section, names[str(part)])
-        elif members and part in (tags := {_kind_of(member): member for member in members}):
-            section, members = tags[part], []
+            field = section.model_fields[names[str(part)]]
+            tree = tree.get(part) if isinstance(tree, Mapping) else getattr(tree, str(part), None)
+            members = sections_in(field.annotation)
+            kind = tree.get("kind", _kind_of(members[0])) if isinstance(tree, Mapping) and members else None
+            members = [member for member in members if kind is not None and _kind_of(member) == kind] or members
+        elif members and part in {_kind_of(member) for member in members}:
             continue
-        elif not isinstance(part, int):
+        elif isinstance(part, int):
+            tree = tree[part] if isinstance(tree, Sequence) and part < len(tree) else None
+        else:
             continue
         parts.append(str(part))
         if len(members) == 1:

@@ -1,6 +1,7 @@
 """Everything that turns sensation into activation."""
 
 from annelid.control.adaptive import AdaptiveController
+from annelid.control.base import OpenLoopController, SegmentController
 from annelid.control.callable import CallableController
 from annelid.control.oscillators import HeteroclinicController, PhaseChainController
 from annelid.control.program import ProgramController
@@ -13,8 +14,10 @@ __all__ = [
     "CallableController",
     "CopySettings",
     "HeteroclinicController",
+    "OpenLoopController",
     "PhaseChainController",
     "ProgramController",
+    "SegmentController",
     "SineController",
     "SnsController",
     "StretchSensor",

@@ -2,14 +2,64 @@
 
 from __future__ import annotations
 
-from annelid import config as settings
-from annelid.control.neural import PeristalsisController, require_step_within
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from annelid.config.kinds import ControllerKind, Knob
+from annelid.control.neural import require_step_within
+from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network, adaptive_peristalsis_network, drive_conductance_uS
-from annelid.protocols import Sensation, Values
+from annelid.protocols import Plant, Sensation, Values
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
 
 
-class AdaptiveController(PeristalsisController[settings.AdaptiveSns]):
+DRIVE_HINT = "Descending drive: more of it makes the wave faster."
+
+
+class AdaptiveSns(ControllerKind):
+    """The synthetic nervous system with a descending neuron, whose activity sets the rate of all half-centres.
+
+    The activity that is asked for is ``drive + drive_slope_per_s time + stretch_gain_per_m stretch``, kept in 0 .. 1,
+    with the mean lengthening of all segments as stretch: a manual, a timed and a sensory drive. The descending neuron
+    follows it with its time constant.
+    """
+
+    sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
+    kind: Literal["adaptive"] = "adaptive"
+    network: Sns = Sns()
+    drive: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="0: the slow rhythm of the half-centres alone; 1: about three times as fast"
+    )
+    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=0.0, description="change of the manual drive"
+    )
+    stretch_gain_per_m: Annotated[float, Field(ge=-1000, le=1000)] = Field(
+        default=0.0, description="drive per mean lengthening of the segments"
+    )
+    drive_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.05, description="time constant of the descending neuron"
+    )
+
+    def build(self, config: RunConfig, plant: Plant) -> AdaptiveController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return AdaptiveController(
+            self, config.sensor, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s
+        )
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns what the network rests on, and its drive."""
+        return (*self.network.cited(), ("nourse", "the idea of half-centres that adapt their rate"))
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the manual drive."""
+        return (Knob("controller.drive", "drive", 1.0, 0.0, 1.0, 0.01, DRIVE_HINT),)
+
+
+class AdaptiveController(PeristalsisController[AdaptiveSns]):
     """Drives a worm by the peristalsis network with a descending neuron that sets the rate of its half-centres.
 
     It starts with that neuron silent. The rest, errors too, is as for `annelid.control.SnsController`.

@@ -5,24 +5,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields
-from itertools import pairwise
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from annelid import config as settings
 from annelid.config.sections import Section
 from annelid.control.base import SegmentController
-from annelid.control.stretch_sensor import StretchSensor
 from annelid.errors import ConfigError
-from annelid.nervous import Network, PeristalsisParameters
+from annelid.nervous import Network
 from annelid.nervous.half_centre import HalfCentre
-from annelid.nervous.peristalsis import ROLES
 from annelid.nervous.stepper import Scheme
 from annelid.protocols import Array, Sensation, State, Values
 
 Design = TypeVar("Design", bound=HalfCentre)
-Config = TypeVar("Config", settings.SnsController, settings.AdaptiveSns, settings.PressureSns)
 
 
 def design_of(kind: type[Design], section: Section) -> Design:
@@ -143,119 +138,3 @@ class NeuralController(SegmentController):
         """Restores what `get_state` returned."""
         self._state.potential[...] = state["potential"]
         self._state.gate[...] = state["gate"]
-
-
-class PeristalsisController(NeuralController, Generic[Config]):
-    """A controller of the paper's network, or of one that extends it, held and let go by stretch sensors.
-
-    One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
-    during the whole step; the activation is read from the potentials at t + dt and drives the body from t on.
-    This is the order of the authors' loop. The kick acts during the first step only.
-
-    Raises:
-        ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, network parameters for
-            which a design rule has no solution, or a control step beyond a neuron's time constant.
-    """
-
-    recorded = (
-        *NeuralController.recorded,
-        (
-            "sensor_on",
-            ("segment",),
-            "1",
-            "stretch sensor during the last control step: 1 while the segment is at rest length",
-        ),
-    )
-    _parameters: PeristalsisParameters
-    _every_step_differs = False
-
-    def __init__(
-        self,
-        config: Config,
-        sensor: settings.StretchSensor,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
-    ) -> None:
-        """Builds the controller in its initial state.
-
-        Args:
-            config: Its section of the configuration.
-            sensor: Section of the stretch sensors; their noise is the simulation's business, not used here.
-            n_segments: Segments, at least 3.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-            control_timestep_s: Step of the network, s.
-        """
-        self._config = config
-        self._sns = sns = config if isinstance(config, settings.SnsController) else config.network
-        self._parameters = design_of(PeristalsisParameters, sns)
-        self._range_mV, self._full_nA = sns.range_mV, sns.leak_conductance_uS * sns.range_mV
-        super().__init__(
-            self._network(n_segments, control_timestep_s),
-            ROLES,
-            n_segments,
-            n_muscles,
-            control_timestep_s,
-            scheme=sns.scheme,
-            slope_per_mV=sns.activation_slope_per_mV,
-            linear_range_mV=sns.range_mV if sns.activation == "linear" else None,
-        )
-        self._sensor = StretchSensor(sensor, n_segments)
-        self._inputs_nA = np.zeros(len(self._stepper.arrays.inputs))
-        self.reset(0)
-
-    @abstractmethod
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
-        """Returns the paper's network, with any further neurons and inputs behind its own."""
-
-    def _feel(self, sensation: Sensation, time_s: float) -> None:
-        """Writes the currents of the further inputs behind those of the sensors and the kick."""
-
-    def reset(self, seed: int) -> None:
-        """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
-        self._state = self._stepper.initial_state(self._sns.gate_start)
-        self._sensor.reset()
-        self._n_steps = 0
-
-    def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps, as `NeuralController.stride`."""
-        n_segments, inputs = self._n_segments, self._inputs_nA
-        for n, time_s in self._pieces(self._n_steps, sensation.time_s, n_steps):
-            on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, time_s)
-            np.multiply(on, self._sns.sensor_current_nA, out=inputs[:n_segments])
-            inputs[n_segments] = self._sns.kick_nA if self._n_steps == 0 else 0.0
-            self._feel(sensation, time_s)
-            self._stepper.advance(self._state, inputs, n)
-            self._n_steps += n
-        return self._activation(self._state.potential[0])
-
-    def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
-        """Cuts steps under one sensation where the inputs change: after the kick, and at the end of the hold.
-
-        Returns:
-            For every piece its number of steps and the time at its beginning, s.
-        """
-        held = self._sensor.held_at(time_s)
-        if n_steps == 1 or (n_taken > 0 and not held and not self._every_step_differs):
-            return [(n_steps, time_s)]
-        first = round(time_s / self._timestep_s)
-        times_s = [time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
-        if self._every_step_differs:
-            return [(1, time_s) for time_s in times_s]
-        cuts = {0, n_steps} | ({1} if n_taken == 0 else set())
-        if held:
-            cuts.add(sum(self._sensor.held_at(time) for time in times_s))
-        return [(end - start, times_s[start]) for start, end in pairwise(sorted(cuts))]
-
-    def _values(self) -> Values:
-        return {**super()._values(), "sensor_on": self._sensor.on.astype(np.float64)}
-
-    def get_state(self) -> State:
-        """Returns copies of potentials (mV), gates, sensors and the number of steps taken."""
-        return super().get_state() | {"sensor_on": self._sensor.on.copy(), "n_steps": np.array(self._n_steps)}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        super().set_state(state)
-        self._sensor.on[...] = state["sensor_on"]
-        self._n_steps = int(state["n_steps"])

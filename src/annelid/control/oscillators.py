@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
-from annelid import config as settings
+import numpy as np
+from pydantic import Field, model_validator
+
+from annelid.config.kinds import ControllerKind, Knob
+from annelid.config.sections import NonNegative, Positive
+from annelid.control.adaptive import DRIVE_HINT
 from annelid.control.base import SegmentController
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
@@ -18,7 +23,105 @@ from annelid.nervous import (
     phase_chain,
 )
 from annelid.nervous.phase_chain import BODY
-from annelid.protocols import Array, Sensation, State, Values
+from annelid.protocols import Array, Plant, Sensation, State, Values
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+
+
+class HeteroclinicChannel(ControllerKind):
+    """A stable heteroclinic channel (Horchler 2015, Daltorio 2013): one saddle a segment, visited in order.
+
+    A segment's activation is its node's activity. Alone it dwells at a node for about ``ln(1 / noise)`` or
+    ``ln(1 / bias)`` over the leaving rate ``growth_rate_per_s / saddle_value``; feedback from the body ends the dwell.
+    The literature gives no constants for this worm: with ours the bias alone makes a dwell of 0.88 s, the paper's
+    interval from segment to segment.
+    """
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("daltorio2013", "a channel that waits for the body"),
+        ("horchler2015", "the stable heteroclinic channel"),
+        ("shaw2012", "limit cycles near a heteroclinic orbit"),
+        ("stone1990", "the dwell time under noise"),
+    )
+    kind: Literal["shc"] = "shc"
+    growth_rate_per_s: Annotated[float, Field(gt=0, le=500)] = Field(
+        default=20.0, description="rate at which activities settle and decay; at most 0.5 over the control timestep"
+    )
+    saddle_value: Annotated[float, Field(gt=1, le=100)] = Field(
+        default=2.0, description="that rate over the rate at which a node is left"
+    )
+    noise: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=1e-6, description="standard deviation of the noise, per square root of a second"
+    )
+    bias_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=5e-4, description="constant input to every node; a larger one shortens the dwell"
+    )
+    feedback: Literal["none", "stretch", "contact"] = Field(
+        default="stretch",
+        description="what excites a node's successor: nothing, the present segment having lengthened by "
+        "stretch_cue_m, or the segment before it bearing contact_cue_N",
+    )
+    feedback_gain_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=0.1, description="input to the successor of an active node whose cue is on"
+    )
+    stretch_cue_m: NonNegative = Field(default=0.02, description="lengthening at which a segment has its shape")
+    contact_cue_N: NonNegative = Field(
+        default=0.2, description="size of the force of the ground with which a segment holds fast"
+    )
+
+    @model_validator(mode="after")
+    def _it_leaves_its_first_node(self) -> Self:
+        if self.noise == 0 and self.bias_per_s == 0 and (self.feedback == "none" or self.feedback_gain_per_s == 0):
+            raise ValueError(
+                "controller.noise, controller.bias_per_s and the feedback are all 0: the ring would rest at its first "
+                "node for ever"
+            )
+        return self
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that a channel that waits for contact has a body with ground."""
+        if self.feedback == "contact" and not config.body.touches_ground:
+            raise ValueError(
+                f"controller.feedback = 'contact' has no effect on body.kind = {config.body.kind!r}, which touches no "
+                "ground: choose 'none' or 'stretch'"
+            )
+
+    def build(self, config: RunConfig, plant: Plant) -> HeteroclinicController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return HeteroclinicController(self, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s)
+
+
+class PhaseChain(ControllerKind):
+    """Phase oscillators under a descending drive (Ijspeert 2007): the salamander's constants, one segment each.
+
+    Activation is an oscillator's output over its largest, ``r (1 + cos theta) / (2 R(5))``.
+    """
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("ijspeert2007", "the phase oscillators under a drive"),)
+    kind: Literal["phase-chain"] = "phase-chain"
+    drive: Annotated[float, Field(ge=0, le=10)] = Field(
+        default=4.0, description="descending drive at the start: the body swims in 3 .. 5, is silent outside 1 .. 5"
+    )
+    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=0.0, description="change of the drive, which stays in 0 .. 10"
+    )
+    limbs: bool = Field(
+        default=False, description="true: limb oscillators force a standing wave below drive 3 (walking)"
+    )
+    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=1.0, description="waves on the body at once, by the phase bias; the salamander's swimming has 1"
+    )
+    coupling_per_s: Positive = Field(default=10.0, description="coupling of neighbours")
+    slowing: Positive = Field(default=1.0, description="times slower than the salamander, in all of its rates")
+
+    def build(self, config: RunConfig, plant: Plant) -> PhaseChainController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return PhaseChainController(self, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s)
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the descending drive."""
+        return (Knob("controller.drive", "drive", 1.0, 0.0, 6.0, 0.05, DRIVE_HINT),)
 
 
 class HeteroclinicController(SegmentController):
@@ -41,9 +144,7 @@ class HeteroclinicController(SegmentController):
         ("cue_on", ("segment",), "1", "during the last control step: 1 while feedback lets go"),
     )
 
-    def __init__(
-        self, config: settings.HeteroclinicChannel, n_segments: int, n_muscles: int, control_timestep_s: float
-    ) -> None:
+    def __init__(self, config: HeteroclinicChannel, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
         """Builds the controller at node 1.
 
         Args:
@@ -135,7 +236,7 @@ class PhaseChainController(SegmentController):
         ("drive", (), "1", "descending drive during the last control step"),
     )
 
-    def __init__(self, config: settings.PhaseChain, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
+    def __init__(self, config: PhaseChain, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
         """Builds the controller in its initial state.
 
         Args:

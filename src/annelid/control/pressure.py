@@ -2,17 +2,89 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
-from annelid import config as settings
-from annelid.control.neural import PeristalsisController, require_step_within
+import numpy as np
+from pydantic import Field, model_validator
+
+from annelid.config.kinds import ControllerKind
+from annelid.config.sections import NonNegative, Positive
+from annelid.control.neural import require_step_within
+from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network
 from annelid.nervous.pressure import PressureParameters, pressure_network
-from annelid.protocols import Array, Sensation
+from annelid.protocols import Array, Plant, Sensation
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
 
 
-class PressureController(PeristalsisController[settings.PressureSns]):
+class PressureSns(ControllerKind):
+    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.pressure`.
+
+    A segment that bears load holds itself expanded until the one before it is extended, and one that begins to contract
+    ends the contraction two segments before. Lengths and loads are those of the six-segment robot, of 0.16 m radius and
+    19 N.
+    """
+
+    sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
+    kind: Literal["sns-pressure"] = "sns-pressure"
+    network: Sns = Sns()
+    light_N: NonNegative = Field(default=2.5, description="load of a segment up to which its pressure neuron rests")
+    full_N: Positive = Field(default=9.0, description="load that drives it to R")
+    extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
+    extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
+    hold: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=1.0, description="potential, over R, that full pressure alone gives the sensory neuron; 0 for none"
+    )
+    release: Annotated[float, Field(ge=0, le=20)] = Field(
+        default=1.8, description="stretch sensors' currents that a full extension neuron cancels; 0 for none"
+    )
+    landing: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.1,
+        description="potential, over R, that full pressure alone gives the sensory neuron of the segment before; 0 for "
+        "none",
+    )
+    exchange: Annotated[float, Field(ge=0, le=5)] = Field(
+        default=0.8,
+        description="potential, over R, that a full contraction neuron alone gives the sensory neuron two segments "
+        "before; 0 for none, which three segments have in any case",
+    )
+    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=10)] = Field(
+        default=0.03, description="time constant of the pressure neurons"
+    )
+
+    @model_validator(mode="after")
+    def _scales_rise(self) -> Self:
+        for low, high in (("light_N", "full_N"), ("extending_m", "extended_m")):
+            if not getattr(self, low) < getattr(self, high):
+                raise ValueError(
+                    f"controller.{low} = {getattr(self, low):g} must be less than controller.{high} = "
+                    f"{getattr(self, high):g}"
+                )
+        return self
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has a skin that feels pressure."""
+        if not config.body.has_skin:
+            raise ValueError(
+                f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {config.body.kind!r} "
+                "has not; only the 3D worm ('worm') has"
+            )
+
+    def build(self, config: RunConfig, plant: Plant) -> PressureController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return PressureController(
+            self, config.sensor, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s
+        )
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns what the network rests on, and the feedback."""
+        return (*self.network.cited(), ("daltorio2013", "the aim of feedback from contact"))
+
+
+class PressureController(PeristalsisController[PressureSns]):
     """Drives a worm by `annelid.nervous.pressure`.
 
     A segment's load is the sum of the normal forces on its four sides, its length the mean of its stretch sensors, both

@@ -2,14 +2,69 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field, model_validator
 
 from annelid.clock import SLACK_S
-from annelid.config import Program
+from annelid.config.kinds import ControllerKind
+from annelid.config.sections import NonNegative, Positive, Section
 from annelid.control.base import OpenLoopController
 from annelid.errors import ConfigError
-from annelid.protocols import Array
+from annelid.protocols import Array, Plant
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+
+
+class Contraction(Section):
+    """One contraction of one segment's ring."""
+
+    segment: Annotated[int, Field(ge=1, le=200)] = Field(description="counted from 1 at the front")
+    start_s: NonNegative = Field(description="when the activation begins to rise")
+    stop_s: Positive = Field(description="when it begins to fall")
+    activation: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="level that it rises to")
+
+    @model_validator(mode="after")
+    def _starts_before_it_stops(self) -> Self:
+        if self.start_s >= self.stop_s:
+            raise ValueError(
+                f"controller.contractions: stop_s = {self.stop_s:g} of a contraction of segment {self.segment} must be "
+                f"greater than its start_s = {self.start_s:g}"
+            )
+        return self
+
+
+class Program(ControllerKind):
+    """Open loop: contractions at times laid down beforehand, whatever the sensors read.
+
+    Where contractions of one segment overlap, the larger activation wins.
+    """
+
+    kind: Literal["program"] = "program"
+    contractions: tuple[Contraction, ...] = Field(description="segment, start_s, stop_s and activation of each")
+    ramp_s: NonNegative = Field(default=0.0, description="time that a rise or fall between 0 and the full level takes")
+
+    @property
+    def laid_down(self) -> tuple[Contraction, ...]:
+        """As `contractions`."""
+        return self.contractions
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has the segments that contract."""
+        n_segments = config.body.n_segments
+        for i, contraction in enumerate(self.contractions):
+            if contraction.segment > n_segments:
+                raise ValueError(
+                    f"controller.contractions.{i}.segment = {contraction.segment}: must be in 1 .. {n_segments}, the "
+                    "segments of the body"
+                )
+
+    def build(self, config: RunConfig, plant: Plant) -> ProgramController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return ProgramController(self, plant.n_segments, plant.n_muscles)
 
 
 class ProgramController(OpenLoopController[Program]):

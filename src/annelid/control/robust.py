@@ -2,16 +2,109 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from annelid import config as settings
+import numpy as np
+from pydantic import Field
+
+from annelid.config.kinds import ControllerKind, Knob
+from annelid.config.sections import Positive, Section
+from annelid.control.adaptive import DRIVE_HINT
 from annelid.control.neural import NeuralController, design_of
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous.adaptive import DRIVE_NEURON
 from annelid.nervous.driven import MOTOR, MOTOR_SHARE, DriveParameters, add_motor_neurons, driven_robust_network
 from annelid.nervous.robust import ROLES, RobustParameters, robust_network
-from annelid.protocols import SIDES, Array, Sensation, Values
+from annelid.protocols import SIDES, Array, Plant, Sensation, Values
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+
+
+class DescendingDrive(Section):
+    """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe."""
+
+    lift: Annotated[float, Field(ge=0, lt=0.5)] = Field(
+        default=0.0,
+        description="share of the range to which full drive lifts resting relays; 0: there is no such neuron; 0.45: "
+        "full drive makes six segments' wave 3.9 times as fast",
+    )
+    drive: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="manual drive, to which pressure adds")
+    per_segment: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.5, description="drive that one segment gives whose back is pressed fully"
+    )
+    full_pressure_N: Positive = Field(
+        default=3.0, description="force on a segment's back that presses it fully; about a segment's weight"
+    )
+    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.2, description="time constant of the pressure neurons"
+    )
+    time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=0.2, description="time constant of the descending neuron"
+    )
+
+
+class RobustSns(ControllerKind):
+    """A peristalsis network made to keep its rhythm under wrong sensor signals: `annelid.nervous.robust`.
+
+    All contraction neurons suppress each other, a slow relay counts each turn, and the stretch sensors entrain it
+    within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used. With
+    ``descending.lift`` the wave adapts to narrow pipes: `annelid.nervous.driven`.
+    """
+
+    sensor_fields: ClassVar[frozenset[str]] = frozenset({"noise_m"})
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("riddle2022", "the neurons"),
+        ("szczecinski2017", "the rules by which synapses are designed"),
+    )
+    kind: Literal["sns-robust"] = "sns-robust"
+    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C of the fast neurons")
+    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
+    range_mV: Positive = Field(default=20.0, description="operating range R")
+    bifurcation_mV: Annotated[float, Field(lt=0)] = Field(
+        default=-1.0, description="delta: below 0, so that the half-centre stays in either state"
+    )
+    offset_mV: Positive = Field(default=0.1, description="how far beyond the range a held half-centre lies")
+    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
+    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
+    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
+    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
+        default=0.05, description="slope S of the sodium gates"
+    )
+    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; does not set the period here")
+    turn_ms: Positive = Field(default=875.0, description="time from one segment's contraction to the next one's")
+    push_nA: Positive = Field(
+        default=6.0, description="current of a full relay into the next contraction neuron at rest"
+    )
+    entrainment: Annotated[float, Field(ge=0, le=0.03)] = Field(
+        default=0.02, description="share of the relay's drive that the sensor may add or take; 0 for none"
+    )
+    habit_ms: Positive = Field(default=10000.0, description="time constant with which the sensor adapts")
+    full_stretch_m: Positive = Field(default=0.08, description="mean lengthening that drives a stretch neuron to R")
+    activation_slope_per_mV: Positive = Field(default=0.35, description="slope of the sigmoid, as in the paper")
+    scheme: Literal["euler", "heun"] = Field(default="euler", description="forward Euler, or second order")
+    start: Literal["design", "silent", "random"] = Field(
+        default="design",
+        description="state of the network at the start: segment 1 contracted, all neurons at rest, or drawn by seed",
+    )
+    let_go_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=0.0,
+        description="time constant with which motor neurons let go, so that several segments share the wave; 0: there "
+        "are none, and contraction and expansion neurons drive the muscles",
+    )
+    descending: DescendingDrive = DescendingDrive()
+
+    def build(self, config: RunConfig, plant: Plant) -> RobustController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return RobustController(self, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s)
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the manual drive, if there is a descending neuron."""
+        if not self.descending.lift:
+            return ()
+        return (Knob("controller.descending.drive", "drive", 1.0, 0.0, 1.0, 0.01, DRIVE_HINT),)
+
 
 BACK = SIDES.index("back")
 
@@ -37,7 +130,7 @@ class RobustController(NeuralController):
     )
     _parameters: RobustParameters
 
-    def __init__(self, config: settings.RobustSns, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
+    def __init__(self, config: RobustSns, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
         """Builds the controller in its initial state.
 
         Args:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid import config
 from annelid.clock import SLACK_S
+from annelid.config.sensor import StretchSensor as StretchSettings
 from annelid.errors import require_at_least
 from annelid.protocols import Array
 
@@ -38,7 +38,7 @@ class StretchSensor:
         ConfigError: Fewer than one segment.
     """
 
-    def __init__(self, settings: config.StretchSensor, n_segments: int) -> None:
+    def __init__(self, settings: StretchSettings, n_segments: int) -> None:
         """Makes a sensor for ``n_segments`` segments from its section of the configuration."""
         require_at_least(1, n_segments=n_segments)
         self._tolerance_m = settings.tolerance_m

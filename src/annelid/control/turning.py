@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from annelid.config import TurningSection
+from annelid.config.kinds import TurningKind
 from annelid.control.base import SegmentController
-from annelid.control.steering import ConstantSteering, CourseSteering, HeadingSteering, Steering, TouchSteering
 from annelid.errors import ConfigError
 from annelid.protocols import (
     Array,
@@ -26,19 +25,6 @@ HALVES = ("left", "right")
 _PATTERN, _STEERING = "pattern_", "turning_"
 
 
-_STEERINGS: dict[str, type[Steering]] = {
-    "constant": ConstantSteering,
-    "heading": HeadingSteering,
-    "course": CourseSteering,
-    "touch": TouchSteering,
-}
-
-
-def build_steering(section: TurningSection, n_segments: int, control_timestep_s: float) -> Steering:
-    """Builds what a section of the configuration describes."""
-    return _STEERINGS[section.kind](section, n_segments, control_timestep_s)
-
-
 class TurningController(SegmentController):
     """A controller whose pattern another one makes, and whose sides a steering scales.
 
@@ -51,7 +37,7 @@ class TurningController(SegmentController):
     def __init__(
         self,
         pattern: Controller,
-        section: TurningSection,
+        section: TurningKind,
         n_segments: int,
         n_muscles: int,
         control_timestep_s: float,
@@ -73,7 +59,7 @@ class TurningController(SegmentController):
         self._pattern = pattern
         self._stateful: Stateful = pattern
         self._kind = section.kind
-        self._steering = build_steering(section, n_segments, control_timestep_s)
+        self._steering = section.build(n_segments, control_timestep_s)
         self._timestep_s = control_timestep_s
 
     def reset(self, seed: int) -> None:

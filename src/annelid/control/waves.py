@@ -2,14 +2,66 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field, model_validator
 
 from annelid.clock import SLACK_S
-from annelid.config import SineWave, TimedWave
+from annelid.config.kinds import ControllerKind
+from annelid.config.sections import NonNegative, Positive
 from annelid.control.base import OpenLoopController
 from annelid.errors import ConfigError
-from annelid.protocols import Array
+from annelid.protocols import Array, Plant
+
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+
+
+class SineWave(ControllerKind):
+    """Open loop: a sinusoidal wave from front to rear, segment 1 contracted at the start."""
+
+    kind: Literal["sine"] = "sine"
+    period_s: Positive = Field(default=2.625, description="time of one cycle; the paper's three segments take 2.625")
+    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
+        default=1.0, description="waves on the body at once; negative ones run forwards, 0 is no wave"
+    )
+    level: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="largest activation")
+
+    def build(self, config: RunConfig, plant: Plant) -> SineController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return SineController(self, plant.n_segments, plant.n_muscles)
+
+
+class TimedWave(ControllerKind):
+    """Open loop: each segment contracts by a ramp, holds, and lets go by a ramp, one after another.
+
+    The authors' patterns: "3x1" is 1 s up, 1 s hold, 1 s down, the next segment 1 s later (the defaults); "2x2" is the
+    same with the next segment 2 s later and two waves at once (``interval_s = 2``, ``waves = 2``). Six segments repeat
+    either every 6 s.
+    """
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "the timed wave"),)
+    kind: Literal["timed"] = "timed"
+    rise_s: NonNegative = Field(default=1.0, description="time to contract; 0 for a step")
+    hold_s: NonNegative = Field(default=1.0, description="time contracted")
+    fall_s: NonNegative = Field(default=1.0, description="time to let go; 0 for a step")
+    interval_s: Positive = Field(default=1.0, description="the next segment begins this much later")
+    waves: Annotated[int, Field(ge=1, le=100)] = Field(
+        default=1, description="waves on the body at once: the cycle is n_segments times interval_s over this"
+    )
+    level: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="activation while contracted")
+
+    @model_validator(mode="after")
+    def _it_contracts(self) -> Self:
+        if self.rise_s + self.hold_s + self.fall_s == 0:
+            raise ValueError("controller.rise_s, hold_s and fall_s are all 0: the segments would never contract")
+        return self
+
+    def build(self, config: RunConfig, plant: Plant) -> TimedController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return TimedController(self, plant.n_segments, plant.n_muscles)
 
 
 def sine_activation(wave: SineWave, n_segments: int, time_s: ArrayLike) -> Array:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Daltorio2013Body
 from annelid.draw.style import STYLE, activation_color
 from annelid.errors import RunFileError
 
@@ -47,8 +46,8 @@ class PlanarScene:
         self._outline = _CM * data["outline"].values if "outline" in data else None
         self._activation = data["activation"].values
         self._size = (width, height)
-        body = run.config.body
-        self._wall_height = _CM * body.pipe_diameter_m / 2 if isinstance(body, Daltorio2013Body) else None
+        distance_m = run.config.body.wall_distance_m
+        self._wall_height = None if distance_m is None else _CM * distance_m / 2
 
     def __enter__(self) -> Self:
         import matplotlib

@@ -10,8 +10,9 @@ import numpy as np
 
 from annelid.analysis.paper import published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save
+from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.style import panel_title, plain, segment_colors
 from annelid.errors import RunFileError
 from annelid.output import with_suffix
@@ -65,6 +66,9 @@ def figure7(run: Run, path: str | Path) -> Path:
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, weight="bold")
         figure.align_ylabels()
         return save(figure, path)
+
+
+RUN_FIGURES.add("figure7", figure7)
 
 
 def plot_path(path: str | Path) -> Path:

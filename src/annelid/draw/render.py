@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import PlanarWorm
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 
@@ -154,7 +153,7 @@ def render_video(
 
 
 def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> AbstractContextManager[Scene]:
-    if isinstance(run.config.body, PlanarWorm):
+    if run.config.body.is_planar:
         from annelid.draw.planar_scene import PlanarScene
 
         if camera is not None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import CourseTurning, Floor, RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.gl import Canvas, find_backend
 from annelid.draw.style import CONTRACTED, activation_color
@@ -331,7 +332,7 @@ def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
 
 def upright(config: RunConfig) -> Array:
     """Returns the rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``."""
-    slope = math.radians(config.arena.slope_deg) if isinstance(config.arena, Floor) else 0.0
+    slope = config.arena.slope_rad if config.arena is not None else 0.0
     c, s = math.cos(slope), math.sin(slope)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
@@ -374,13 +375,14 @@ def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:
     """Lays a disc on the floor where each waypoint of a course counts as reached."""
     import mujoco
 
-    if not (isinstance(config.turning, CourseTurning) and isinstance(config.arena, Floor)):
+    if config.turning is None or config.arena is None:
         return
-    for x, y in config.turning.waypoints:
+    goals = config.turning.goals
+    for x, y in goals.points_m:
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-            pos=[x, y, WAYPOINT_HALF_HEIGHT_M - config.arena.floor_gap_m],
-            size=[config.turning.reach_m, WAYPOINT_HALF_HEIGHT_M, 0.0],
+            pos=[x, y, WAYPOINT_HALF_HEIGHT_M - config.arena.floor_depth_m],
+            size=[goals.reach_m, WAYPOINT_HALF_HEIGHT_M, 0.0],
             rgba=WAYPOINT_RGBA,
             contype=0,
             conaffinity=0,

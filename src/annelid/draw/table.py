@@ -20,7 +20,8 @@ from annelid.analysis.paper import (
     stands_for_the_papers,
 )
 from annelid.analysis.summary import Summary
-from annelid.config import WormBody, field_value, fields_of, toml_value
+from annelid.body.worm import WormBody
+from annelid.config import field_value, fields_of, toml_value
 from annelid.errors import listed
 
 if TYPE_CHECKING:

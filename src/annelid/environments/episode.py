@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.environments.observation import Layout, Observation, Senses, layout_of
-from annelid.environments.reward import Deed, reward_terms
-from annelid.environments.task import Task
+from annelid.environments.task import Deed, Task, reward_terms
 from annelid.environments.way import Place, way_of
 from annelid.errors import ConfigError
 from annelid.morphology import Array

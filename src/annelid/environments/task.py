@@ -1,4 +1,4 @@
-"""What an environment asks of its worm: which body, where, how often it acts, for how long, and what is rewarded."""
+"""What an environment asks of its worm: which body, where, how often it acts, for how long, and a step's reward."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from annelid.analysis.passage import reach_of
+import numpy as np
+
 from annelid.body import mesh_of
-from annelid.config import LEVELS, Clock, Pipe, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, Clock, RunConfig, load_config
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
+from annelid.morphology import Array
 
 COARSE = "coarse"
 COARSE_BASE = "fast"
@@ -107,6 +110,45 @@ def weights_of(given: Mapping[str, float]) -> Weights:
     return Weights(**{name: float(value) for name, value in given.items()})
 
 
+@dataclass(frozen=True, slots=True)
+class Deed:
+    """What a worm has done in one step of the environment.
+
+    Attributes:
+        advance_m: How far its middle has come along its way, m.
+        slid_m: Mean way that its segments have slid on the ground, m.
+        action: The activations that it was given, ``(n_muscles,)``.
+        passed: Whether it has come through its pipe in this step.
+        broke_down: Whether its simulation broke down; then nothing else counts.
+    """
+
+    advance_m: float
+    slid_m: float
+    action: Array
+    passed: bool
+    broke_down: bool
+
+
+def reward_terms(deed: Deed, weights: Weights, length_m: float, interval_s: float) -> dict[str, float]:
+    """Returns the terms of the reward by name; the reward is their sum.
+
+    Args:
+        deed: What the worm has done.
+        weights: Of the terms.
+        length_m: Length of its body, m.
+        interval_s: Time of the step, s.
+    """
+    lengths_per_s = 0.0 if deed.broke_down else 1.0 / (length_m * interval_s)
+    effort = 0.0 if deed.broke_down else float(np.mean(deed.action * deed.action))
+    return {
+        "reward_progress": weights.progress * deed.advance_m * lengths_per_s,
+        "reward_effort": 0.0 - weights.effort * effort,
+        "reward_slip": 0.0 - weights.slip * deed.slid_m * lengths_per_s,
+        "reward_success": weights.success * float(deed.passed),
+        "reward_failure": 0.0 - weights.failure * float(deed.broke_down),
+    }
+
+
 def _worm(preset: str, changes: Mapping[str, Any], arena: str | None, fidelity: str | None) -> RunConfig:
     """Loads the worm, whatever the preset's own controller is."""
     for path in changes:
@@ -139,7 +181,8 @@ def _whole(name: str, value: float, unit_name: str, unit: float) -> int:
 
 def _goal_m(config: RunConfig) -> float | None:
     """Returns where the middle of a worm has passed a pipe: behind all that bends or narrows, else a body length on."""
-    if not isinstance(config.arena, Pipe):
+    reach_m = config.arena.reach_m() if config.arena is not None else None
+    if reach_m is None:
         return None
     assert isinstance(config.body, WormBody)
-    return reach_of(config.arena)[1] or mesh_of(config.body.mesh).length_m
+    return reach_m[1] or mesh_of(config.body.mesh).length_m

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from annelid.arena.course import AHEAD, LEFT, UP, Course, course_of
-from annelid.config import Arena, Pipe
+from annelid.arena.course import AHEAD, LEFT, UP, Course
+from annelid.config import ArenaKind
 from annelid.morphology import heading_turn
 from annelid.protocols import Array
 
@@ -45,6 +45,6 @@ class Way:
         return Place(along, np.stack([tangent, left, np.cross(tangent, left)]))
 
 
-def way_of(arena: Arena, heading_deg: float = 0.0) -> Way:
+def way_of(arena: ArenaKind, heading_deg: float = 0.0) -> Way:
     """Returns the way through an arena of a worm that starts with a heading."""
-    return Way(course_of(arena) if isinstance(arena, Pipe) else None, heading_deg)
+    return Way(arena.centre_line(), heading_deg)

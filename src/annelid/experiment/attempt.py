@@ -10,8 +10,8 @@ import platform
 import shutil
 import tempfile
 import uuid
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -29,13 +29,12 @@ DRAFTS = ".*.part"
 """Folders of attempts."""
 
 MOST_BYTES = {FILE_NAME: 4 * 2**30, OUTCOME_NAME: 2**26}
-"""The files that a worker may send, and how large each may be, bytes."""
+"""How large a file may be that a worker sends, bytes."""
 
 Keep = Literal["runs", "outcomes"]
 """What is kept of every run: all of its files, or its numbers only."""
 SENT: Mapping[Keep, str] = {"runs": FILE_NAME, "outcomes": OUTCOME_NAME}
 """The one file that a worker sends: an outcome is read at home where its run is there."""
-Files = dict[str, bytes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +63,11 @@ def own_code() -> tuple[str, str]:
     return physics_fingerprint(), code_fingerprint(*READERS)
 
 
-def attempt(task: Task) -> Files | None:
+def attempt(task: Task) -> bytes | None:
     """Computes a run and publishes it in its store.
 
     Returns:
-        None; or the content of the file to send by its name, where the store's folder is not that of this machine.
+        None; or the content of the file to send, where the store's folder is not that of this machine.
 
     Raises:
         ClusterError: This worker has other code.
@@ -85,43 +84,34 @@ def attempt(task: Task) -> Files | None:
     if not _is_shared(home, task.mark):
         with tempfile.TemporaryDirectory(prefix="annelid-") as away:
             compute_run(RunConfig.model_validate_json(task.config), Path(away), task.keep)
-            return {SENT[task.keep]: (Path(away) / SENT[task.keep]).read_bytes()}
-    draft = new_draft(folder)
+            return (Path(away) / SENT[task.keep]).read_bytes()
     try:
-        compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
-        publish(draft, folder, task.keep)
+        with _draft_of(folder, task.keep) as draft:
+            compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
     except OSError:
         # Where another attempt has won, this one's folder may have been cleared away under it.
         if stored_outcome(folder, task.keep) is None:
             raise
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
     return None
 
 
-def fetch_results(files: Files, folder: Path, config: RunConfig, keep: Keep) -> None:
+def fetch_results(content: bytes, folder: Path, config: RunConfig, keep: Keep) -> None:
     """Publishes a run that was computed on another machine, once its file is seen to be of this run.
 
     Args:
-        files: What the worker sent.
+        content: What the worker sent.
         folder: Of the run in the store.
         config: Of the run.
         keep: What is kept.
 
     Raises:
-        ClusterError: It is another file, too large, damaged, or of another run.
+        ClusterError: It is no file, too large, damaged, or of another run.
         OSError: It cannot be written.
     """
     name = SENT[keep]
-    if not isinstance(files, dict) or list(files) != [name]:
-        names = sorted(map(repr, files)) if isinstance(files, dict) else [f"a {type(files).__name__}"]
-        sent = f"{', '.join(names[:3])}{' ..' if len(names) > 3 else ''}"[:200]
-        raise ClusterError(f"a worker sent {sent or 'nothing'} in place of {name}: nothing of it is kept")
-    content = files[name]
     if not isinstance(content, bytes) or len(content) > MOST_BYTES[name]:
         raise ClusterError(f"a worker sent a {name} that is no file of at most {MOST_BYTES[name]:,} bytes")
-    draft = new_draft(folder)
-    try:
+    with _draft_of(folder, keep) as draft:
         draft.mkdir()
         (draft / name).write_bytes(content)
         try:
@@ -138,9 +128,6 @@ def fetch_results(files: Files, folder: Path, config: RunConfig, keep: Keep) -> 
             raise ClusterError(
                 f"a worker sent a damaged {name} of the run {folder.name}: {shortened(str(error), MOST_LISTED)}"
             ) from None
-        publish(draft, folder, keep)
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def compute_run(config: RunConfig, folder: Path, keep: Keep = "runs") -> None:
@@ -185,6 +172,17 @@ def stored_outcome(folder: Path, keep: Keep = "runs") -> Outcome | None:
         with suppress(RunFileError):
             return keep_outcome(open_run(folder))
         return None
+
+
+@contextmanager
+def _draft_of(folder: Path, keep: Keep) -> Iterator[Path]:
+    """Gives an attempt's own folder, which is published if the block ends well and is gone in any case."""
+    draft = new_draft(folder)
+    try:
+        yield draft
+        publish(draft, folder, keep)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
 
 
 def publish(draft: Path, folder: Path, keep: Keep) -> None:

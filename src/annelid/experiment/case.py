@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import shlex
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from annelid.config import Chain, RunConfig, WormBody, load_config, toml_value
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config, toml_value
 from annelid.errors import ConfigError
+from annelid.output import whole_file
 from annelid.plausibility import refuse_nonsense
+from annelid.textfiles import nested, toml_text
 
 SHEAR_OVER_YOUNG = 1.0 / 1.5
 """G/E of the paper's strands (0.2 and 0.3 GPa) and of the authors' later model's (1.33 and 2 GPa)."""
@@ -21,60 +23,28 @@ SHEAR_OVER_YOUNG = 1.0 / 1.5
 _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
 
 # Milliseconds of one core for each evaluation of the dynamics, only to start the longest runs first.
-_COST_MS = {"chain": 3.8, "rods": 4.5, "planar": 0.05}
-
-
-class Work(ABC):
-    """One run that a store computes and keeps."""
-
-    @property
-    @abstractmethod
-    def stem(self) -> str:
-        """What the name of its folder begins with."""
-
-    @property
-    @abstractmethod
-    def command(self) -> str:
-        """The command line that makes it."""
-
-    @abstractmethod
-    def configured(self) -> RunConfig:
-        """Makes its configuration."""
-
-    @cached_property
-    def config(self) -> RunConfig:
-        """Its configuration."""
-        return self.configured()
-
-    @property
-    def cost_s(self) -> float:
-        """About how long the run takes on one core, s: for the order of the runs and the progress bar."""
-        body, clock = self.config.body, self.config.clock
-        evaluations = self.config.duration_s / clock.physics_timestep_s
-        if not isinstance(body, WormBody):
-            return evaluations * _COST_MS["planar"] / 1e3
-        formulation = body.formulation
-        chain = isinstance(formulation, Chain)
-        if isinstance(formulation, Chain) and formulation.integrator == "RK4":
-            evaluations *= 4
-        size = body.mesh.n_segments / 3 * body.mesh.elements_per_side / 3
-        return evaluations * size * _COST_MS["chain" if chain else "rods"] / 1e3
+_PLANAR_STEP_MS = 0.05
 
 
 @dataclass(frozen=True)
-class Case(Work):
+class Case:
     """One run of a study.
 
     Attributes:
-        preset: The preset that it starts from.
+        preset: The preset or TOML file that it starts from.
         changes: Fields that differ from it, by their dotted paths.
+        base: A configuration that it starts from instead, recorded as that says; ``preset`` is then its name.
     """
 
     preset: str
     changes: Mapping[str, Any] = field(default_factory=dict)
+    base: RunConfig | None = None
 
-    def configured(self) -> RunConfig:
-        """Makes its configuration; sparsely recorded unless the case says otherwise."""
+    @cached_property
+    def config(self) -> RunConfig:
+        """Its configuration; a preset's is sparsely recorded unless the case says otherwise."""
+        if self.base is not None:
+            return load_config(self.base.model_dump(exclude_none=True), dict(self.changes))
         config = load_config(self.preset, dict(self.changes))
         if any(path.startswith("record.") for path in self.changes):
             return config
@@ -83,19 +53,29 @@ class Case(Work):
     @property
     def stem(self) -> str:
         """What the name of its folder begins with: the preset's name, or the file's."""
-        return Path(self.preset).name.removesuffix(".toml")
+        return "run" if self.base is not None else Path(self.preset).name.removesuffix(".toml")
 
     @property
     def command(self) -> str:
-        """The command line that makes the same run."""
+        """The command line that makes the same run, as far as the name of a whole configuration tells."""
         return run_command(self.preset, self.changes)
+
+    @property
+    def cost_s(self) -> float:
+        """About how long the run takes on one core, s: for the order of the runs and the progress bar."""
+        body, clock = self.config.body, self.config.clock
+        evaluations = self.config.duration_s / clock.physics_timestep_s
+        if not isinstance(body, WormBody):
+            return evaluations * _PLANAR_STEP_MS / 1e3
+        size = body.mesh.n_segments / 3 * body.mesh.elements_per_side / 3
+        return evaluations * size * body.formulation.step_cost_ms / 1e3
 
     def but(self, changes: Mapping[str, Any]) -> Case:
         """Returns the case with further changes."""
-        return Case(self.preset, {**self.changes, **changes})
+        return replace(self, changes={**self.changes, **changes})
 
 
-def refusal(case: Work) -> ConfigError | None:
+def refusal(case: Case) -> ConfigError | None:
     """Returns why a case's configuration is refused; None if it is not."""
     try:
         refuse_nonsense(case.config)
@@ -109,3 +89,25 @@ def run_command(preset: str, changes: Mapping[str, Any]) -> str:
     told = {path: value for path, value in changes.items() if not path.startswith("record.")}
     words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in told.items()]
     return " ".join(["annelid run", preset, *words])
+
+
+def absolute(source: str) -> str:
+    """Returns the name of a preset as it is, and the path of a TOML file from the root."""
+    return Path(source).resolve().as_posix() if source.endswith(".toml") else source
+
+
+def extend(path: Path, source: str, fields: Mapping[str, Any], heading: Sequence[str]) -> None:
+    """Writes a worm as a file that ``annelid run`` takes: what it extends, and what differs.
+
+    Args:
+        path: The file to write.
+        source: Preset or TOML file that it extends.
+        fields: Values by dotted path.
+        heading: Lines of the comment that it begins with.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    text = toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading))
+    with whole_file(path) as draft:
+        draft.write_text(text, encoding="utf-8")

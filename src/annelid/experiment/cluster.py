@@ -79,6 +79,10 @@ class DaskWorkers(Workers):
             MissingDependency: Dask is not installed.
         """
         if self._client is None:
+            try:
+                import distributed  # noqa: F401
+            except ImportError:
+                raise MissingDependency(MISSING) from None
             self._client = self._join()
             self._greet(threads_of(self._client))
         if self._client.status == "closed":
@@ -146,7 +150,6 @@ class SchedulerWorkers(DaskWorkers):
         return self._cluster.address
 
     def _join(self) -> Client:
-        _require_dask()
         from distributed import Client
 
         address, seconds = self._cluster.found(), self._cluster.reconnect_s
@@ -191,7 +194,6 @@ class SlurmWorkers(DaskWorkers):
         return "in this process"
 
     def _join(self) -> Client:
-        _require_dask()
         from distributed import Client
 
         with _quiet(self.retries):
@@ -258,13 +260,6 @@ def threads_of(client: Client) -> dict[str, int]:
     """Returns the number of threads of every worker by its address."""
     threads: Any = client.nthreads()
     return threads
-
-
-def _require_dask() -> None:
-    try:
-        import distributed  # noqa: F401
-    except ImportError:
-        raise MissingDependency(MISSING) from None
 
 
 def _quiet(retries: int) -> Any:

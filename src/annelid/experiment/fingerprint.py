@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import inspect
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.metadata import version
@@ -48,6 +49,14 @@ def code_fingerprint(*roots: str) -> str:
     for name in sorted(modules_behind(*roots)):
         digest.update(f"{name}\0{_written(name)}\0".encode())
     return digest.hexdigest()[:16]
+
+
+@cache
+def foreign_code(kind: type) -> str:
+    """Returns what the module of another package's kind does, empty for one of annelid's own."""
+    if kind.__module__.split(".")[0] in PACKAGES:
+        return ""
+    return code_of(ast.parse(Path(inspect.getfile(kind)).read_bytes()))
 
 
 def modules_behind(*roots: str) -> set[str]:

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
-from annelid.config import Program
 from annelid.simulation.runfile import Run
 
 
@@ -81,15 +80,8 @@ def outcome(run: Run) -> Outcome:
 
 def write_outcome(read: Outcome, path: Path, reader: str) -> None:
     """Writes an outcome as JSON, with the mark of the code that read it."""
-    content = {
-        "reader": reader,
-        "summary": read.summary.to_dict(),
-        "rhythm": asdict(read.rhythm),
-        "holds": [asdict(hold) for hold in read.holds],
-        "message": read.message,
-        "gait": read.gait.to_dict(),
-        "cpu_time_s": read.cpu_time_s,
-    }
+    content = {"reader": reader, **asdict(read)}
+    del content["path"]
     path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
 
 
@@ -108,13 +100,12 @@ def read_outcome(path: Path, reader: str) -> Outcome:
         raise ValueError(f"{path} is no outcome: {part}: {wrong['msg']}") from None
     if held.reader != reader:
         raise ValueError(f"{path} was read by other code")
-    return Outcome(path.parent, held.summary, held.rhythm, held.holds, held.message, held.gait, held.cpu_time_s)
+    return Outcome(path.parent, **{name: value for name, value in held if name != "reader"})
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:
-    program = run.config.controller
-    data = run.data
-    if not isinstance(program, Program) or not data.sizes.get("time"):
+    contractions, data = run.config.controller.laid_down, run.data
+    if not contractions or not data.sizes.get("time"):
         return ()
     times = data["time"].values
     n_segments = run.config.body.n_segments
@@ -122,7 +113,7 @@ def _holds(run: Run) -> tuple[Hold, ...]:
     ring = data["ring_length"].values.reshape(len(times), n_segments, -1).sum(axis=2)
     force = _segment_means(data["muscle_force"].values, n_segments) if "muscle_force" in data else None
     holds = []
-    for contraction in program.contractions:
+    for contraction in contractions:
         within = np.flatnonzero(times <= contraction.stop_s + 1e-9)
         if times[-1] < contraction.stop_s - 2 * float(np.diff(times).max(initial=0.0)):
             continue

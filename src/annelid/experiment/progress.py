@@ -28,8 +28,11 @@ def study_progress(*, quiet: bool = False) -> Iterator[StudyProgress | None]:
     if quiet:
         yield None
     elif sys.stderr.isatty():
-        with _bar() as update:
-            yield update
+        from annelid.terminal import progress_bar
+
+        time_left = TimeLeft()
+        with progress_bar(transient=True) as draw:
+            yield lambda stage, done, total, share: draw(stage, share, _text(done, total, time_left(stage, share)))
     else:
         yield Lines(sys.stderr)
 
@@ -70,31 +73,6 @@ class Lines:
             text = _text(done, total, left)
             self._stream.write(f"{stage}: {text}\n" if text else f"{stage}\n")
             self._stream.flush()
-
-
-@contextmanager
-def _bar() -> Iterator[StudyProgress]:
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    from annelid.terminal import Console
-
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.fields[state]}", markup=False),
-        console=Console(stderr=True),
-        transient=True,
-        refresh_per_second=2,
-    )
-    time_left = TimeLeft()
-    with bar:
-        task = bar.add_task("", total=1.0, state="")
-
-        def update(stage: str, done: int, total: int, share: float) -> None:
-            state = _text(done, total, time_left(stage, share))
-            bar.update(task, description=stage, completed=share, state=state)
-
-        yield update
 
 
 def _text(done: int, total: int, left_s: float | None) -> str:

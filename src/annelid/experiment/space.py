@@ -1,13 +1,18 @@
-"""What may be varied: a field of a configuration in a range, or among choices."""
+"""What a study varies: fields of a configuration in ranges or among choices, and samples of them."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
-from math import exp, log
+from math import exp, floor, log
 from typing import Any
 
+import numpy as np
+
 from annelid.config import toml_value
+from annelid.config.study import Design
 from annelid.errors import ConfigError
+from annelid.morphology import Array
 
 DIGITS = 4
 """Significant digits of a value, so that a file that states it makes the same run."""
@@ -62,6 +67,20 @@ class Choice:
 Variable = Interval | Choice
 
 
+def interval(field: str, low: float, high: float, present: Any, *, logarithmic: bool = False) -> Interval:
+    """Returns the range of a field, one of whole numbers where its present value is whole.
+
+    Raises:
+        ConfigError: The field holds no number, or is whole and an end of the range is not.
+    """
+    if isinstance(present, bool | str | tuple):
+        raise ConfigError(f"{field} is {toml_value(present)}, which is no number with a range")
+    whole = isinstance(present, int)
+    if whole and not (low.is_integer() and high.is_integer()):
+        raise ConfigError(f"{field} from {low:g} to {high:g}: both ends must be whole numbers, as the field is")
+    return Interval(field, low, high, logarithmic, whole)
+
+
 def to_unit(variable: Interval, value: float) -> float:
     """Returns where a value lies in its range: 0 at the lower end, 1 at the upper one."""
     if variable.logarithmic:
@@ -76,12 +95,37 @@ def from_unit(variable: Interval, share: float) -> float | int:
     return variable.rounded(variable.low + share * (variable.high - variable.low))
 
 
-def is_whole(field: str, present: Any) -> bool:
-    """Whether a range of a field is one of whole numbers, as its present value is.
+def sampled(variable: Variable, share: float) -> Any:
+    """Returns the value of a sample from its place in [0, 1): all choices and all whole numbers alike often."""
+    if isinstance(variable, Choice):
+        return variable.values[int(share * len(variable.values))]
+    if variable.whole:
+        return variable.rounded(floor(variable.low + share * (variable.high - variable.low + 1.0)))
+    return from_unit(variable, share)
 
-    Raises:
-        ConfigError: It is no number at all.
+
+def unit_samples(design: Design, n: int, n_variables: int, seed: int) -> Array:
+    """Draws samples of the unit cube.
+
+    They depend on the seed alone. Those of a random or a Sobol design begin alike however many are drawn, so that more
+    of them leave the earlier runs as they are; those of a Latin hypercube do not.
+
+    Args:
+        design: ``"random"``, ``"lhs"`` or ``"sobol"``.
+        n: How many.
+        n_variables: Dimensions of the cube.
+        seed: Of the samples.
+
+    Returns:
+        Places in [0, 1), ``(n, n_variables)``.
     """
-    if isinstance(present, bool | str | tuple):
-        raise ConfigError(f"{field} is {toml_value(present)}, which is no number with a range")
-    return isinstance(present, int)
+    rng = np.random.default_rng(seed)
+    if design == "random":
+        return rng.random((n, n_variables))
+    from scipy.stats import qmc
+
+    engine = qmc.LatinHypercube(n_variables, rng=rng) if design == "lhs" else qmc.Sobol(n_variables, rng=rng)
+    with warnings.catch_warnings():
+        # That any number but a power of two is less even: the user may add samples later.
+        warnings.simplefilter("ignore", UserWarning)
+        return np.minimum(engine.random(n), np.nextafter(1.0, 0.0))

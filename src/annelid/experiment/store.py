@@ -14,10 +14,13 @@ import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, wait
-from contextlib import contextmanager
+from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-from annelid.errors import ClusterError, RunFileError
+from annelid.config.kinds import kinds_in
+from annelid.errors import AnnelidError, ClusterError, ConfigError, RunFileError
 from annelid.experiment.attempt import (
     DRAFTS,
     MARK_NAME,
@@ -28,9 +31,10 @@ from annelid.experiment.attempt import (
     run_of_draft,
     stored_outcome,
 )
-from annelid.experiment.case import Work
-from annelid.experiment.fingerprint import physics_fingerprint
+from annelid.experiment.case import Case, refusal
+from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
+from annelid.experiment.progress import StudyProgress
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.simulation.runfile import Run, open_run
 
@@ -39,6 +43,41 @@ Progress = Callable[[int, int, float], object]
 
 POLL_S = 0.5
 """How often workers are looked for that have come or gone, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What became of a case.
+
+    Attributes:
+        outcome: What is kept of its run; None where there is none.
+        error: Why there is none.
+        refused: Whether that was known before anything ran.
+    """
+
+    outcome: Outcome | None
+    error: Exception | None = None
+    refused: bool = False
+
+    @property
+    def status(self) -> Literal["complete", "stopped", "failed"]:
+        """How it went: "stopped" is ended by a guard before its time, "failed" could not be computed."""
+        if self.outcome is None:
+            return "failed"
+        return "stopped" if self.outcome.message else "complete"
+
+    @property
+    def reason(self) -> str:
+        """Why it is not complete, in a sentence; empty if it is."""
+        if self.outcome is not None:
+            return self.outcome.message
+        text = " ".join(str(self.error).split())
+        return text if isinstance(self.error, AnnelidError) and text else f"{type(self.error).__name__}: {text}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about its run, a sentence each."""
+        return () if self.outcome is None else self.outcome.summary.warnings
 
 
 class Store:
@@ -56,21 +95,21 @@ class Store:
         self._workers = workers
         self._keep: Keep = keep
 
-    def path(self, case: Work) -> Path:
+    def path(self, case: Case) -> Path:
         """Folder of a case's run."""
         return self.folder / f"{case.stem}-{case_key(case)}"
 
-    def __contains__(self, case: Work) -> bool:
+    def __contains__(self, case: Case) -> bool:
         return self._stored(case) is not None
 
-    def __getitem__(self, case: Work) -> Outcome:
+    def __getitem__(self, case: Case) -> Outcome:
         """Outcome of a case that has been computed; KeyError if it has not."""
         found = self._stored(case)
         if found is None:
             raise KeyError(case.command)
         return found
 
-    def run(self, case: Work) -> Run:
+    def run(self, case: Case) -> Run:
         """Opens the run of a case that has been computed.
 
         Raises:
@@ -78,12 +117,12 @@ class Store:
         """
         return open_run(self.path(case))
 
-    def _stored(self, case: Work) -> Outcome | None:
+    def _stored(self, case: Case) -> Outcome | None:
         return stored_outcome(self.path(case), self._keep)
 
     def compute(
         self,
-        cases: Iterable[Work],
+        cases: Iterable[Case],
         *,
         jobs: int | None = None,
         progress: Progress | None = None,
@@ -121,7 +160,9 @@ class Store:
         if not missing:
             return found
         mark = self._mark()
-        with self._opened(min(jobs or os.cpu_count() or 1, len(missing))) as workers:
+        given = self._workers
+        cores = min(jobs or os.cpu_count() or 1, len(missing))
+        with Processes(cores) if given is None else nullcontext(given) as workers:
             for case, error in self._computed(workers, missing, mark):
                 left_s, done = left_s - case.cost_s, done + 1
                 if error is None:
@@ -134,13 +175,49 @@ class Store:
         self._clear_drafts()
         return found
 
+    def finish(
+        self, cases: Sequence[Case], stage: str, *, jobs: int | None = None, progress: StudyProgress | None = None
+    ) -> list[Done]:
+        """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
+
+        Args:
+            cases: The cases.
+            stage: What is told as they are run.
+            jobs: As of `compute`.
+            progress: Called as cases are checked and run.
+
+        Returns:
+            What became of every case, in their order.
+        """
+
+        def told(text: str, done: int, total: int, share: float) -> None:
+            if progress is not None:
+                progress(text, done, total, share)
+
+        failed: dict[str, Exception] = {}
+        refused: list[ConfigError | None] = []
+        for i, case in enumerate(cases):
+            told("checking the runs", i, len(cases), i / len(cases))
+            refused.append(refusal(case))
+        built = [case for case, error in zip(cases, refused, strict=True) if error is None]
+        outcomes = self.compute(
+            built,
+            jobs=jobs,
+            progress=lambda *state: told(f"{stage}, {len(failed)} failed" if failed else stage, *state),
+            failed=failed,
+        )
+        return [
+            Done(outcomes.get(case_key(case)), failed.get(case_key(case))) if error is None else Done(None, error, True)
+            for case, error in zip(cases, refused, strict=True)
+        ]
+
     def _computed(
-        self, workers: Workers, missing: Sequence[Work], mark: str
-    ) -> Iterator[tuple[Work, Exception | None]]:
+        self, workers: Workers, missing: Sequence[Case], mark: str
+    ) -> Iterator[tuple[Case, Exception | None]]:
         """Has runs computed, and hands each over as it is there or has failed."""
         # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
         # dies would be counted against the runs behind the one that killed it.
-        waiting, running, tries = deque(missing), dict[Result, Work](), Counter[str]()
+        waiting, running, tries = deque(missing), dict[Result, Case](), Counter[str]()
         while waiting or running:
             while waiting and len(running) < workers.slots():
                 case = waiting.popleft()
@@ -152,9 +229,9 @@ class Store:
                 case = running.pop(future)
                 key = case_key(case)
                 try:
-                    files = future.result()
-                    if files is not None:
-                        fetch_results(files, self.path(case), case.config, self._keep)
+                    content = future.result()
+                    if content is not None:
+                        fetch_results(content, self.path(case), case.config, self._keep)
                 except CancelledError:
                     waiting.append(case)
                 except ClusterError:
@@ -170,7 +247,7 @@ class Store:
                 else:
                     yield case, None
 
-    def _task(self, case: Work, mark: str) -> Task:
+    def _task(self, case: Case, mark: str) -> Task:
         config = case.config.model_dump_json()
         return Task(self.path(case).name, config, own_code(), str(self.folder.resolve()), mark, self._keep)
 
@@ -188,17 +265,9 @@ class Store:
             if stored_outcome(run_of_draft(draft), self._keep) is not None:
                 shutil.rmtree(draft, ignore_errors=True)
 
-    @contextmanager
-    def _opened(self, jobs: int) -> Iterator[Workers]:
-        """Gives the store's own workers, or as many processes as are asked for."""
-        if self._workers is not None:
-            yield self._workers
-        else:
-            with Processes(jobs) as processes:
-                yield processes
 
-
-def case_key(case: Work) -> str:
-    """Digest of all that a run depends on: its configuration, annelid's code, and the engine."""
-    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint()
+def case_key(case: Case) -> str:
+    """Digest of all that a run depends on: its configuration, the code that computes it, and the engine."""
+    foreign = "".join(sorted(foreign_code(kind) for kind in kinds_in(case.config)))
+    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint() + foreign
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -15,11 +15,11 @@ from types import TracebackType
 from typing import Self
 
 from annelid.errors import ClusterError, RunKilled
-from annelid.experiment.attempt import Files, Task, attempt
+from annelid.experiment.attempt import Task, attempt
 from annelid.experiment.lifeline import end_with_parent
 from annelid.simulation.interruption import Interruption
 
-Result = Future[Files | None]
+Result = Future[bytes | None]
 
 STARTS = 5
 """Processes that are tried for one run before they count as unable to start."""
@@ -109,31 +109,21 @@ class Processes(Workers):
         Raises:
             ClusterError: Processes end as they start.
         """
-        free = next((one for one in self._processes if one.result is None or one.result.done()), None)
-        if free is not None and free.result is not None and isinstance(free.result.exception(), BrokenExecutor):
-            self._bury(free)
-            free = None
         # The pool starts its process as it takes work.
         with _single_threaded():
-            for left in reversed(range(STARTS)):
-                free = free or self._start()
+            for _ in range(STARTS):
+                free = self._free() or self._start()
                 try:
-                    free.result = free.pool.submit(attempt, task)
+                    result = free.result = free.pool.submit(attempt, task)
                     # One that dies at this very moment may lose the run without a word, so that it would never end
                     # (CPython 3.11); a pool that still takes a call tells of what it has taken before.
                     free.pool.submit(os.getpid)
-                    break
                 except BrokenExecutor:
                     # It was killed while it had nothing to do.
                     self._bury(free)
-                    free = None
-                    if not left:
-                        raise ClusterError(
-                            f"{STARTS} processes ended as they started: killed, or out of memory (try fewer --jobs)"
-                        ) from None
-        assert free is not None
-        assert free.result is not None
-        return free.result
+                else:
+                    return result
+        raise ClusterError(f"{STARTS} processes ended as they started: killed, or out of memory (try fewer --jobs)")
 
     def explained(self, error: Exception) -> Exception:
         """Says in a sentence that the process of a run has died."""
@@ -152,6 +142,14 @@ class Processes(Workers):
             reader.close()
             writer.close()
         self._processes, self._lifeline = [], None
+
+    def _free(self) -> _Process | None:
+        """Returns a process with nothing to do; one whose run has killed it is buried."""
+        free = next((one for one in self._processes if one.result is None or one.result.done()), None)
+        if free is not None and free.result is not None and isinstance(free.result.exception(), BrokenExecutor):
+            self._bury(free)
+            return None
+        return free
 
     def _start(self) -> _Process:
         context = get_context("spawn")

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from annelid.draw.render import Progress, render_video
-from annelid.errors import MissingDependency, RunFileError, suggest
+from annelid.errors import MissingDependency, RunFileError
 from annelid.export.matlab import write_matlab
 from annelid.export.mjcf import write_mjcf
 from annelid.export.page import write_page
 from annelid.export.tables import Table, about, tables_of, write_parquet, write_table
 from annelid.output import with_suffix, write_json
+from annelid.registry import Registry
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -72,15 +73,17 @@ class Format:
         return with_suffix(output, (self.suffix,), self.name, default=self.suffix)
 
 
+FORMATS: Registry[Format] = Registry("format", "annelid.export", error=RunFileError)
+"""Every format by its name; a module in this package, or one of another package, adds its own."""
+
+
 def find_format(name: str) -> Format:
     """Returns the format of a name.
 
     Raises:
         RunFileError: There is none; the sentence suggests the nearest.
     """
-    if name not in FORMATS:
-        raise RunFileError(f"unknown format {name!r}: {suggest(name, FORMATS)}")
-    return FORMATS[name]
+    return FORMATS.find(name)
 
 
 def _csv(run: Run, path: Path, progress: Progress) -> list[Path]:
@@ -129,21 +132,19 @@ def _tables(
     return [write(table, path if alone else path / f"{name}{suffix}", wrote) for name, table in tables.items()]
 
 
-FORMATS = {
-    each.name: each
-    for each in (
-        Format("csv", "csv", ".csv", SELECTION, _csv),
-        Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)], "scipy"),
-        Format("parquet", "parquet", ".parquet", SELECTION, _parquet, "pyarrow"),
-        Format("mp4", "video.mp4", ".mp4", WINDOW, lambda run, path, told: [render_video(run, path, progress=told)]),
-        Format(
-            "gif",
-            "video.gif",
-            ".gif",
-            WINDOW,
-            lambda run, path, told: [render_video(run, path, fps=GIF_FPS, progress=told)],
-        ),
-        Format("html", "report.html", ".html", WINDOW, lambda run, path, told: [write_page(run, path, told)]),
-        Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)]),
-    )
-}
+for _format in (
+    Format("csv", "csv", ".csv", SELECTION, _csv),
+    Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)]),
+    Format("parquet", "parquet", ".parquet", SELECTION, _parquet, "pyarrow"),
+    Format("mp4", "video.mp4", ".mp4", WINDOW, lambda run, path, told: [render_video(run, path, progress=told)]),
+    Format(
+        "gif",
+        "video.gif",
+        ".gif",
+        WINDOW,
+        lambda run, path, told: [render_video(run, path, fps=GIF_FPS, progress=told)],
+    ),
+    Format("html", "report.html", ".html", WINDOW, lambda run, path, told: [write_page(run, path, told)]),
+    Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)]),
+):
+    FORMATS.add(_format.name, _format)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.body.mjcf import Keyframe, mjcf_text
-from annelid.config import PlanarWorm
 from annelid.errors import RunFileError
 from annelid.output import whole_file
 
@@ -32,7 +31,7 @@ def write_mjcf(run: Run, path: Path) -> Path:
         ConfigError: The worm is planar or started with a heading, or its friction depends on the direction.
         RunFileError: The file cannot be written.
     """
-    text = mjcf_text(run.config, [] if isinstance(run.config.body, PlanarWorm) else _keyframes(run))
+    text = mjcf_text(run.config, [] if run.config.body.is_planar else _keyframes(run))
     with whole_file(path) as draft:
         draft.write_text(text, encoding="utf-8")
     return path

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from annelid.analysis import gait, summary
-from annelid.config import PlanarWorm, RunConfig, field_value, fields_of, toml_value
+from annelid.config import RunConfig, field_value, fields_of, toml_value
 from annelid.draw.figures.track import track_figure
 from annelid.draw.markdown import anchors, code, emphasis, table, words
 from annelid.draw.page import page
@@ -79,7 +79,7 @@ def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:
         ("frame.png", lambda run, path: render_frame(run, middle, path), f"The worm at {middle:g} s."),
         ("figure7.png", figure7, "Potentials of the half-centres, contractions, and lengths of the stretch sensors."),
     ]
-    if not isinstance(run.config.body, PlanarWorm):
+    if not run.config.body.is_planar:
         pictures.append(("track.png", track_figure, "Where it crawled, seen from above."))
     blocks = ["## Figures"]
     for done, (name, draw, caption) in enumerate(pictures, start=1):

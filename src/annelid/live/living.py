@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.live.moments import Moment, Reel, signal_names
 from annelid.morphology import Array

@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.kinds.floor import Floor
 from annelid.arena.scenery import (
     FLOOR_HALF_SIZE_M,
-    PIPE_ABOVE_FLOOR_M,
     PIPE_RGBA,
     POST_HALF_HEIGHT_M,
     POST_RGBA,
     RAIL_HALF_HEIGHT_M,
     RAIL_RGBA,
 )
-from annelid.arena.shapes import shape_of
-from annelid.config import Floor, Pipe, RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
+from annelid.config.arena import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.draw.scene import upright
 from annelid.live.picture import CONTACT_COLOR, Colors, Picture
@@ -145,8 +146,7 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, h
     scene, arena = server.scene, config.arena
     assert arena is not None
     scene.add_frame(f"{_ROOT}/ground", show_axes=False)
-    shape = shape_of(arena, length_m)
-    pipe = isinstance(arena, Pipe)
+    shape, pipe = arena.shape(length_m), arena.is_closed
     if shape is not None and pipe:
         look: dict[str, Any] = {"color": PIPE_RGBA[:3], "opacity": PIPE_RGBA[3], "side": "double"}
         scene.add_mesh_simple(f"{_ROOT}/ground/pipe", shape.vertices_m, shape.faces, **look)
@@ -158,14 +158,12 @@ def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, h
         relief.visual = ColorVisuals(relief, vertex_colors=_shaded(relief.vertex_normals))
         scene.add_mesh_trimesh(f"{_ROOT}/ground/relief", relief, cast_shadow=False, receive_shadow=False)
     if shape is None or pipe:
-        depth = arena.floor_gap_m if isinstance(arena, Floor) else PIPE_ABOVE_FLOOR_M
-        vertices, faces = _squares(-depth)
+        vertices, faces = _squares(-arena.floor_depth_m)
         vertices = vertices @ heading_turn(heading_deg).T
         # The plainest of the viewer's materials.
         look = {"color": SQUARE_COLOR, "material": "toon3", "cast_shadow": False, "receive_shadow": False}
         scene.add_mesh_simple(f"{_ROOT}/ground/floor", vertices, faces, **look)
-    if isinstance(arena, Floor):
-        _add_walls(scene, arena)
+    _add_walls(scene, arena)
 
 
 def _shaded(normals: Array) -> NDArray[np.uint8]:
@@ -198,16 +196,17 @@ def _half_width(place_m: float) -> float:
     return STRIP_M / 2 * (2.5 if abs(place_m - round(place_m)) < 1e-6 else 1.0)
 
 
-def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:
-    for number, (x, y, radius) in enumerate(arena.posts or ()):
+def _add_walls(scene: viser.SceneApi, arena: ArenaKind) -> None:
+    rail_gap_m, posts = arena.walls
+    for number, (x, y, radius) in enumerate(posts):
         scene.add_cylinder(
             f"{_ROOT}/ground/post_{number}",
             radius=radius,
             height=2 * POST_HALF_HEIGHT_M,
             color=POST_RGBA[:3],
-            position=(x, y, POST_HALF_HEIGHT_M - arena.floor_gap_m),
+            position=(x, y, POST_HALF_HEIGHT_M - arena.floor_depth_m),
         )
-    if arena.rail_gap_m is None:
+    if rail_gap_m is None:
         return
     for side in (-1.0, 1.0):
         scene.add_box(
@@ -215,5 +214,5 @@ def _add_walls(scene: viser.SceneApi, arena: Floor) -> None:
             dimensions=(FLOOR_HALF_SIZE_M, 0.004, 2 * RAIL_HALF_HEIGHT_M),
             color=RAIL_RGBA[:3],
             opacity=RAIL_RGBA[3],
-            position=(0.0, side * (arena.rail_gap_m / 2 + 0.002), RAIL_HALF_HEIGHT_M - arena.floor_gap_m),
+            position=(0.0, side * (rail_gap_m / 2 + 0.002), RAIL_HALF_HEIGHT_M - arena.floor_depth_m),
         )

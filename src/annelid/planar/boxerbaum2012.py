@@ -18,16 +18,38 @@ the segments push them apart; there is neither gravity nor ground, so the centre
 
 Source: Boxerbaum, Shaw, Chiel and Quinn 2012, Continuous wave peristaltic motion in a robot, Int. J. Robot. Res. 31,
 302-318, as described by Riddle et al. 2023, section 2.1. The constants are this package's own
-(`annelid.config.Boxerbaum2012Body`), as are the force-height law of the muscles and the dampers.
+(`Boxerbaum2012Body`), as are the force-height law of the muscles and the dampers.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING, ClassVar, Literal
 
-from annelid.config import Boxerbaum2012Body, Clock
+import numpy as np
+from pydantic import Field
+
+from annelid.config.sections import NonNegative, Positive
 from annelid.planar.dynamic import DynamicPlanarPlant
 from annelid.planar.linkage import Linkage
+from annelid.planar.sections import DynamicPlanarWorm
+
+if TYPE_CHECKING:
+    from annelid.config.run import Clock, RunConfig
+
+
+class Boxerbaum2012Body(DynamicPlanarWorm):
+    """The planar worm of Boxerbaum 2012: rhombi whose sides bend in their middle, without ground."""
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("boxerbaum2012", "the planar worm"),)
+    touches_ground: ClassVar[bool] = False
+    kind: Literal["boxerbaum2012"] = "boxerbaum2012"
+    middle_mass_kg: Positive = Field(default=0.02, description="mass of the middle of a side")
+    torsion_stiffness_Nm_per_rad: Positive = Field(default=0.2, description="torsional spring in the middle of a side")
+    torsion_damping_Nms_per_rad: NonNegative = Field(default=0.01, description="viscous resistance beside it")
+
+    def build(self, config: RunConfig) -> Boxerbaum2012Plant:
+        """Builds the worm, as `BodyKind.build`."""
+        return Boxerbaum2012Plant(self, config.clock)
 
 
 class Boxerbaum2012Plant(DynamicPlanarPlant):

@@ -24,11 +24,50 @@ linear walls, and the dampers beside the muscles.
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
-from annelid.config import Clock, Daltorio2013Body
+import numpy as np
+from pydantic import Field, model_validator
+
+from annelid.config.sections import NonNegative, Positive
 from annelid.planar.dynamic import DynamicPlanarPlant
 from annelid.planar.linkage import Linkage
+from annelid.planar.sections import DynamicPlanarWorm
+
+if TYPE_CHECKING:
+    from annelid.config.run import Clock, RunConfig
+
+
+class Daltorio2013Body(DynamicPlanarWorm):
+    """The planar worm of Daltorio 2013: rigid-sided rhombi, torsional springs between them, and the walls of a pipe."""
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("daltorio2013", "the planar worm"),)
+    kind: Literal["daltorio2013"] = "daltorio2013"
+    torsion_stiffness_Nm_per_rad: NonNegative = Field(
+        default=0.2, description="torsional springs between neighbouring segments"
+    )
+    torsion_damping_Nms_per_rad: NonNegative = Field(default=0.0, description="viscous resistance beside them")
+    pipe_diameter_m: Positive = Field(default=0.1, description="distance of the walls from one another")
+    wall_stiffness_N_per_m: Positive = Field(default=2000.0, description="force per indentation at one vertex")
+    wall_friction: NonNegative = Field(default=0.5, description="coefficient of Coulomb friction with the walls")
+
+    @model_validator(mode="after")
+    def _the_worm_can_leave_the_wall(self) -> Self:
+        if self.pipe_diameter_m <= self.height_shortest_m:
+            raise ValueError(
+                f"body.pipe_diameter_m = {self.pipe_diameter_m:g} must be greater than body.height_shortest_m = "
+                f"{self.height_shortest_m:g}"
+            )
+        return self
+
+    @property
+    def wall_distance_m(self) -> float:
+        """As `pipe_diameter_m`."""
+        return self.pipe_diameter_m
+
+    def build(self, config: RunConfig) -> Daltorio2013Plant:
+        """Builds the worm, as `BodyKind.build`."""
+        return Daltorio2013Plant(self, config.clock)
 
 
 class Daltorio2013Plant(DynamicPlanarPlant):

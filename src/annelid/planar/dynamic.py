@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.clock import StepRatio
-from annelid.config import Clock
 from annelid.errors import SimulationStopped
 from annelid.planar.linkage import Linkage
 from annelid.planar.midpoint import midpoint_step
 from annelid.protocols import Array, Recordable, Sensation, Signal, State
+
+if TYPE_CHECKING:
+    from annelid.config.run import Clock
 
 _STEEPEST = 0.9999
 _HALVINGS = 80

@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
-from annelid.config import DynamicPlanarWorm
+from annelid.planar.sections import DynamicPlanarWorm
 from annelid.protocols import Array
 
 _NO_WAY_M = 1e-12

@@ -3,14 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from annelid.clock import StepRatio
-from annelid.config import Clock, PlanarBody
+from annelid.config.sections import Positive
 from annelid.errors import ConfigError
+from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Array, Recordable, Sensation, Signal, State
+
+if TYPE_CHECKING:
+    from annelid.config.run import Clock, RunConfig
+
+
+class PlanarBody(PlanarWorm):
+    """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2022", "the planar worm"),)
+    touches_ground: ClassVar[bool] = False
+    kind: Literal["riddle2022"] = "riddle2022"
+    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    height_min_m: Positive = Field(default=0.065, description="height when contracted")
+    height_max_m: Positive = Field(default=0.11, description="height when relaxed")
+    gain: Positive = Field(
+        default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
+    )
+
+    @model_validator(mode="after")
+    def _heights_fit_the_rhombus(self) -> Self:
+        if not self.height_min_m < self.height_max_m < 2 * self.side_m:
+            raise ValueError(
+                f"body.height_min_m = {self.height_min_m:g} and body.height_max_m = {self.height_max_m:g} must satisfy "
+                f"height_min_m < height_max_m < 2 side_m = {2 * self.side_m:g}"
+            )
+        return self
+
+    def published_period_s(self, config: RunConfig) -> float | None:
+        """Returns the period that the authors' code gives for their time constants and gains, s."""
+        gate_ms = float(getattr(config.controller, "gate_time_constant_ms", 0.0))
+        return _PUBLISHED_PERIODS_S.get((self.n_segments, gate_ms, self.gain))
+
+    def build(self, config: RunConfig) -> Riddle2022Plant:
+        """Builds the worm, as `BodyKind.build`."""
+        return Riddle2022Plant(self, config.clock)
+
+
+# (segments, tau_h,max in ms, gain): period in s.
+_PUBLISHED_PERIODS_S = {
+    (3, 300.0, 1.3): 2.625,
+    (6, 300.0, 1.3): 5.250,
+    (3, 200.0, 1.9): 1.867,
+    (6, 200.0, 1.9): 3.734,
+    (3, 100.0, 3.6): 1.124,
+    (6, 100.0, 3.6): 2.248,
+}
 
 # A spool at 20 turns a minute takes up 2 pi 20 / 60 cm/s per cm of radius; the authors' loop moves 1/300 of that
 # number a millisecond for each unit of gain and of height error, so per second it is 1000 / 300 of it.

@@ -6,7 +6,7 @@ to the last bit in both cases: sums run in the same order whatever the number of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import NamedTuple, Self
 
@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 from annelid.arena.contact import touching
 from annelid.arena.surface import Surface
 from annelid.body import mesh_of
-from annelid.body.actuation import crossing_site, ring_names, stretch_sensors, winding_speed
-from annelid.body.rods import vertex_name
-from annelid.config import Chain, Rods, ServoRings, WormBody
-from annelid.morphology import Array, MeshGeometry
+from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
+from annelid.body.worm import WormBody
+from annelid.morphology import Array, MeshGeometry, norm
 from annelid.simulation.books import Bookkeeper
 from annelid.simulation.elasticity import Elasticity
 from annelid.simulation.skin import Skin
@@ -150,9 +149,8 @@ class Anatomy:
         self._before, self._behind = np.maximum(segments - 1, 0), np.minimum(segments + 1, self.n_segments - 1)
         self._sensors = stretch_sensors(self.geometry, body.springs)
         self.rest_stretch_m = self.geometry.spring_length_m[self._sensors]
-        self._servos = body.rings if isinstance(body.rings, ServoRings) else None
-        # Servos begin with their cables paid out.
-        self.first_act = np.zeros(model.na) if self._servos is None else model.actuator_actrange[:, 1].copy()
+        self._rings = body.rings
+        self.first_act = body.rings.first_act(model)
         self.has_edges = bool(model.nflexedge)
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
         self.crossing_body: NDArray[np.int32] = model.site_bodyid[self._crossing_site]
@@ -160,7 +158,7 @@ class Anatomy:
         self._mass_share = model.body_mass / model.body_mass.sum()
         self._edges_per_m = 1.0 / model.flexedge_length0
         self._contact_slice, self._skin_geom, self._segment_rows, self.skin = self._contacts_of_segments(surface)
-        self._pin_gap, pin_outputs = self._pin_reader(body)
+        self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
         self.pins_can_part = self._pin_gap is not None
         edges = ("flexedge_length",) if self.has_edges else ()
         self.elasticity = Elasticity(model, body)
@@ -188,15 +186,6 @@ class Anatomy:
         skin = Skin(rest, nearest, geometry.n_segments, geometry.radius_m, surface)
         return slice(first, first + 3 * len(sensors)), geoms, np.eye(geometry.n_segments)[:, nearest], skin
 
-    def _pin_reader(self, body: WormBody) -> tuple[Callable[[Mapping[str, Array]], Array] | None, tuple[str, ...]]:
-        """Returns what reads the largest gap at a pin, if pins can part, and the arrays that it needs."""
-        formulation = body.formulation
-        if isinstance(formulation, Chain):
-            return _gap_at_connections(self.model, formulation.pins == "separate"), ("xpos", "xmat")
-        if isinstance(formulation, Rods) and formulation.pins == "separate":
-            return _gap_at_vertices(_pinned_bodies(self.model, self.geometry)), ("xpos",)
-        return None, ()
-
     def locate(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
         """Brings the engine's positions up to its coordinates, which is not part of a step.
 
@@ -214,9 +203,9 @@ class Anatomy:
     def posture(self, crossing: Array, center_of_mass: Array, skin: Array) -> Posture:
         """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
         ends = crossing.take(self.geometry.springs, axis=-2)
-        spring = _norm(ends[..., 1, :] - ends[..., 0, :])
+        spring = norm(ends[..., 1, :] - ends[..., 0, :])
         corners = crossing.take(self.ring_path, axis=-2)
-        ring = _norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
+        ring = norm(corners[..., 1:, :] - corners[..., :-1, :]).sum(axis=-1)
         center = crossing.take(self.geometry.rings, axis=-2).mean(axis=-2)
         front = center[..., 0, :]
         heading = _unit(front - center[..., -1, :])
@@ -233,11 +222,7 @@ class Anatomy:
             ring_length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
             time_s: Time for which it holds, s.
         """
-        if self._servos is None:
-            return activation
-        model = self.model
-        limits = -model.actuator_forcerange[:, 0]
-        return winding_speed(activation, state, ring_length_m, model.actuator_actrange, limits, self._servos, time_s)
+        return self._rings.drive(self.model, activation, state, ring_length_m, time_s)
 
     def ground(self, engine: Mapping[str, Array]) -> Array:
         """Reads the force of the ground on every geom of the skin during the last physics step, N, ``(n_geoms, 3)``."""
@@ -270,51 +255,6 @@ class Anatomy:
         )
 
 
-def _pinned_bodies(model: mujoco.MjModel, geometry: MeshGeometry) -> NDArray[np.int64]:
-    """Bodies of both strands at every crossing of rods with separate pins, ``(n_crossings, 2)``."""
-    vertices = geometry.crossing_vertex[geometry.crossing_plane]
-    return np.array(
-        [
-            [model.body(vertex_name(int(strand), int(vertex))).id for strand in strands]
-            for strands, vertex in zip(geometry.crossing_strands, vertices, strict=True)
-        ]
-    )
-
-
-def _gap_at_vertices(bodies: NDArray[np.int64]) -> Callable[[Mapping[str, Array]], Array]:
-    def gap(engine: Mapping[str, Array]) -> Array:
-        ends = engine["xpos"].take(bodies, axis=-2)
-        return _norm(ends[..., 1, :] - ends[..., 0, :]).max(axis=-1)
-
-    return gap
-
-
-def _gap_at_connections(model: mujoco.MjModel, separate: bool) -> Callable[[Mapping[str, Array]], Array]:
-    """Reads the residual of the engine's connections; with a pin mass, two of them make one crossing."""
-    sides = ((model.eq_obj1id, model.eq_data[:, :3]), (model.eq_obj2id, model.eq_data[:, 3:6]))
-
-    def gap(engine: Mapping[str, Array]) -> Array:
-        position, turn = engine["xpos"], engine["xmat"]
-        turn = turn.reshape(*turn.shape[:-1], 3, 3)
-        first, second = (
-            position.take(body, axis=-2) + (turn.take(body, axis=-3) * local[:, np.newaxis]).sum(axis=-1)
-            for body, local in sides
-        )
-        residual = first - second
-        if separate:
-            residual = residual[..., 0::2, :] - residual[..., 1::2, :]
-        return _norm(residual).max(axis=-1)
-
-    return gap
-
-
-def _norm(vectors: Array) -> Array:
-    """Lengths of vectors along the last axis."""
-    squares = vectors * vectors
-    # In this order the last bit is that of numpy's einsum and of a dot product.
-    return np.sqrt((squares[..., 0] + squares[..., 2]) + squares[..., 1])
-
-
 def _unit(vectors: Array) -> Array:
     """Vectors of the same directions and of length one."""
-    return vectors / _norm(vectors)[..., np.newaxis]
+    return vectors / norm(vectors)[..., np.newaxis]

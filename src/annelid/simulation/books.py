@@ -21,9 +21,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Rings, ServoRings
+from annelid.body.actuators import ActuatorKind
 from annelid.morphology import Array
-from annelid.simulation.muscle_slopes import slopes_of
 
 Engine = Mapping[str, NDArray[Any]]
 """The engine's arrays of one worm by name."""
@@ -75,11 +74,13 @@ class Bookkeeper:
         "moment_rowadr",
     )
 
-    def __init__(self, model: mujoco.MjModel, rings: Rings | ServoRings) -> None:
+    def __init__(self, model: mujoco.MjModel, rings: ActuatorKind) -> None:
         """Notes the time step and what the actuators are."""
         self._n_muscles = model.nu
         self._timestep_s = float(model.opt.timestep)
-        self.slopes = slopes_of(model, rings)
+        # Other integrators take the actuators' forces as they are at the start of a step.
+        implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
+        self.slopes = rings.slopes(model) if implicit else None
 
     def opened(self) -> Books:
         """Returns the books before the first step."""

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from annelid.body.damping import HELD, damper_coefficients, damper_name, damper_rows, is_damper
-from annelid.config import Strands
+from annelid.body.worm import Strands
 from annelid.morphology import Array
 
 INERTANCE = 1e-3

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Rods, WormBody
+from annelid.body.worm import WormBody
 from annelid.morphology import Array
 
 Seen = NDArray[np.complex128]
@@ -41,7 +41,7 @@ class Elasticity:
         springs = [model.tendon(f"spring_{i}").id for i in range(_count(model, "spring_"))]
         self._spring_rate = model.tendon_stiffness[springs].copy()
         self._spring_slack = model.tendon_lengthspring[springs].T.copy()
-        self._rods = _Rods(model, body) if isinstance(body.formulation, Rods) else None
+        self._rods = _Rods(model, body) if model.nflex else None
         self._joints = _Joints(model)
 
     def energy_J(self, qpos: Array, plastic: Array, spring_length_m: Array) -> float:

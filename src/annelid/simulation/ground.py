@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.surface import ground_of
-from annelid.config import Arena
+from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
 
 
@@ -22,7 +21,7 @@ class MovingGround:
         depth_m: Depth of the deepest part of the skin in the ground where planes were laid last, m; negative above it.
     """
 
-    def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena) -> None:
+    def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: ArenaKind) -> None:
         """Finds the planes.
 
         Args:
@@ -32,7 +31,7 @@ class MovingGround:
         """
         self._model = model
         self.depth_m = -np.inf
-        self._surface = ground_of(arena)
+        self._surface = arena.ground()
         self._skin, self._planes = _skin_and_planes(model)
         self._bodies = model.geom_bodyid[self._skin]
         self._roots = model.body_rootid[self._bodies]
@@ -90,7 +89,9 @@ class _Setae:
     A part that sticks creeps the way it is pushed, since contacts are soft, so the sign tells at rest too.
     """
 
-    def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: Arena, skin: NDArray[np.int32]) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, geometry: MeshGeometry, arena: ArenaKind, skin: NDArray[np.int32]
+    ) -> None:
         assert arena.backward_friction is not None
         self._forwards, self._backwards = arena.friction, arena.backward_friction
         n_planes = len(geometry.plane_x_m)

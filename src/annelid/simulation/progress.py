@@ -33,28 +33,15 @@ def reporting(
 
 @contextmanager
 def _bar(start_s: float, end_s: float, forced: bool) -> Iterator[ProgressCallback]:
-    from rich.progress import BarColumn, Progress, TextColumn
+    from annelid.terminal import progress_bar
 
-    from annelid.terminal import Console
-
-    console = Console(stderr=True, force_terminal=True if forced else None)
-    bar = Progress(
-        TextColumn("simulated {task.completed:.2f} of {task.total:g} s"),
-        BarColumn(),
-        TextColumn("{task.fields[speed]}  {task.fields[left]}"),
-        console=console,
-        # The loop refreshes; a thread of its own would compete with the physics for the core.
-        auto_refresh=False,
-    )
-    with bar:
-        task = bar.add_task("", total=end_s, speed="", left="")
-        bar.update(task, completed=start_s)
+    with progress_bar(forced=forced) as draw:
 
         def update(simulated_s: float, wall_s: float) -> None:
             factor = (simulated_s - start_s) / wall_s if wall_s > 0 else 0.0
             left = f"{clock_text((end_s - simulated_s) / factor)} left" if factor > 0 else ""
-            bar.update(task, completed=simulated_s, speed=f"{factor:.3g} x real time", left=left)
-            bar.refresh()
+            text = f"simulated {simulated_s:.2f} of {end_s:g} s"
+            draw(text, simulated_s / end_s, f"{factor:.3g} x real time  {left}")
 
         yield update
 

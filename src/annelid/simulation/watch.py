@@ -13,9 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import Guard, ServoRings, WormBody
+from annelid.body.estimates import COLLAPSED, HARDLY, rhombus_of, touching_ring_m
+from annelid.body.worm import WormBody
+from annelid.config import Guard
 from annelid.morphology import Array
-from annelid.plausibility import COLLAPSED, HARDLY, IDLE_SHARE, NUMERICAL_SHARE, rhombus_of, touching_ring_m
+from annelid.plausibility import IDLE_SHARE, NUMERICAL_SHARE
 from annelid.protocols import State
 
 ACTIVATED = 0.1
@@ -74,9 +76,9 @@ class Watch:
         self._spring_most_m = shape.longest_m
         self._deep_m = DEEP * body.mesh.radius_m
         self._gap_m = WIDE_GAP * shape.side_m
-        forces = rings.force_limits(n) if isinstance(rings, ServoRings) else rings.peak_forces(n)
+        forces = rings.forces(n)
         self._idle_N = IDLE_SHARE * np.repeat(forces, 2 if self._halves else 1)
-        self._force_field = "force_limit_N" if isinstance(rings, ServoRings) else "peak_force_N"
+        self._force_field = rings.force_field
         self._spring_rest_m = shape.along_m
         self._closing, self._depth, self._gap, self._spring = _Extreme(), _Extreme(), _Extreme(), _Extreme()
         muscles = len(self._idle_N)

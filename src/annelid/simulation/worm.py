@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.arena.contact import has_moving_planes
-from annelid.arena.surface import Plane, ground_of, surface_of
+from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
+from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
-from annelid.config import Pipe, Rods, RunConfig, WormBody
+from annelid.config import RunConfig
 from annelid.errors import SimulationStopped
 from annelid.morphology import Array, MeshGeometry, heading_turn
 from annelid.plausibility import check, refuse_nonsense
@@ -81,7 +82,7 @@ def owns_model(config: RunConfig) -> bool:
 
 
 def _has_damper_rows(body: WormBody) -> bool:
-    return isinstance(body.formulation, Rods) and bool(body.strands.material_damping_s)
+    return body.formulation.damps_material and bool(body.strands.material_damping_s)
 
 
 class Worm(ABC):
@@ -105,7 +106,7 @@ class Worm(ABC):
         self._config = config
         assert config.arena is not None
         self._surface = surface_of(config.arena)
-        in_pipe = isinstance(config.arena, Pipe)
+        in_pipe = config.arena.is_closed
         self._height_words = "distance of a crossing from the pipe's wall" if in_pipe else "height of a crossing"
         moving = has_moving_planes(config.arena)
         self.ground = MovingGround(anatomy.model, anatomy.geometry, config.arena) if moving else None
@@ -113,7 +114,7 @@ class Worm(ABC):
         assert isinstance(body, WormBody)
         self.damping = MaterialDamping(anatomy.model, body.strands) if _has_damper_rows(body) else None
         # What needs no moving planes is level.
-        self._floor = cast(Plane, ground_of(config.arena))
+        self._floor = cast(Plane, config.arena.ground())
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._control_step = 0
         self._posture: Posture

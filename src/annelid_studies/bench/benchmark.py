@@ -10,7 +10,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.config import Chain
 from annelid.output import whole_file
 from annelid.simulation.lock import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
@@ -142,7 +141,7 @@ def _name(case: BenchCase | None) -> str | None:
 def _cost_s(case: BenchCase | None) -> float:
     if case is None:
         return _PEER_COST_S
-    growth = _GROWTH["chain" if isinstance(case.body.formulation, Chain) else "rods"]
+    growth = _GROWTH[case.body.formulation.kind]
     return case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
 
 
@@ -154,7 +153,7 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
         "lines": list(case.lines),
         "level": level_of(config) if "levels" in case.lines else None,
         "preset": case.case.preset,
-        "formulation": "chain" if isinstance(case.body.formulation, Chain) else "rods",
+        "formulation": case.body.formulation.kind,
         "n_segments": config.body.n_segments,
         "elements_per_side": case.body.mesh.elements_per_side,
         "physics_step_ms": round(1e3 * config.clock.physics_timestep_s, 9),

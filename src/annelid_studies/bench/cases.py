@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any, Literal
 
-from annelid.config import LEVELS, RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort
@@ -19,7 +20,7 @@ LINES = {
     "levels": "the levels of --fidelity, and the paper's own worm beside them",
     "steps": "3 segments, physics steps of 1 to 40 ms, 2 and 3 elements a side",
     "elements": "3 segments, 1 to 6 elements a side, physics steps of 5 and 20 ms",
-    "segments": "rods as their preset has them, 3 to 47 segments",
+    "segments": "rods as their preset has them, 3 to 30 segments",
     "chain": "the paper's formulation, 3 to 12 segments",
     "duration": "rods as their preset has them, 10 and 60 s, for the memory",
     "peer": "free rods of PyElastica",
@@ -36,8 +37,8 @@ CHAIN_S, SEGMENTS_S = 0.05, 2.0
 _STEPS_MS = {"full": (1, 2, 5, 10, 20, 40), "quick": (5, 20)}
 _ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
 _ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
-# 48 segments of two elements a side are ten bodies beyond the engine's limit (docs/upstream/sparse_ordering.md).
-_SEGMENTS = {"full": (3, 6, 12, 24, 47), "quick": (3, 6, 12)}
+# 31 segments of three elements a side are beyond the limit of the engine (docs/upstream/sparse_ordering.md).
+_SEGMENTS = {"full": (3, 6, 12, 24, 30), "quick": (3, 6, 12)}
 # Twelve segments of chain take seconds to compile and most of a second a step; both grow about with the cube of N.
 _CHAIN_SEGMENTS = {"full": (3, 6, 12), "quick": (3, 6)}
 _DURATIONS_S = {"full": (10.0, 60.0), "quick": (10.0,)}

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from annelid.config import Mesh, Strands, WormBody, load_config
+from annelid.body.worm import Mesh, Strands, WormBody
+from annelid.config import load_config
 from annelid_studies.worms import CHAIN
 
 PACKAGE, INSTALL = "pyelastica", "pip install pyelastica"

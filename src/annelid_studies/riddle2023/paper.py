@@ -10,7 +10,7 @@ from pathlib import Path
 
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.draw.markdown import Table
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case

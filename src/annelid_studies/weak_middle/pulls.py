@@ -7,8 +7,11 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Any
 
+from annelid.body.actuators.muscle import Rings
+from annelid.body.actuators.servo import ServoRings
 from annelid.body.assemble import mesh_of
-from annelid.config import Rings, ServoRings, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome
@@ -136,7 +139,7 @@ def servo() -> Actuator:
     """The base worm's servo: its force limit, its speed limit and its range of lengths."""
     servos = base_servos()
     shortest = servos.length_ranges(1)[0][0]
-    return Actuator("servo", f"{servos.force_limits(1)[0]:.2f} N, {shortest:g} m", _QUICK_CABLE)
+    return Actuator("servo", f"{servos.forces(1)[0]:.2f} N, {shortest:g} m", _QUICK_CABLE)
 
 
 def muscle(activation: float) -> Actuator:
@@ -150,7 +153,7 @@ def muscle_activation(force_N: float, ring_length_m: float) -> float:
     """Activation at which the paper's muscle, standing still, pulls with a force at a length of its ring."""
     rings = papers_muscle()
     length = scaled_length(ring_length_m, rings.length_ranges(1)[0])
-    return float(force_N / (rings.peak_forces(1)[0] * closed_form_flv(length, 0.0, rings)))
+    return float(force_N / (rings.forces(1)[0] * closed_form_flv(length, 0.0, rings)))
 
 
 def rest_ring_m() -> float:

@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `experiment load-frame`."""
 
 from __future__ import annotations
@@ -14,13 +13,16 @@ from annelid.cli.common import (
     FidelityLevel,
     Force,
     NamedPreset,
+    Quiet,
     config_of,
     overrides_of,
+    print_results,
     refuse_existing,
 )
-from annelid.cli.entry import lock
+from annelid.cli.entry import lock, study
 
 
+@study("load-frame")
 def load_frame_command(
     preset: NamedPreset = RIGID_PRESET,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("load-frame"),
@@ -37,7 +39,7 @@ def load_frame_command(
     data: Annotated[
         Path | None, typer.Option("--data", help="Measured loop to compare with.  [default: the one of annelid]")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table, only the paths.")] = False,
+    quiet: Quiet = False,
     force: Force = False,
 ) -> None:
     """Close one ring by its cable and open it again.
@@ -54,7 +56,6 @@ def load_frame_command(
     from annelid.experiment.calibration.loop import MM, cable_force, read_loop
     from annelid.experiment.calibration.report import frame_table, write_loop
     from annelid.experiment.progress import study_progress
-    from annelid.terminal import Console
 
     table = output / "load_frame.csv"
     lock(output)
@@ -69,9 +70,7 @@ def load_frame_command(
             progress=None if progress is None else lambda share: progress("load frame", 0, 0, share),
         )
     loop = cable_force(tension, cable_friction)
-    if not quiet:
-        Console().print(frame_table({config.name: loop, "measured": measured}))
     write_loop(loop, tension, table)
     loops = {config.name: (loop.displacement_m, loop.force_N), "measured": (measured.displacement_m, measured.force_N)}
-    for path in (table, load_frame_figure(loops, table.with_suffix(""))):
-        typer.echo(path)
+    written = table, load_frame_figure(loops, table.with_suffix(""))
+    print_results(written, frame_table({config.name: loop, "measured": measured}), quiet=quiet)

@@ -1,4 +1,3 @@
-# ruff: noqa: D301 -- the help texts need a real backspace: it keeps the lines of an example apart.
 """The command `experiment weak-middle`."""
 
 from __future__ import annotations
@@ -8,10 +7,11 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.common import ClusterName, Jobs
-from annelid.cli.experiment.kept import Output, Quiet, kept_runs
+from annelid.cli.common import ClusterName, Jobs, Output, Quiet, kept_runs, print_results
+from annelid.cli.entry import study
 
 
+@study("weak-middle")
 def weak_middle_command(
     output: Output = Path("weak-middle"),
     quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
@@ -35,7 +35,6 @@ def weak_middle_command(
     annelid experiment weak-middle --quick
     annelid experiment weak-middle -o weak-middle
     """
-    from annelid.terminal import Console
     from annelid_studies.figures.weak_middle import weak_middle_figure
     from annelid_studies.weak_middle.asymmetry import asymmetry
     from annelid_studies.weak_middle.results import (
@@ -51,17 +50,13 @@ def weak_middle_command(
     from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
 
     found = None
-    with kept_runs(["weak-middle"], output, quick=quick, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
         if not quick:
             found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)
-    if not quiet:
-        tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
-        tables += [checks_table(readings), asymmetry_table(found)] if found else []
-        for table in tables:
-            Console().print(table)
+    tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
+    tables += [checks_table(readings), asymmetry_table(found)] if found else []
     path = output / "weak_middle.csv"
     write_readings([*readings, *(found.readings if found else ())], path)
     marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
-    for written in (path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))):
-        typer.echo(written)
+    print_results((path, weak_middle_figure(panels(readings), marks, path.with_suffix(""))), *tables, quiet=quiet)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.analysis.travel import way_ahead
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save
 from annelid.draw.style import panel_title, plain, segment_colors
 from annelid.errors import RunFileError

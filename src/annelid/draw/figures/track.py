@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.track import Track, track_of
-from annelid.config import CourseTurning, Floor, RunConfig
+from annelid.config import RunConfig
+from annelid.config.kinds import Goals
 from annelid.draw.canvas import WIDTH_IN, canvas, save
+from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path
 from annelid.draw.style import panel_title
 
@@ -55,6 +57,9 @@ def track_figure(run: Run, path: str | Path) -> Path:
         return save(figure, path)
 
 
+RUN_FIGURES.add("track", track_figure)
+
+
 def draw_track(axes: Axes, track: Track, label: str = "middle of the body", color: str = LAST) -> None:
     """Draws a track with outlines into axes of equal scale."""
     from matplotlib.colors import LinearSegmentedColormap
@@ -78,24 +83,28 @@ def draw_marks(axes: Axes, config: RunConfig) -> None:
     """Draws posts and guard rails, and waypoints with the circle within which each counts as reached."""
     from matplotlib.patches import Circle
 
-    if isinstance(config.arena, Floor):
-        for x, y, radius in config.arena.posts or ():
+    if config.arena is not None:
+        rail_gap_m, posts = config.arena.walls
+        for x, y, radius in posts:
             axes.add_patch(Circle((x, y), radius, facecolor=WALL, edgecolor="none"))
-        if config.arena.rail_gap_m is not None:
+        if rail_gap_m is not None:
             for side in (-0.5, 0.5):
-                axes.axhline(side * config.arena.rail_gap_m, color=WALL, linewidth=2.0)
-    if isinstance(config.turning, CourseTurning):
-        for number, point in enumerate(config.turning.waypoints, start=1):
-            axes.add_patch(Circle(point, config.turning.reach_m, fill=False, color="0.6", linestyle=":"))
-            axes.annotate(str(number), point, fontsize=8, color="0.3", ha="center", va="center")
+                axes.axhline(side * rail_gap_m, color=WALL, linewidth=2.0)
+    goals = _goals(config)
+    for number, point in enumerate(goals.points_m, start=1):
+        axes.add_patch(Circle(point, goals.reach_m, fill=False, color="0.6", linestyle=":"))
+        axes.annotate(str(number), point, fontsize=8, color="0.3", ha="center", va="center")
 
 
 def _height_in(track: Track, config: RunConfig) -> float:
     """Height at which the plot fills the width of a page at equal scales, within reason."""
     points = track.crossing_m[..., :2].reshape(-1, 2)
-    if isinstance(config.turning, CourseTurning):
-        points = np.concatenate([points, config.turning.waypoints])
-    if isinstance(config.arena, Floor) and config.arena.posts:
-        points = np.concatenate([points, [post[:2] for post in config.arena.posts]])
+    posts = config.arena.walls.posts if config.arena is not None else ()
+    for places in (_goals(config).points_m, [post[:2] for post in posts]):
+        points = np.concatenate([points, np.reshape(places, (-1, 2))])
     width, height = np.ptp(points, axis=0)
     return float(np.clip((WIDTH_IN - _EDGE_IN) * height / width + _EDGE_IN, 2.6, 8.5))
+
+
+def _goals(config: RunConfig) -> Goals:
+    return config.turning.goals if config.turning is not None else Goals()

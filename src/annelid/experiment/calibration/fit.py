@@ -10,15 +10,15 @@ of which one loop has just one: viscous friction is fitted only where it is aske
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 
 import numpy as np
 
 from annelid.config import RunConfig, load_config
-from annelid.errors import ConfigError, MissingDependency, suggest
+from annelid.errors import ConfigError, suggest
 from annelid.experiment.calibration.frame import load_frame
 from annelid.experiment.calibration.loop import Loop, cable_force
 from annelid.experiment.case import SHEAR_OVER_YOUNG
@@ -42,7 +42,7 @@ class Parameter:
         start: First guess.
         low: Smallest value tried.
         high: Greatest value tried.
-        changes: The fields that a value sets, by dotted path; the cable's friction sets none.
+        fields: The fields that it sets, by dotted path, and what each is of its value; the cable's friction sets none.
     """
 
     name: str
@@ -50,37 +50,22 @@ class Parameter:
     start: float
     low: float
     high: float
-    changes: Callable[[float], dict[str, float]]
+    fields: Mapping[str, float]
 
 
+_MODULUS = {"body.strands.young_modulus_Pa": 1.0, "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG}
 PARAMETERS = {
     parameter.name: parameter
     for parameter in (
-        Parameter(
-            "young_modulus",
-            "Pa",
-            6e8,
-            5e7,
-            5e9,
-            lambda value: {
-                "body.strands.young_modulus_Pa": value,
-                "body.strands.shear_modulus_Pa": value * SHEAR_OVER_YOUNG,
-            },
-        ),
-        Parameter("dry_friction", "N m", 0.01, 1e-4, 0.2, lambda value: {"body.joints.dry_friction_Nm": value}),
-        Parameter("cable_friction", "1", 1.4, 1e-3, 4.0, lambda _: {}),
-        Parameter("spring_rate", "N/m", 24.5, 2.0, 100.0, lambda value: {"body.springs.stiffness_N_per_m": value}),
-        Parameter("spring_rest_length", "m", 0.065, 0.05, 0.0748, lambda value: {"body.springs.rest_length_m": value}),
-        Parameter(
-            "viscous_friction",
-            "N m s/rad",
-            0.02,
-            1e-4,
-            5.0,
-            lambda value: {"body.joints.viscous_friction_Nms_per_rad": value},
-        ),
+        Parameter("young_modulus", "Pa", 6e8, 5e7, 5e9, _MODULUS),
+        Parameter("dry_friction", "N m", 0.01, 1e-4, 0.2, {"body.joints.dry_friction_Nm": 1.0}),
+        Parameter("cable_friction", "1", 1.4, 1e-3, 4.0, {}),
+        Parameter("spring_rate", "N/m", 24.5, 2.0, 100.0, {"body.springs.stiffness_N_per_m": 1.0}),
+        Parameter("spring_rest_length", "m", 0.065, 0.05, 0.0748, {"body.springs.rest_length_m": 1.0}),
+        Parameter("viscous_friction", "N m s/rad", 0.02, 1e-4, 5.0, {"body.joints.viscous_friction_Nms_per_rad": 1.0}),
     )
 }
+"""What can be fitted."""
 DEFAULT_FREE = ("young_modulus", "dry_friction", "cable_friction")
 """What one loop can tell apart; springs and strands resist alike, so that their stiffnesses only shift between them."""
 
@@ -204,7 +189,6 @@ def calibrate(
 
     Raises:
         ConfigError: A parameter is unknown or none is given.
-        MissingDependency: scipy is not installed.
     """
     names = tuple(dict.fromkeys(free))
     for name in names:
@@ -212,18 +196,25 @@ def calibrate(
             raise ConfigError(f"unknown parameter {name!r}: {suggest(name, PARAMETERS)}")
     if not names:
         raise ConfigError(f"no parameter to fit: name at least one of {', '.join(PARAMETERS)}")
-    try:
-        least_squares = import_module("scipy.optimize").least_squares
-    except ImportError:
-        raise MissingDependency("calibrating needs scipy: install it with  pip install 'annelid[calibrate]'") from None
+    # Loading it takes a second, which only a fit should pay.
+    least_squares = import_module("scipy.optimize").least_squares
     at_m = places(measured)
     wanted = measured.branches(at_m)
-    loops = _Loops(base, names, simulate or (lambda config: load_frame(config, displacement_m=_reach(measured))))
+    run = simulate or partial(load_frame, displacement_m=_reach(measured))
+    kept: dict[tuple[tuple[str, float], ...], Loop] = {}
+
+    def loop_of(values: Array) -> Loop:
+        """Simulates each set of fields once: the cable's friction needs no engine."""
+        changes = _changes(names, values)
+        key = tuple(changes.items())
+        if key not in kept:
+            kept[key] = run(load_config(base.model_dump(exclude_none=True), changes))
+        return cable_force(kept[key], dict(zip(names, values.tolist(), strict=True)).get("cable_friction", 0.0))
 
     def residual(log_values: Array) -> Array:
-        error = (loops(np.exp(log_values)).branches(at_m) - wanted).ravel()
+        error = (loop_of(np.exp(log_values)).branches(at_m) - wanted).ravel()
         if progress is not None:
-            progress(loops.n_simulated, float(np.sqrt((error**2).mean())))
+            progress(len(kept), float(np.sqrt((error**2).mean())))
         return error
 
     chosen = [PARAMETERS[name] for name in names]
@@ -238,18 +229,9 @@ def calibrate(
         ftol=1e-4,
     )
     values = np.exp(result.x)
-    simulated = loops(values)
-    return Calibration(
-        names,
-        values,
-        at_m,
-        wanted,
-        simulated.branches(at_m),
-        np.asarray(result.jac),
-        measured,
-        simulated,
-        loops.n_simulated,
-    )
+    simulated = loop_of(values)
+    fitted, jacobian = simulated.branches(at_m), np.asarray(result.jac)
+    return Calibration(names, values, at_m, wanted, fitted, jacobian, measured, simulated, len(kept))
 
 
 def places(measured: Loop) -> Array:
@@ -272,29 +254,5 @@ def _reach(measured: Loop) -> float:
 
 
 def _changes(names: Sequence[str], values: Array) -> dict[str, float]:
-    changes: dict[str, float] = {}
-    for name, value in zip(names, values.tolist(), strict=True):
-        changes |= PARAMETERS[name].changes(value)
-    return changes
-
-
-class _Loops:
-    """Simulates loops, each set of fields once: the cable's friction needs no engine."""
-
-    def __init__(self, base: RunConfig, names: tuple[str, ...], simulate: Simulate) -> None:
-        self._base = base.model_dump(exclude_none=True)
-        self._names = names
-        self._simulate = simulate
-        self._kept: dict[tuple[tuple[str, float], ...], Loop] = {}
-
-    @property
-    def n_simulated(self) -> int:
-        return len(self._kept)
-
-    def __call__(self, values: Array) -> Loop:
-        changes = _changes(self._names, values)
-        key = tuple(changes.items())
-        if key not in self._kept:
-            self._kept[key] = self._simulate(load_config(self._base, changes))
-        friction = dict(zip(self._names, values.tolist(), strict=True)).get("cable_friction", 0.0)
-        return cable_force(self._kept[key], friction)
+    chosen = zip(names, values.tolist(), strict=True)
+    return {path: share * value for name, value in chosen for path, share in PARAMETERS[name].fields.items()}

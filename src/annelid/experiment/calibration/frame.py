@@ -16,9 +16,11 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
+from annelid.arena.kinds.floor import Floor
 from annelid.body import build_spec, compile_spec, mesh_of
 from annelid.body.actuation import crossing_site, ring_names
-from annelid.config import Floor, Rods, RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.calibration.loop import Loop
 
@@ -118,9 +120,7 @@ def _hastened(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
     damping = ("joint_damping_Nms_per_rad", "damping_time_s", "loss_factor")
     strands = {name: value / haste for name in damping if (value := getattr(body.strands, name)) is not None}
     changed: dict[str, object] = {"strands": body.strands.model_copy(update=strands)}
-    if isinstance(body.formulation, Rods):
-        lateral = {"lateral_damping_Nms_per_rad": body.formulation.lateral_damping_Nms_per_rad / haste}
-        changed["formulation"] = body.formulation.model_copy(update=lateral)
+    changed["formulation"] = body.formulation.hastened(haste)
     if body.joints is not None:
         viscous = {"viscous_friction_Nms_per_rad": body.joints.viscous_friction_Nms_per_rad / haste}
         changed["joints"] = body.joints.model_copy(update=viscous)

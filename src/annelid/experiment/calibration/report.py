@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from math import pi
 from pathlib import Path
@@ -12,8 +11,8 @@ import numpy as np
 
 from annelid.experiment.calibration.fit import PARAMETERS, Calibration
 from annelid.experiment.calibration.loop import MM, Loop
-from annelid.output import whole_file
-from annelid.textfiles import nested, toml_text
+from annelid.experiment.case import absolute, extend
+from annelid.output import write_csv, write_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -82,10 +81,9 @@ def write_loop(loop: Loop, tension: Loop, path: Path) -> None:
     Raises:
         RunFileError: The file cannot be written.
     """
-    rows = np.stack([loop.displacement_m / MM, loop.force_N, tension.force_N], axis=-1)
-    with whole_file(path) as draft:
-        header = "displacement_mm,force_N,tension_N"
-        np.savetxt(draft, rows, fmt="%.6g", delimiter=",", header=header, comments="")
+    rows = zip(loop.displacement_m / MM, loop.force_N, tension.force_N, strict=True)
+    columns = ["displacement_mm", "force_N", "tension_N"]
+    write_csv(path, columns, ([f"{value:.6g}" for value in row] for row in rows))
 
 
 def write_calibration(fit: Calibration, source: str, changes: Mapping[str, Any], path: Path) -> tuple[Path, Path]:
@@ -103,10 +101,9 @@ def write_calibration(fit: Calibration, source: str, changes: Mapping[str, Any],
     Raises:
         RunFileError: A file cannot be written.
     """
-    base = Path(source).resolve().as_posix() if source.endswith(".toml") else source
     known = fit.identifiability
     report = {
-        "base": base,
+        "base": absolute(source),
         "changes": dict(changes),
         "parameters": {
             name: {"value": float(value), "unit": PARAMETERS[name].unit, "relative_error": _number(error)}
@@ -123,22 +120,16 @@ def write_calibration(fit: Calibration, source: str, changes: Mapping[str, Any],
         "fitted_N": fit.fitted_N.tolist(),
         "n_loops": fit.n_loops,
     }
-    with whole_file(path) as draft:
-        draft.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    write_json(path, report)
     written = path.with_name("calibrated.toml")
     lines = [f"Fitted to a load frame's loop, {fit.rms_N[2]:.2f} N off (root mean square)."]
     if "cable_friction" in fit.names:
         friction = float(fit.values[fit.names.index("cable_friction")])
         lines.append(f"Friction of the cable: coefficient times angle {friction:.3g}, no field of the body.")
-    tree = {"extends": base, **fields_as_tree(dict(changes) | fit.overrides)}
-    with whole_file(written) as draft:
-        draft.write_text(toml_text(tree, "\n".join(lines)), encoding="utf-8")
+    fields = dict(changes) | fit.overrides
+    rounded = {path: float(f"{value:.4g}") if isinstance(value, float) else value for path, value in fields.items()}
+    extend(written, source, rounded, lines)
     return path, written
-
-
-def fields_as_tree(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Makes a tree of fields given by dotted path; fractions to four digits."""
-    return nested({path: float(f"{v:.4g}") if isinstance(v, float) else v for path, v in fields.items()})
 
 
 def _number(value: float) -> float | None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from annelid.config import field_paths, unit_of
-from annelid.experiment.outcome import Outcome
-from annelid.experiment.sweep.design import REPEAT, SAMPLE, Plan, Point, label
+from annelid.experiment.store import Done
+from annelid.experiment.sweep.design import REPEAT, SAMPLE, Plan, label
 from annelid.experiment.sweep.numbers import Number
 
 if TYPE_CHECKING:
@@ -28,41 +28,19 @@ _TEXT = {
 
 
 @dataclass(frozen=True)
-class SweepRun:
-    """One run of a sweep, done.
-
-    Attributes:
-        point: The run.
-        status: "stopped" where a guard ended it before its time, "failed" where it could not be computed.
-        reason: Why; empty for a complete run.
-        outcome: What is kept of it; None where it failed.
-    """
-
-    point: Point
-    status: Literal["complete", "stopped", "failed"]
-    reason: str
-    outcome: Outcome | None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is doubtful about it, a sentence each."""
-        return () if self.outcome is None else self.outcome.summary.warnings
-
-
-@dataclass(frozen=True)
 class Sweep:
     """All runs of a study.
 
     Attributes:
         plan: The design.
         numbers: What is told of every run.
-        runs: The runs, in the order of the plan's points.
+        runs: What became of the plan's points, in their order.
         folder: Folder of the results.
     """
 
     plan: Plan
     numbers: tuple[Number, ...]
-    runs: tuple[SweepRun, ...]
+    runs: tuple[Done, ...]
     folder: Path
 
 
@@ -83,15 +61,15 @@ def dataset_of(sweep: Sweep) -> xr.Dataset:
         name: (dims, np.array(texts, dtype=object).reshape(plan.shape), {"units": "1", "long_name": _TEXT[name]})
         for name, texts in _texts(sweep.runs).items()
     }
-    n_segments = max((_length(number, run) for number in sweep.numbers for run in sweep.runs), default=0)
+    per_segment = [number for number in sweep.numbers if number.per_segment]
+    outcomes = [run.outcome for run in sweep.runs if run.outcome is not None]
+    n_segments = max((len(number.read(of) or ()) for number in per_segment for of in outcomes), default=0)
     for number in sweep.numbers:
+        more = ((SEGMENT, n_segments),) if number.per_segment else ()
+        values = _values(number, sweep.runs, n_segments if number.per_segment else 1)
+        shape = (*plan.shape, *(length for _, length in more))
         told = {"units": number.unit, "long_name": number.text}
-        if number.per_segment:
-            rows = np.array([_row(number, run, n_segments) for run in sweep.runs])
-            variables[number.name] = (*((*dims, SEGMENT), rows.reshape(*plan.shape, n_segments)), told)
-        else:
-            values = np.array([_value(number, run) for run in sweep.runs])
-            variables[number.name] = (dims, values.reshape(plan.shape), told)
+        variables[number.name] = ((*dims, *(dim for dim, _ in more)), values.reshape(shape), told)
     return xr.Dataset(
         variables,
         coords=_coordinates(sweep, n_segments),
@@ -132,7 +110,7 @@ def column(values: Sequence[Any]) -> np.ndarray:
     return np.array([label(value) for value in values], dtype=object)
 
 
-def _texts(runs: Sequence[SweepRun]) -> dict[str, list[str]]:
+def _texts(runs: Sequence[Done]) -> dict[str, list[str]]:
     return {
         "status": [run.status for run in runs],
         "reason": [run.reason for run in runs],
@@ -142,19 +120,12 @@ def _texts(runs: Sequence[SweepRun]) -> dict[str, list[str]]:
     }
 
 
-def _value(number: Number, run: SweepRun) -> float:
-    value = None if run.outcome is None else number.read(run.outcome)
-    return np.nan if value is None else float(value)
-
-
-def _row(number: Number, run: SweepRun, n_segments: int) -> np.ndarray:
-    row = np.full(n_segments, np.nan)
-    values = None if run.outcome is None else number.read(run.outcome)
-    if values is not None:
-        row[: len(values)] = [np.nan if value is None else value for value in values]
-    return row
-
-
-def _length(number: Number, run: SweepRun) -> int:
-    values = number.read(run.outcome) if number.per_segment and run.outcome is not None else None
-    return 0 if values is None else len(values)
+def _values(number: Number, runs: Sequence[Done], length: int) -> np.ndarray:
+    """Reads a number of every run, ``(n_runs, length)``; NaN where it cannot be told."""
+    values = np.full((len(runs), length), np.nan)
+    for row, run in zip(values, runs, strict=True):
+        told = None if run.outcome is None else number.read(run.outcome)
+        if told is not None:
+            several = np.atleast_1d(np.array(told, dtype=float))
+            row[: len(several)] = several
+    return values

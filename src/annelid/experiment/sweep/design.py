@@ -1,13 +1,9 @@
-"""The design of a sweep: which values each run has, for every combination or for samples of the ranges.
-
-Samples depend on the study's seed alone. Those of a random or a Sobol design begin alike however many are drawn, so
-that more of them leave the earlier runs as they are; those of a Latin hypercube do not.
-"""
+"""The design of a sweep: which values each run has, for every combination or for samples of the ranges."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -28,16 +24,14 @@ from annelid.config import (
     whole_path,
 )
 from annelid.config.study import MOST_RUNS
-from annelid.errors import ConfigError, MissingDependency, suggest
+from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
-from annelid.experiment.space import Choice, Interval, Variable, from_unit, is_whole
-from annelid.morphology import Array
+from annelid.experiment.space import Choice, Variable, from_unit, interval, sampled, unit_samples
 
 SAMPLE, REPEAT = "sample", "repeat"
 """Dimensions beside those of the varied fields."""
 LONG_S = 100 * 3600.0
 """Studies that take longer on one core are told of, s."""
-MISSING = "samples of a sweep need SciPy: install it with  pip install 'annelid[sweep]'"
 
 
 @dataclass(frozen=True)
@@ -115,33 +109,12 @@ def plan_of(study: Study) -> Plan:
         }
         samples = list(product(*levels.values()))
     else:
-        samples = [_sample(variables, shares) for shares in unit_samples(study, len(variables))]
+        places = unit_samples(study.design, study.samples or 0, len(variables), study.seed)
+        samples = [tuple(map(sampled, variables, row)) for row in places.tolist()]
         levels = {SAMPLE: range(len(samples))}
     if study.repeats > 1:
         levels[REPEAT] = range(base.seed, base.seed + study.repeats)
     return Plan(study, base, fields, samples, levels)
-
-
-def unit_samples(study: Study, n_fields: int) -> Array:
-    """Draws a study's samples.
-
-    Returns:
-        Each field's place in its range, in [0, 1), ``(n_samples, n_fields)``.
-    """
-    n = study.samples or 0
-    if study.design == "random":
-        return np.random.default_rng(study.seed).random((n, n_fields))
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise MissingDependency(MISSING) from None
-    rng = np.random.default_rng(study.seed)
-    if study.design == "lhs":
-        return qmc.LatinHypercube(n_fields, rng=rng).random(n)
-    with warnings.catch_warnings():
-        # That any number but a power of two is less even: the user may add samples later.
-        warnings.simplefilter("ignore", UserWarning)
-        return np.minimum(qmc.Sobol(n_fields, rng=rng).random(n), np.nextafter(1.0, 0.0))
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -166,16 +139,9 @@ def _variable(vary: Vary, base: RunConfig) -> Variable:
     if vary.values is not None:
         numbers = [int(value) if isinstance(present, int) and value.is_integer() else value for value in vary.values]
         return Choice(field, tuple(numbers))
-    low, high = _end(vary.from_), _end(vary.to)
-    whole = is_whole(field, present)
-    if whole and not (low.is_integer() and high.is_integer()):
-        raise ConfigError(f"vary {field!r}: from = {low:g}, to = {high:g}: must be whole numbers, as the field is")
-    return Interval(field, low, high, vary.log, whole)
-
-
-def _end(value: float | None) -> float:
-    assert value is not None, "a range has both ends"
-    return value
+    assert vary.from_ is not None
+    assert vary.to is not None
+    return interval(field, vary.from_, vary.to, present, logarithmic=vary.log)
 
 
 def _levels(variable: Variable, number: int | None) -> tuple[Any, ...]:
@@ -188,21 +154,6 @@ def _levels(variable: Variable, number: int | None) -> tuple[Any, ...]:
             f"{len(levels)} values to tell apart"
         )
     return levels
-
-
-def _sample(variables: Sequence[Variable], shares: Array) -> tuple[Any, ...]:
-    return tuple(_values(variables, shares.tolist()))
-
-
-def _values(variables: Sequence[Variable], shares: Sequence[float]) -> Iterator[Any]:
-    for variable, share in zip(variables, shares, strict=True):
-        if isinstance(variable, Choice):
-            yield variable.values[int(share * len(variable.values))]
-        elif variable.whole:
-            # Each whole number has the same share of the range, the ends too.
-            yield variable.rounded(np.floor(variable.low + share * (variable.high - variable.low + 1.0)))
-        else:
-            yield from_unit(variable, share)
 
 
 def n_runs(study: Study) -> int:

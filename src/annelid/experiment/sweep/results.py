@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.experiment.sweep.dataset import SEGMENT, Sweep, SweepRun
+from annelid.experiment.sweep.dataset import SEGMENT, Sweep
 from annelid.experiment.sweep.design import REPEAT, label
 from annelid.experiment.sweep.numbers import PREFERRED
 from annelid.output import whole_file, write_csv
@@ -56,12 +56,10 @@ def write_rows(sweep: Sweep, data: xr.Dataset, path: Path) -> Path:
         values = data[number.name].values.reshape(len(sweep.runs), -1)
         names = [f"{number.name}_{i}" for i in data[SEGMENT].values] if number.per_segment else [number.name]
         columns |= dict(zip(names, values.T, strict=True))
-    seeds = data[REPEAT].values if REPEAT in data.dims else None
     rows = (
         [
             i,
-            *(label(value) for value in run.point.values.values()),
-            *([] if seeds is None else [seeds[run.point.place[-1]]]),
+            *_place(sweep, data, i),
             run.status,
             run.reason,
             " | ".join(run.warnings),
@@ -70,7 +68,7 @@ def write_rows(sweep: Sweep, data: xr.Dataset, path: Path) -> Path:
         ]
         for i, run in enumerate(sweep.runs)
     )
-    repeat = [] if seeds is None else ["seed"]
+    repeat = ["seed"] if REPEAT in data.dims else []
     heads = ["number", *sweep.plan.fields, *repeat, "status", "reason", "warnings", "run", *columns]
     return write_csv(path, heads, rows)
 
@@ -108,7 +106,7 @@ def results_table(sweep: Sweep, data: xr.Dataset) -> Table:
     for rows in _ends(columns[told[0]]) if told else []:
         for i in rows:
             values = (_short(column[i]) for column in columns.values())
-            table.add_row(str(i), *_place(sweep, data, sweep.runs[i]), *values)
+            table.add_row(str(i), *_place(sweep, data, i), *values)
         table.add_section()
     table.caption = _caption(sweep)
     return table
@@ -144,9 +142,11 @@ def _listed(numbers: Sequence[int]) -> str:
     return ", ".join(map(str, numbers[:5])) + (", .." if len(numbers) > 5 else "")
 
 
-def _place(sweep: Sweep, data: xr.Dataset, run: SweepRun) -> list[str]:
-    seed = [str(data[REPEAT].values[run.point.place[-1]])] if REPEAT in data.dims else []
-    return [*(label(value) for value in run.point.values.values()), *seed]
+def _place(sweep: Sweep, data: xr.Dataset, i: int) -> list[str]:
+    """Values of the varied fields of a run, and its seed where there are repeats."""
+    point = sweep.plan.points[i]
+    seed = [str(data[REPEAT].values[point.place[-1]])] if REPEAT in data.dims else []
+    return [*(label(value) for value in point.values.values()), *seed]
 
 
 def _ends(values: np.ndarray) -> list[list[int]]:

@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from annelid.config import Cluster, Study, find_cluster, load_study
-from annelid.errors import AnnelidError
-from annelid.experiment.case import refusal
 from annelid.experiment.cluster import workers_of
-from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.store import Store, case_key
-from annelid.experiment.sweep.dataset import Sweep, SweepRun, dataset_of
-from annelid.experiment.sweep.design import Point, plan_of
+from annelid.experiment.store import Store
+from annelid.experiment.sweep.dataset import Sweep, dataset_of
+from annelid.experiment.sweep.design import plan_of
 from annelid.experiment.sweep.numbers import check_rank, chosen_numbers
 from annelid.simulation.lock import locks
 
@@ -97,38 +94,9 @@ def swept(
     chosen = find_cluster(cluster or "processes") if cluster is None or isinstance(cluster, str) else cluster
     its_workers = workers_of(chosen, jobs)
     plan = plan_of(study)
-    refused = []
-    for i, point in enumerate(plan.points):
-        if progress is not None:
-            progress("checking the study", i, len(plan.points), i / len(plan.points))
-        refused.append(refusal(point.case))
-    first = refused[0]
-    if first is not None and all(refused):
-        raise first
-    built = [point.case for point, error in zip(plan.points, refused, strict=True) if error is None]
-    failed: dict[str, Exception] = {}
-
-    def tell(done: int, total: int, share: float) -> None:
-        if progress is not None:
-            progress(f"sweep, {len(failed)} failed" if failed else "sweep", done, total, share)
-
     with its_workers as workers:
-        outcomes = Store(folder / RUNS, workers, study.keep).compute(built, progress=tell, failed=failed)
-    runs = tuple(
-        _run(point, outcomes, failed) if error is None else SweepRun(point, "failed", str(error), None)
-        for point, error in zip(plan.points, refused, strict=True)
-    )
-    return Sweep(plan, tuple(numbers), runs, folder)
-
-
-def _run(point: Point, outcomes: Mapping[str, Outcome], failed: Mapping[str, Exception]) -> SweepRun:
-    key = case_key(point.case)
-    if key in outcomes:
-        message = outcomes[key].message
-        return SweepRun(point, "stopped" if message else "complete", message, outcomes[key])
-    return SweepRun(point, "failed", _sentence(failed[key]), None)
-
-
-def _sentence(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    return text if isinstance(error, AnnelidError) and text else f"{type(error).__name__}: {text}"
+        cases = [point.case for point in plan.points]
+        done = Store(folder / RUNS, workers, study.keep).finish(cases, "sweep", progress=progress)
+    if all(one.refused for one in done) and done[0].error is not None:
+        raise done[0].error
+    return Sweep(plan, tuple(numbers), tuple(done), folder)

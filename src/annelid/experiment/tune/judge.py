@@ -31,10 +31,6 @@ class Objective:
     penalty: float
     read: Callable[[Gait], float | None]
 
-    def is_better(self, one: float, other: float) -> bool:
-        """Whether one value is better than another."""
-        return one > other if self.better == "more" else one < other
-
 
 OBJECTIVES: Mapping[str, Objective] = {
     one.name: one
@@ -64,6 +60,10 @@ class Judged:
         """Returns the value of an objective, its penalty for a run that does not walk."""
         value = None if self.gait is None or self.problem else objective.read(self.gait)
         return objective.penalty if value is None or not isfinite(value) else value
+
+    def score(self, objective: Objective) -> float:
+        """Returns the value of an objective, signed so that less is better."""
+        return -self.value(objective) if objective.better == "more" else self.value(objective)
 
 
 def objectives_of(names: list[str]) -> list[Objective]:

@@ -1,11 +1,11 @@
-"""The optimisers: each asks for a generation of values and is told what they were worth."""
+"""The optimisers: each asks for a generation of values and is told their scores, of which less is better."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
 from math import floor, log
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,19 +23,7 @@ Values = Mapping[str, Any]
 MISSING = "tuning needs Optuna and cmaes: install them with  pip install 'annelid[tune]'"
 
 
-class Optimiser(Protocol):
-    """Asks for values of variables and learns from scores, of which less is better."""
-
-    def ask(self) -> list[dict[str, Any]]:
-        """Returns the values of the next generation, by field."""
-        ...
-
-    def tell(self, scores: Sequence[tuple[float, ...]]) -> None:
-        """Takes the scores of the generation that was asked for last, in its order."""
-        ...
-
-
-def optimiser_of(variables: Sequence[Variable], n_objectives: int, own: Values | None, seed: int) -> Optimiser:
+def optimiser_of(variables: Sequence[Variable], n_objectives: int, own: Values | None, seed: int) -> CmaEs | Parzen:
     """Returns the optimiser that suits a search.
 
     Args:

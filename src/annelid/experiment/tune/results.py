@@ -10,10 +10,11 @@ import numpy as np
 
 from annelid.config import field_value
 from annelid.draw.figures.tuning import Mark, pareto_figure, progress_figure
-from annelid.experiment.tune.judge import OBJECTIVES, Objective
+from annelid.experiment.case import extend
+from annelid.experiment.tune.judge import Objective
 from annelid.experiment.tune.search import START, Task, Trial, best, compromise, front
-from annelid.output import whole_file, write_csv
-from annelid.textfiles import nested, toml_text, toml_value
+from annelid.output import write_csv
+from annelid.textfiles import toml_value
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -83,8 +84,7 @@ def write_trials(task: Task, trials: Sequence[Trial], path: Path) -> None:
 
 
 def _cells(trial: Trial, fields: Sequence[str]) -> list[object]:
-    gait = trial.judged.gait
-    numbers = ["" if gait is None else _short(getattr(gait, name)) for name in _ROWS.values()]
+    numbers = [_number(trial, name) for name in _ROWS.values()]
     values = [_plain(field_value(trial.case.config, field)) for field in fields] if _built(trial) else []
     row = [_name(trial), *(values or [_plain(trial.values[field]) for field in fields]), *numbers]
     return [*row, trial.judged.problem, trial.path.name]
@@ -97,34 +97,14 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> None:
         RunFileError: The file cannot be written.
     """
     before = task.start.config
-    is_file = task.source.endswith(".toml")
-    source = str(Path(task.source).resolve()) if is_file else task.source
-    lines = [f"Tuned by: {command}", f"{'Trial ' if trial.number != START else ''}{_name(trial)}:"]
-    lines += [f"  {label}: {number}" for label, number in gait_lines(trial)]
-    lines += [f"  before: {field} = {toml_value(field_value(before, field))}" for field in trial.values]
-    tree = {
-        "extends": source,
-        "name": path.stem,
-        "summary": f"{before.name}, tuned for {_words(task.objectives)}",
-        **nested({**task.changes, **trial.values}),
-    }
-    with whole_file(path) as draft:
-        draft.write_text(toml_text(tree, "\n".join(lines)), encoding="utf-8")
-
-
-def gait_lines(trial: Trial) -> list[tuple[str, str]]:
-    """Returns what is stated of a gait, label and number."""
-    gait = trial.judged.gait
-    if gait is None:
-        return [("problem", trial.judged.problem)]
-    found = [
-        ("speed (m/s)", _short(gait.speed_m_per_s)),
-        ("speed (body lengths/s)", _short(gait.speed_body_lengths_per_s)),
-        ("period (s)", _short(gait.period_s)),
-        ("cost of transport", _short(gait.cost_of_transport)),
-        ("slip ratio", _short(gait.slip_ratio)),
+    lines = [
+        f"Tuned by: {command} ({task.n_trials} trials, seed {task.seed})",
+        f"{'Trial ' if trial.number != START else ''}{_name(trial)}:",
     ]
-    return [(label, number) for label, number in found if number]
+    lines += [f"  {label}: {number}" for label, name in _ROWS.items() if (number := _number(trial, name))]
+    lines += [f"  before: {field} = {toml_value(field_value(before, field))}" for field in trial.values]
+    summary = f"{before.name}, tuned for {_words(task.objectives)}"
+    extend(path, task.source, {"name": path.stem, "summary": summary, **task.changes, **trial.values}, lines)
 
 
 def results_table(task: Task, trials: Sequence[Trial]) -> Table:
@@ -138,8 +118,7 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
     for trial in shown:
         table.add_column(_name(trial), justify="right")
     for label, name in _ROWS.items():
-        gaits = [trial.judged.gait for trial in shown]
-        table.add_row(label, *("" if gait is None else _short(getattr(gait, name)) for gait in gaits))
+        table.add_row(label, *(_number(trial, name) for trial in shown))
     table.add_section()
     for variable in task.variables:
         table.add_row(variable.field, *(_plain(field_value(trial.case.config, variable.field)) for trial in shown))
@@ -173,10 +152,12 @@ def _name(trial: Trial) -> str:
 
 
 def _words(objectives: Sequence[Objective]) -> str:
-    return " and ".join(one.name.replace("-", " ") for one in objectives if one.name in OBJECTIVES)
+    return " and ".join(one.name.replace("-", " ") for one in objectives)
 
 
-def _short(number: float | None) -> str:
+def _number(trial: Trial, name: str) -> str:
+    """A number of a trial's gait; empty where there is none."""
+    number = None if trial.judged.gait is None else getattr(trial.judged.gait, name)
     return "" if number is None else f"{number:.4g}"
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case, refusal
-from annelid.experiment.progress import StudyProgress
+from annelid.experiment.case import Case
+from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.space import Variable
-from annelid.experiment.store import Store, case_key
+from annelid.experiment.store import Store
 from annelid.experiment.tune.judge import Judged, Objective, judge
 from annelid.experiment.tune.optimiser import optimiser_of
 from annelid.experiment.tune.space import own_values
@@ -100,23 +100,19 @@ def search(
         KeyboardInterrupt: Finished runs are kept.
     """
     optimiser = optimiser_of(task.variables, len(task.objectives), task.own, task.seed)
-    store.compute([task.start], jobs=jobs, progress=_report(progress, "the gait it starts from", 0, task.n_trials))
+    report = _after(progress, 0, task.n_trials)
+    store.compute([task.start], jobs=jobs, progress=in_stage(report, "the gait it starts from"))
     first = _trial(task.start, store, START, {})
     yield [first]
     found = [first]
     while (done := len(found) - 1) < task.n_trials:
         values = optimiser.ask()[: task.n_trials - done]
         cases = [task.start.but(of_trial) for of_trial in values]
-        errors: list[Exception | None] = [refusal(case) for case in cases]
-        built = [i for i, error in enumerate(errors) if error is None]
-        failed: dict[str, Exception] = {}
-        report = _report(progress, _best_words(task, found), done, task.n_trials)
-        store.compute([cases[i] for i in built], jobs=jobs, progress=report, failed=failed)
-        for i in built:
-            errors[i] = failed.get(case_key(cases[i]))
+        report = _after(progress, done, task.n_trials)
+        results = store.finish(cases, _best_words(task, found), jobs=jobs, progress=report)
         trials = [
-            _trial(case, store, done + i, of_trial, error)
-            for i, (case, of_trial, error) in enumerate(zip(cases, values, errors, strict=True))
+            _trial(case, store, done + i, of_trial, one.error)
+            for i, (case, of_trial, one) in enumerate(zip(cases, values, results, strict=True))
         ]
         optimiser.tell([scores(trial, task.objectives) for trial in trials])
         found += trials
@@ -126,8 +122,7 @@ def search(
 def best(trials: Sequence[Trial], objective: Objective) -> Trial | None:
     """Returns the best of those that walk; None if none does."""
     walking = [trial for trial in trials if not trial.judged.problem]
-    sign = 1.0 if objective.better == "more" else -1.0
-    return max(walking, key=lambda trial: sign * trial.judged.value(objective), default=None)
+    return min(walking, key=lambda trial: trial.judged.score(objective), default=None)
 
 
 def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Trial]:
@@ -160,9 +155,7 @@ def compromise(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Tria
 
 def scores(trial: Trial, objectives: Sequence[Objective]) -> tuple[float, ...]:
     """Values of the objectives, signed so that less is better."""
-    return tuple(
-        (-1.0 if objective.better == "more" else 1.0) * trial.judged.value(objective) for objective in objectives
-    )
+    return tuple(trial.judged.score(objective) for objective in objectives)
 
 
 def _dominates(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
@@ -192,11 +185,12 @@ def _best_words(task: Task, found: Sequence[Trial]) -> str:
     return f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
 
 
-def _report(progress: StudyProgress | None, stage: str, done: int, n_trials: int) -> Any:
+def _after(progress: StudyProgress | None, before: int, n_trials: int) -> StudyProgress | None:
+    """Returns what tells the progress of a generation as one of the whole search."""
     if progress is None:
         return None
 
-    def report(runs_done: int, _: int, __: float) -> None:
-        progress(stage, done + runs_done, n_trials, (done + runs_done) / n_trials)
+    def report(stage: str, done: int, _: int, __: float) -> None:
+        progress(stage, before + done, n_trials, (before + done) / n_trials)
 
     return report

@@ -7,7 +7,7 @@ from typing import Any
 
 from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments
 from annelid.errors import ConfigError, suggest
-from annelid.experiment.space import Choice, Interval, Variable, is_whole
+from annelid.experiment.space import Choice, Interval, Variable, interval
 
 LOG = "log"
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
@@ -122,10 +122,7 @@ def _interval(field: str, text: str, present: Any) -> Interval:
         raise ConfigError(f"{field}={text}: the lower end must be below the upper end")
     if rest and low <= 0.0:
         raise ConfigError(f"{field}={text}: a logarithmic range needs a lower end above 0")
-    whole = is_whole(field, present)
-    if whole and not (low.is_integer() and high.is_integer()):
-        raise ConfigError(f"{field}={text}: the ends must be whole numbers, as the field is")
-    return Interval(field, low, high, bool(rest), whole)
+    return interval(field, low, high, present, logarithmic=bool(rest))
 
 
 def own_values(config: RunConfig, variables: Sequence[Variable]) -> dict[str, Any] | None:

@@ -15,17 +15,20 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.experiment.calibration.fit import PARAMETERS
 from annelid.experiment.calibration.loop import wrap_factors
+from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text
 
 CABLE = "cable_friction"
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    **{name: tuple(parameter.changes(parameter.start)) for name, parameter in PARAMETERS.items()},
+    **{name: tuple(parameter.fields) for name, parameter in PARAMETERS.items()},
     CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N"),
     "floor_friction": ("arena.friction",),
 }
@@ -85,6 +88,18 @@ class Spread:
         return replace(self, names=tuple(names), relative_error=self.relative_error[chosen], correlation=correlation)
 
 
+class _Parameter(BaseModel):
+    value: float
+    relative_error: float | None
+
+
+class _Fit(BaseModel):
+    """What is read of a ``calibration.json``; None is what the fit does not tell."""
+
+    parameters: dict[str, _Parameter]
+    correlation: list[list[float | None]]
+
+
 def read_spread(path: Path | None = None) -> Spread:
     """Reads the errors of a fit.
 
@@ -96,29 +111,27 @@ def read_spread(path: Path | None = None) -> Spread:
     """
     bundled = (resources.files(__package__ or __name__) / CALIBRATION).read_text(encoding="utf-8")
     try:
-        content: dict[str, Any] = parse_json(bundled if path is None else read_text(path), str(path))
-        fitted = {str(name): (float(of["value"]), of["relative_error"]) for name, of in content["parameters"].items()}
-        rows: list[list[float | None]] = content["correlation"]
-        correlation = np.array([[np.nan if value is None else value for value in row] for row in rows], dtype=float)
+        fit = _Fit.model_validate(parse_json(bundled if path is None else read_text(path), str(path)))
+        fitted, correlation = fit.parameters, np.array(fit.correlation, dtype=float)
         if correlation.shape != (len(fitted), len(fitted)):
             raise ValueError("shape")
     except UnreadableText:
         raise
-    except (ValueError, OverflowError, KeyError, TypeError, AttributeError):
+    except (ValueError, OverflowError):
         raise ConfigError(f"{path} is no calibration.json of `annelid calibrate`") from None
-    for name, (_, error) in fitted.items():
+    for name, parameter in fitted.items():
         if name not in FIELDS:
             raise ConfigError(f"{path} has an unknown parameter {name!r}: {suggest(name, FIELDS)}")
-        if error is None or not 0.0 <= float(error) < inf:
+        if parameter.relative_error is None or not 0.0 <= parameter.relative_error < inf:
             raise ConfigError(f"{path} does not tell {name}: its relative error is not finite; fit fewer with --free")
     if not _is_correlation(correlation):
         raise ConfigError(f"{path}: correlation must be symmetric and positive, with ones on its diagonal")
     return Spread(
         tuple(fitted),
-        np.array([float(error) for _, error in fitted.values()]),
+        np.array([parameter.relative_error for parameter in fitted.values()]),
         correlation,
         DEFAULT_SOURCE if path is None else str(path),
-        fitted[CABLE][0] if CABLE in fitted else None,
+        fitted[CABLE].value if CABLE in fitted else None,
     )
 
 
@@ -161,24 +174,22 @@ def draw(n: int, spread: Spread, seed: int) -> Array:
 
     Returns:
         Shape ``(n, p)``.
+
+    Raises:
+        MissingDependency: SciPy is not installed.
     """
     p = len(spread.names)
     if not p:
         return np.empty((n, 0))
-    normal = np.vectorize(NormalDist().inv_cdf, otypes=[float])(hypercube(n, p, np.random.default_rng(seed)))
+    # Clear of 0 and 1, where the normal numbers are infinite.
+    shares = unit_samples("lhs", n, p, seed).clip(1e-9, 1.0 - 1e-9)
+    normal = np.vectorize(NormalDist().inv_cdf, otypes=[float])(shares)
     left, _, right = np.linalg.svd(normal - normal.mean(axis=0), full_matrices=False)
     rank = min(n - 1, p)
     independent = sqrt((n - 1) * p / rank) * left[:, :rank] @ right[:rank]
     values, vectors = np.linalg.eigh(spread.correlation)
     root = vectors * np.sqrt(values.clip(min=0.0)) @ vectors.T
     return independent @ root * spread.relative_error
-
-
-def hypercube(n: int, p: int, rng: np.random.Generator) -> Array:
-    """Draws a Latin hypercube in (0, 1), shape ``(n, p)``, p at least 1: in every column one number in each n-th."""
-    strata = np.column_stack([rng.permutation(n) for _ in range(p)])
-    # Open at both ends, where the normal numbers are infinite.
-    return (strata + rng.uniform(1e-6, 1.0 - 1e-6, strata.shape)) / n
 
 
 def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
+from dataclasses import asdict
 from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from annelid.config import field_value
 from annelid.draw.figures.uncertainty import Panel, uncertainty_figure
-from annelid.experiment.uncertainty.combine import Quantity
 from annelid.experiment.uncertainty.parameters import UNMEASURED, scaled_fields
+from annelid.experiment.uncertainty.quantities import Quantity
 from annelid.experiment.uncertainty.study import Uncertainty, VariantRun
-from annelid.output import whole_file
+from annelid.output import write_csv, write_json
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -83,9 +82,10 @@ def remarks(result: Uncertainty) -> list[str]:
         lines.append(f"not varied: {', '.join(names)} ({reason}{remedy})")
     steps = [1e3 * run.changes["clock.physics_timestep_s"] for run in result.of("time step")]
     counts = [run.changes["body.mesh.elements_per_side"] for run in result.of("elements")]
+    n_elements = field_value(result.config, "body.mesh.elements_per_side")
     lines.append(
         f"time step: {1e3 * result.config.clock.physics_timestep_s:g} ms against {_listed(steps)} ms; "
-        f"elements a side: {_elements(result)} against {_listed(counts)}"
+        f"elements a side: {n_elements} against {_listed(counts)}"
     )
     for run in result.runs:
         name = f"{run.kind} {_change(run)}".rstrip()
@@ -108,12 +108,14 @@ def write_uncertainty(result: Uncertainty) -> tuple[Path, Path, Path]:
     Raises:
         RunFileError: A file cannot be written.
     """
-    paths = [result.folder / f"uncertainty.{suffix}" for suffix in ("json", "csv", "png")]
-    content = json.dumps(as_json(result), indent=1, allow_nan=False) + "\n"
-    for path, text in zip(paths, (content, _as_csv(result)), strict=False):
-        with whole_file(path) as draft:
-            draft.write_text(text, encoding="utf-8")
-    return paths[0], paths[1], uncertainty_figure(panels(result), paths[2])
+    stem = result.folder / "uncertainty"
+    rows = {quantity.name: _row(quantity) for quantity in result.quantities}
+    columns = ["quantity", *_row(result.quantities[0])]
+    return (
+        write_json(stem.with_suffix(".json"), as_json(result)),
+        write_csv(stem.with_suffix(".csv"), columns, ([name, *row.values()] for name, row in rows.items())),
+        uncertainty_figure(panels(result), stem.with_suffix(".png")),
+    )
 
 
 def as_json(result: Uncertainty) -> dict[str, Any]:
@@ -134,18 +136,7 @@ def as_json(result: Uncertainty) -> dict[str, Any]:
         "source": spread.source,
         "not_varied": dict(result.left_out),
         "quantities": {quantity.name: _row(quantity) for quantity in result.quantities},
-        "runs": [
-            {
-                "kind": run.kind,
-                "changes": dict(run.changes),
-                "path": run.path.relative_to(result.folder).as_posix(),
-                "verdict": run.verdict,
-                "reason": run.reason,
-                "message": run.message,
-                "values": dict(run.values),
-            }
-            for run in result.runs
-        ],
+        "runs": [asdict(run) | {"path": run.path.relative_to(result.folder).as_posix()} for run in result.runs],
     }
 
 
@@ -184,15 +175,6 @@ def _row(quantity: Quantity) -> dict[str, Any]:
     }
 
 
-def _as_csv(result: Uncertainty) -> str:
-    text = io.StringIO()
-    rows = [{"quantity": quantity.name, **_row(quantity)} for quantity in result.quantities]
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
-
-
 def _error(quantity: Quantity, error: float | None) -> str:
     return UNKNOWN if error is None else f"{quantity.factor * error:.{_digits(quantity)}f}"
 
@@ -203,10 +185,6 @@ def _digits(quantity: Quantity) -> int:
     if not total:
         return quantity.digits
     return min(max(1 - floor(log10(quantity.factor * total)), 0), quantity.digits + 1)
-
-
-def _elements(result: Uncertainty) -> int:
-    return result.config.body.model_dump()["mesh"]["elements_per_side"]
 
 
 def _listed(numbers: list[Any]) -> str:

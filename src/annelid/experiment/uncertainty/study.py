@@ -20,14 +20,21 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from annelid.config import RunConfig, WormBody, load_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
-from annelid.experiment.case import Work, run_command
+from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Progress, Store, case_key
-from annelid.experiment.uncertainty.combine import Quantity, largest_difference, order_of_convergence, scatter
 from annelid.experiment.uncertainty.parameters import Spread, applicable, changes, draw, read_spread
-from annelid.experiment.uncertainty.readings import Reading, readings
+from annelid.experiment.uncertainty.quantities import (
+    Quantity,
+    Reading,
+    largest_difference,
+    order_of_convergence,
+    readings,
+    scatter,
+)
 from annelid.output import whole_file
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import FILE_NAME, read_config, refuse_used_folder
@@ -41,32 +48,14 @@ Kind = Literal["nominal", "drawn", "time step", "elements"]
 
 
 @dataclass(frozen=True)
-class Variant(Work):
+class Variant(Case):
     """One run of the study: a configuration and what is changed in it.
 
     Attributes:
-        base: The configuration that gets error bars.
         kind: What the variant is for.
-        changes: Fields that differ, by dotted path.
     """
 
-    base: RunConfig
-    kind: Kind
-    changes: Mapping[str, Any]
-
-    def configured(self) -> RunConfig:
-        """Makes the configuration of the run."""
-        return load_config(self.base.model_dump(exclude_none=True), dict(self.changes))
-
-    @property
-    def stem(self) -> str:
-        """What the name of its folder begins with."""
-        return "run"
-
-    @property
-    def command(self) -> str:
-        """The command line that makes the run, as far as the name of the configuration tells."""
-        return run_command(self.base.name, self.changes)
+    kind: Kind = "nominal"
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,11 +173,16 @@ def plan(config: RunConfig, n: int, spread: Spread) -> list[Variant]:
         spread: Parameters that change it.
     """
     return [
-        Variant(config, "nominal", {}),
-        *(Variant(config, "drawn", changes(config, spread, row)) for row in draw(n, spread, config.seed)),
-        *(Variant(config, "time step", finer) for finer in finer_steps(config)),
-        *(Variant(config, "elements", {"body.mesh.elements_per_side": count}) for count in more_elements(config)),
+        variant(config, "nominal", {}),
+        *(variant(config, "drawn", changes(config, spread, row)) for row in draw(n, spread, config.seed)),
+        *(variant(config, "time step", finer) for finer in finer_steps(config)),
+        *(variant(config, "elements", {"body.mesh.elements_per_side": count}) for count in more_elements(config)),
     ]
+
+
+def variant(config: RunConfig, kind: Kind, changed: Mapping[str, Any]) -> Variant:
+    """Returns a variant of a run, with what is changed in it by dotted path."""
+    return Variant(config.name, changed, config, kind)
 
 
 def finer_steps(config: RunConfig) -> list[dict[str, float]]:

@@ -12,7 +12,8 @@ from mujoco.batch import Batch, SimulationError
 from numpy.typing import NDArray
 
 from annelid.arena.surface import surface_of
-from annelid.config import RunConfig, WormBody
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Movement, Posture

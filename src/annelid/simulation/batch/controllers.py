@@ -4,18 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from annelid import config as settings
 from annelid.config import RunConfig
 from annelid.control import CopySettings
-from annelid.control.sns import SnsController
 from annelid.protocols import Array, Sensation, State, StridingController
 from annelid.simulation.coupling import Coupling
 
 Outcome = tuple[dict[int, Array], dict[int, Exception]]
 """Activation of every worm, and the errors of those that failed, by number of the worm."""
+
+
+@runtime_checkable
+class CopiedController(Protocol):
+    """The capability of a controller of advancing many copies of itself at once.
+
+    Attributes:
+        alike: Equal for controllers that are copies of one another.
+        own: What may differ between the copies.
+    """
+
+    alike: Hashable
+    own: CopySettings
+
+    def step_copies(
+        self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
+    ) -> tuple[State, Array]:
+        """Returns the copies' states some control steps on, and their activation, ``(n_copies, n_muscles)``."""
+        ...
+
+    def get_state(self) -> State:
+        """Returns copies of all that the next step depends on."""
+        ...
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        ...
 
 
 class ControllerBatch:
@@ -30,10 +56,10 @@ class ControllerBatch:
         """
         alike: dict[Hashable, list[int]] = {}
         for row, config in enumerate(configs):
-            alike.setdefault(_kind(config, row), []).append(row)
+            alike.setdefault(_group(couplings[row], config, row), []).append(row)
         self._groups = [
-            _Networks(rows, [configs[row] for row in rows], [couplings[row] for row in rows])
-            if _is_network(configs[rows[0]])
+            _Networks(rows, [couplings[row] for row in rows], noisy=configs[rows[0]].sensor.noise_m > 0)
+            if isinstance(couplings[rows[0]].controller, CopiedController)
             else _Single(rows[0], couplings[rows[0]], noisy=configs[rows[0]].sensor.noise_m > 0)
             for rows in alike.values()
         ]
@@ -64,20 +90,12 @@ class ControllerBatch:
         self._groups = [group for group in self._groups if group.rows]
 
 
-def _is_network(config: RunConfig) -> bool:
-    """Tells whether a worm's controller is a bare synthetic nervous system."""
-    return isinstance(config.controller, settings.SnsController) and config.turning is None
-
-
-def _kind(config: RunConfig, row: int) -> Hashable:
-    """Tells which controllers may step together: networks alike but for what `CopySettings` holds."""
-    if not _is_network(config):
+def _group(coupling: Coupling, config: RunConfig, row: int) -> Hashable:
+    """Tells which controllers may step together: copies that are alike, noisy or not."""
+    controller = coupling.controller
+    if not isinstance(controller, CopiedController):
         return row
-    return (
-        config.controller.model_dump_json(exclude={"sensor_current_nA", "kick_nA"}),
-        config.sensor.startup_hold_s,
-        config.sensor.noise_m > 0,
-    )
+    return type(controller), controller.alike, config.sensor.noise_m > 0
 
 
 def _advance_with_time(couplings: Sequence[Coupling], later: int) -> list[Sensation]:
@@ -94,21 +112,16 @@ def _advance_with_time(couplings: Sequence[Coupling], later: int) -> list[Sensat
 class _Networks:
     """Synthetic nervous systems, as copies of one that differ in their sensors and currents only."""
 
-    def __init__(self, rows: Sequence[int], configs: Sequence[RunConfig], couplings: Sequence[Coupling]) -> None:
+    def __init__(self, rows: Sequence[int], couplings: Sequence[Coupling], noisy: bool) -> None:
         self.rows = list(rows)
         self._couplings = list(couplings)
-        self._controllers = [c.controller for c in couplings if isinstance(c.controller, SnsController)]
-        self._sections = [
-            (config.controller, config.sensor)
-            for config in configs
-            if isinstance(config.controller, settings.SnsController)
-        ]
+        self._controllers = [c.controller for c in couplings if isinstance(c.controller, CopiedController)]
         self._first = self._controllers[0]
         states = [controller.get_state() for controller in self._controllers]
         self._states: State = {name: np.stack([state[name] for state in states]) for name in states[0]}
         self._states["n_steps"] = states[0]["n_steps"]
-        self._each = CopySettings.of(self._sections)
-        self._noisy = configs[0].sensor.noise_m > 0
+        self._each = CopySettings.of(controller.own for controller in self._controllers)
+        self._noisy = noisy
 
     def advance(self, n_steps: int) -> Outcome:
         """Takes control steps with the bodies at rest."""
@@ -144,9 +157,9 @@ class _Networks:
             return
         place = self.rows.index(row)
         self._controllers[place].set_state(self._state_of(place))
-        for members in (self.rows, self._couplings, self._controllers, self._sections):
+        for members in (self.rows, self._couplings, self._controllers):
             del members[place]
-        self._each = CopySettings.of(self._sections)
+        self._each = CopySettings.of(controller.own for controller in self._controllers)
         self._states = {
             name: np.delete(values, place, axis=0) if values.ndim else values for name, values in self._states.items()
         }

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from annelid.config import RunConfig, WormBody, as_config
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError
 
 ALIKE = (

@@ -6,7 +6,8 @@ from math import nan
 
 import numpy as np
 
-from annelid.config import SnsController, WormBody
+from annelid.body.worm import WormBody
+from annelid.control.sns import Sns
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     EXACT,
@@ -27,7 +28,7 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
 
     body, controller = main.config.body, main.config.controller
     assert isinstance(body, WormBody)
-    assert isinstance(controller, SnsController)
+    assert isinstance(controller, Sns)
     difference = largest_difference(body.muscles)
     summaries = [one.summary for one, _ in evidence.runs]
     medians = [summary.contraction_force_median_N or nan for summary in summaries]
@@ -75,7 +76,7 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
             "engine tells the force of the last of its four stages, which alternates from step to step: the largest is "
             "one of these, and depends on the time step. The muscle settles near its shortest length, where "
             "little is left of the "
-            f"{max(body.muscles.peak_forces(body.n_segments)):.0f} N that it could pull with: it limits length rather "
+            f"{max(body.muscles.forces(body.n_segments)):.0f} N that it could pull with: it limits length rather "
             "than force. The paper's number is nearer to that settled force.",
             MAIN.command,
             within,

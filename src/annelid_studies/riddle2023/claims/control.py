@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import nan
 
 from annelid.analysis.rhythm import CONTRACTED
-from annelid.config import SnsController
+from annelid.control.sns import Sns
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
@@ -86,7 +86,7 @@ def control_claims(evidence: Evidence) -> list[Claim]:
 def _half_centres(run: Run) -> tuple[float, float]:
     """Share of samples in which both neurons of a half-centre are excited, and in which activation follows them."""
     data, controller = run.data, run.config.controller
-    assert isinstance(controller, SnsController)
+    assert isinstance(controller, Sns)
     names = [str(name) for name in data["neuron"].values]
     segments = range(1, run.config.body.n_segments + 1)
     contraction, expansion = (

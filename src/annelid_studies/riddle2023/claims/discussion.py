@@ -9,7 +9,7 @@ import numpy as np
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
 from annelid.analysis.travel import way_ahead
-from annelid.config import Program
+from annelid.control.program import Program
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     LABELS,

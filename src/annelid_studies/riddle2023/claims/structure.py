@@ -7,7 +7,8 @@ from math import isnan, nan, pi, sqrt
 import numpy as np
 
 from annelid.body import mesh_of
-from annelid.config import PlanarBody, WormBody
+from annelid.body.worm import WormBody
+from annelid.planar.riddle2022 import PlanarBody
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     PLANAR_CASES,

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.assemble import build_spec
-from annelid.config import Rods, WormBody
+from annelid.body.formulations.chain import Chain
+from annelid.body.formulations.rods import Rods
+from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title, segment_colors
@@ -80,6 +82,7 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     formulation = config.body.formulation
     if isinstance(formulation, Rods):
         return formulation.pin_stiffness_N_per_m if formulation.pins == "separate" else float("inf")
+    assert isinstance(formulation, Chain)
     model = build_spec(config).compile()
     inverse_mass = model.body_invweight0[model.eq_obj1id, 0] + model.body_invweight0[model.eq_obj2id, 0]
     impedance = formulation.pin_impedance[1]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
-from annelid.config import WormBody
+from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.config import Rings
+from annelid.body.actuators.muscle import Rings
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.style import panel_title, segment_colors
 
@@ -111,7 +111,7 @@ def caption(rings: Rings, n_segments: int = 3) -> str:
     ranges = rings.length_ranges(n_segments)
     optimal = [(high - low) / (SCALED_RANGE[1] - SCALED_RANGE[0]) for low, high in ranges]
     low, high = _working_range(ranges)
-    peak_N = max(rings.peak_forces(n_segments))
+    peak_N = max(rings.forces(n_segments))
     grid = np.linspace(rings.minimum_length, 1.0, 20_001)
     settled = grid[np.searchsorted(engine_flv(grid, 0.0, rings), SETTLED_FORCE_N / peak_N)]
     settled_m = [high - (SCALED_RANGE[1] - settled) * unit for (_, high), unit in zip(ranges, optimal, strict=True)]

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config import PlanarWorm, RunConfig, load_config
+from annelid.config import RunConfig, load_config
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.planar_scene import bent_rhombi, rhombi
 from annelid.draw.style import panel_title, segment_colors
 from annelid.errors import ConfigError
+from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Records
 from annelid.simulation import build_plant
 

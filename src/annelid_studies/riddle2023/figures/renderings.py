@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from annelid.analysis.rhombi import nearest_frame
 from annelid.body import mesh_of
-from annelid.body.rods import PIN_RGBA, STRAND_RGBA
-from annelid.config import RunConfig, WormBody
+from annelid.body.formulations.rods.net import PIN_RGBA, STRAND_RGBA
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
 from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
 from annelid.draw.canvas import canvas, save_both
 from annelid.draw.gl import find_backend

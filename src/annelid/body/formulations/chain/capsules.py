@@ -9,16 +9,20 @@ tied by two `connect` constraints to its strands, or one constraint straight bet
 from __future__ import annotations
 
 from math import pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
 
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
-from annelid.body.rods import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
-from annelid.config import Arena, Chain, Strands, WormBody
+from annelid.body.formulations.rods.net import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
+from annelid.body.worm import Strands, WormBody
+from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
+
+if TYPE_CHECKING:
+    from annelid.body.formulations.chain import Chain
 
 JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
 
@@ -28,7 +32,7 @@ def add_chains(
     geometry: MeshGeometry,
     body: WormBody,
     formulation: Chain,
-    arena: Arena,
+    arena: ArenaKind,
     *,
     vertices_touch: bool = False,
 ) -> None:

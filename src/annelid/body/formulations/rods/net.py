@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -23,8 +24,12 @@ import numpy as np
 from annelid.arena.contact import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
-from annelid.config import Arena, Rods, Strands, WormBody
+from annelid.body.worm import Strands, WormBody
+from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
+
+if TYPE_CHECKING:
+    from annelid.body.formulations.rods import Rods
 
 AXES = np.eye(3)
 ORIGIN = np.zeros(3)
@@ -39,7 +44,7 @@ TWIST_MASS_KG = 1e-9
 
 
 def add_rods(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: Arena, *, dampers: bool
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: ArenaKind, *, dampers: bool
 ) -> None:
     """Adds the mesh as a net of rods, and the solver settings that it needs.
 

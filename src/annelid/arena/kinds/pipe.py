@@ -1,0 +1,278 @@
+"""A pipe: a centre line of straights and curves, and a bore that may change along it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, inf, isfinite, pi, radians, sin, tan
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from annelid.arena.course import AHEAD, UP, Bore, Course, Curve, Straight
+from annelid.arena.kinds.floor import refuse_heading
+from annelid.arena.shapes import AROUND, ENTRY_SHOWN_M, EXIT_SHOWN_M, PIPE_GRAIN_M, Shape, grid_faces
+from annelid.arena.surface import Implicit, Level, Surface, lengths
+from annelid.config.arena import ArenaKind
+from annelid.config.sections import NonNegative, Positive
+from annelid.protocols import Array
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.config.run import RunConfig
+
+ENTRY_RAMP_M = 0.1
+"""Length over which the entry's clearance ends, from the worm's front on."""
+ROUNDING_M = 0.02
+"""Length over which the bore's slope changes where a taper begins or ends."""
+PIPE_ABOVE_FLOOR_M = 0.02
+"""The floor below a pipe is there to be seen only."""
+PANELS_AROUND = 32
+PANEL_LENGTH_M = 0.05
+HALF_THICKNESS_M = 0.01
+
+
+class Pipe(ArenaKind):
+    """A pipe: a centre line of straights and curves, and a bore that may change along it.
+
+    The worm starts inside the entry, which goes on behind it; the exit goes on too. The bore's lowest line at the entry
+    is that of the mesh. Lengths along the pipe count from the worm's front.
+    """
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "pipes"),)
+    is_closed: ClassVar[bool] = True
+    kind: Literal["pipe"] = "pipe"
+    bore_m: Positive = Field(default=0.16, description="radius of the bore, free for the worm's skin")
+    entry_clearance_m: NonNegative = Field(
+        default=0.003, description="how much wider the bore is where the worm starts, so that its strands fit in"
+    )
+    course: Literal["straight", "bend", "s", "helix"] = Field(
+        default="straight", description="the centre line: one bend, two opposite ones, or a rising helix"
+    )
+    straight_m: NonNegative = Field(default=0.2, description="straight pipe between the worm's front and the curve")
+    radius_m: Positive = Field(default=0.5, description="radius of the centre line's curves")
+    turn_deg: Annotated[float, Field(ge=-3600, le=3600)] = Field(
+        default=90.0, description="angle of each curve (helix: of the whole), positive to the worm's left"
+    )
+    pitch_m: NonNegative = Field(default=0.5, description="rise of the helix in a turn")
+    profile: Literal["even", "taper", "hourglass"] = Field(
+        default="even", description="the bore along the pipe: the same, narrowing for good, or narrowest midway"
+    )
+    narrowest_m: Positive = Field(default=0.13, description="radius of the narrowest bore of a taper or an hourglass")
+    profile_start_m: NonNegative = Field(default=0.2, description="where the bore begins to narrow")
+    profile_length_m: Positive = Field(default=0.5, description="length over which it changes")
+
+    @model_validator(mode="after")
+    def _a_pipe_that_can_be(self) -> Self:
+        if self.profile != "even" and self.narrowest_m >= self.bore_m:
+            raise ValueError(
+                f"arena.narrowest_m = {self.narrowest_m:g}: must be less than arena.bore_m = {self.bore_m:g}"
+            )
+        widest = self.bore_m + self.entry_clearance_m
+        if self.course == "bend" and abs(self.turn_deg) > 180:
+            raise ValueError(f"arena.turn_deg = {self.turn_deg:g}: a bend must be in -180 .. 180; a helix may go on")
+        if self.course == "s" and abs(self.turn_deg) > 135:
+            raise ValueError(f"arena.turn_deg = {self.turn_deg:g}: each curve of an s must be in -135 .. 135")
+        if self.course in ("bend", "s") and abs(self.turn_deg) > 135 and self.radius_m <= widest:
+            raise ValueError(
+                f"arena.radius_m = {self.radius_m:g}: must be more than {widest:g}, or the legs of the bend overlap"
+            )
+        if self.course == "helix":
+            if self.radius_m <= widest:
+                raise ValueError(
+                    f"arena.radius_m = {self.radius_m:g}: must be more than {widest:g} for a helix, or the pipe "
+                    "overlaps itself"
+                )
+            if abs(self.turn_deg) > 270 and self.pitch_m <= 2.2 * widest:
+                raise ValueError(
+                    f"arena.pitch_m = {self.pitch_m:g}: must be more than {2.2 * widest:g} for turns that lie above "
+                    "each other"
+                )
+        return self
+
+    @property
+    def floor_depth_m(self) -> float:
+        """Of a floor that is there to be seen only."""
+        return PIPE_ABOVE_FLOOR_M
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the worm leads along the pipe and fits into its entry."""
+        free, mesh = self.bore_m + self.entry_clearance_m, getattr(config.body, "mesh", None)
+        if mesh is not None and free < mesh.radius_m:
+            raise ValueError(
+                f"arena.bore_m = {self.bore_m:g}: with arena.entry_clearance_m = {self.entry_clearance_m:g} it must be "
+                f"at least body.mesh.radius_m = {mesh.radius_m:g}, the worm that starts inside; make it narrower "
+                "further on with arena.profile"
+            )
+        refuse_heading(config, f"arena.kind = {self.kind!r}")
+
+    def ground(self) -> Surface:
+        """Returns the inside of the wall."""
+        return PipeWall(course_of(self), bore_of(self))
+
+    def centre_line(self) -> Course:
+        """Returns `course_of`."""
+        return course_of(self)
+
+    def bore(self) -> Bore:
+        """Returns `bore_of`."""
+        return bore_of(self)
+
+    def reach_m(self) -> tuple[float, float]:
+        """Returns where the pipe bends or changes its bore; both 0 for a plain straight one."""
+        joints = course_of(self).joints_m
+        parts = [(joints[0], joints[-1])] if joints else []
+        if self.profile != "even":
+            parts.append((self.profile_start_m, self.profile_start_m + self.profile_length_m))
+        return (min(first for first, _ in parts), max(last for _, last in parts)) if parts else (0.0, 0.0)
+
+    def shape(self, length_m: float) -> Shape:
+        """Returns the tube to be drawn."""
+        return _tube(PipeWall(course_of(self), bore_of(self)), length_m)
+
+    def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
+        """Adds flat panels that are tangent to the wall in their middles."""
+        add_pipe_panels(spec, self, length_m)
+
+
+def course_of(pipe: Pipe) -> Course:
+    """Returns a pipe's centre line in the coordinates of the worm's model; arc lengths count from the worm's front."""
+    start = pipe.bore_m * UP
+    if pipe.course == "straight":
+        return Course((Straight(start, AHEAD, -inf, inf),), ())
+    turn = radians(pipe.turn_deg)
+    rise = pipe.pitch_m / (2 * pi) if pipe.course == "helix" else 0.0
+    curve = _curve(start + pipe.straight_m * AHEAD, AHEAD, UP, pipe.radius_m, rise, turn, pipe.straight_m)
+    pieces: list[Straight | Curve] = [Straight(start, AHEAD, -inf, pipe.straight_m), curve]
+    if pipe.course == "s":
+        end = curve.at(np.array(curve.last_m))
+        pieces.append(_curve(end.point_m, end.tangent, UP, pipe.radius_m, 0.0, -turn, curve.last_m))
+    last = pieces[-1].at(np.array(pieces[-1].last_m))
+    pieces.append(Straight(last.point_m, last.tangent, pieces[-1].last_m, inf))
+    return Course(tuple(pieces), tuple(piece.last_m for piece in pieces[:-1]))
+
+
+def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, turn_rad: float, arc_m: float) -> Curve:
+    """Joins a curve smoothly to what ends at a point; the axis of a helix leans so far that its start is level."""
+    outwards = np.sign(turn_rad) * np.cross(tangent, up)
+    lean = atan2(rise, radius)
+    onwards, axis = cos(lean) * tangent - sin(lean) * up, sin(lean) * tangent + cos(lean) * up
+    return Curve(start - radius * outwards, outwards, onwards, axis, radius, rise, abs(turn_rad), arc_m)
+
+
+def bore_of(pipe: Pipe) -> Bore:
+    """Returns a pipe's bore: wider at the entry by the clearance, then as the profile says."""
+    parts = [_ramp(0.0, ENTRY_RAMP_M, -pipe.entry_clearance_m)]
+    change = pipe.narrowest_m - pipe.bore_m
+    if pipe.profile == "taper":
+        parts.append(_ramp(pipe.profile_start_m, pipe.profile_length_m, change))
+    if pipe.profile == "hourglass":
+        parts.append(_waist(pipe.profile_start_m, pipe.profile_length_m, change))
+    arc = np.unique(np.concatenate([knots for knots, _ in parts]))
+    slope = sum((np.interp(arc, *part, left=0.0, right=0.0) for part in parts), np.zeros(len(arc)))
+    rises = np.diff(arc) * (slope[1:] + slope[:-1]) / 2
+    radius = pipe.bore_m + pipe.entry_clearance_m + np.concatenate([[0.0], np.cumsum(rises)])
+    return Bore(arc, slope, radius)
+
+
+def _ramp(start: float, length: float, change: float) -> tuple[Array, Array]:
+    """Arc lengths and slopes of an even change of the radius with rounded ends."""
+    rounding = min(ROUNDING_M, length / 4)
+    slope = change / (length - rounding)
+    knots = np.array([start, start + rounding, start + length - rounding, start + length])
+    return knots, np.array([0.0, slope, slope, 0.0])
+
+
+def _waist(start: float, length: float, change: float) -> tuple[Array, Array]:
+    """Arc lengths and slopes of a parabolic waist with rounded ends, narrowest midway."""
+    rounding = min(ROUNDING_M, length / 4)
+    slope = 4.0 * change / length
+    knots = np.array([start, start + rounding, start + length - rounding, start + length])
+    return knots, np.array([0.0, slope, -slope, 0.0])
+
+
+@dataclass(frozen=True)
+class PipeWall(Implicit):
+    """The inside of a pipe.
+
+    Attributes:
+        course: Its centre line.
+        bore: Its radius along it.
+    """
+
+    course: Course
+    bore: Bore
+
+    def level(self, points_m: Array) -> Level:
+        """Returns how far points lie within the bore's radius at the nearest point of the centre line, m."""
+        foot = self.course.nearest(points_m)
+        away = points_m - foot.point_m
+        radial = lengths(away)
+        on_line = radial == 0.0
+        outwards = np.where(on_line[:, np.newaxis], UP, away / np.where(on_line, 1.0, radial)[:, np.newaxis])
+        radius, slope = self.bore.at(foot.arc_m)
+        # The centre line's arc length grows faster than the way on the inner side of a curve.
+        stretch = np.maximum(1.0 - (away * foot.curvature_per_m).sum(axis=-1), 0.1)
+        gradient = (slope / stretch)[:, np.newaxis] * foot.tangent - outwards
+        return Level(radius - radial, gradient, slope == 0.0)
+
+
+def last_change_m(course: Course, bore: Bore) -> float:
+    """Returns the arc length at which a pipe's last curve or change of its bore ends, m."""
+    ends = [piece.first_m for piece in course.pieces if isinstance(piece, Straight) and isfinite(piece.first_m)]
+    return max([*ends, float(bore.arc_m[-1])])
+
+
+def frames_along(course: Course, arc_m: Array) -> tuple[Array, Array, Array]:
+    """Returns the centre line's points at arc lengths and two unit vectors across it, ``(n, 3)`` each.
+
+    The second one points as far upwards as it can, so the rings drawn with them are not twisted.
+    """
+    foot = course.at(arc_m)
+    side: Array = np.cross(foot.tangent, UP)
+    side = side / np.linalg.norm(side, axis=-1, keepdims=True)
+    up: Array = np.cross(side, foot.tangent)
+    return foot.point_m, side, up
+
+
+def _tube(wall: PipeWall, length_m: float) -> Shape:
+    first, last = -(length_m + ENTRY_SHOWN_M), last_change_m(wall.course, wall.bore) + EXIT_SHOWN_M
+    arc = np.linspace(first, last, int((last - first) / PIPE_GRAIN_M) + 2)
+    centre, side, up = frames_along(wall.course, arc)
+    angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    across = np.cos(angle)[:, np.newaxis] * side[:, np.newaxis] + np.sin(angle)[:, np.newaxis] * up[:, np.newaxis]
+    rings = centre[:, np.newaxis] + wall.bore.at(arc)[0][:, np.newaxis, np.newaxis] * across
+    return Shape(rings.reshape(-1, 3), grid_faces(len(arc), AROUND, closed=True))
+
+
+def add_pipe_panels(spec: mujoco.MjSpec, pipe: Pipe, length_m: float, around: int = PANELS_AROUND) -> None:
+    """Adds flat panels tangent to a pipe's wall; they are not drawn.
+
+    Args:
+        spec: The worm's spec.
+        pipe: The pipe and its contact settings.
+        length_m: Length of the worm, which the entry holds.
+        around: Number of panels round the pipe.
+    """
+    from annelid.arena.contact import add_box
+
+    wall = PipeWall(course_of(pipe), bore_of(pipe))
+    first, last = -(length_m + ENTRY_SHOWN_M), last_change_m(wall.course, wall.bore) + EXIT_SHOWN_M
+    n_rings = int((last - first) / PANEL_LENGTH_M) + 1
+    arc = first + (np.arange(n_rings) + 0.5) * (last - first) / n_rings
+    centre, side, up = frames_along(wall.course, arc)
+    foot, radius = wall.course.at(arc), wall.bore.at(arc)[0]
+    for angle in 2.0 * pi * np.arange(around) / around:
+        outwards = np.cos(angle) * side + np.sin(angle) * up
+        # A ring's panels are longer on the outer side of a curve.
+        stretch = 1.0 - radius * (outwards * foot.curvature_per_m).sum(axis=-1)
+        places = centre + radius[:, np.newaxis] * outwards
+        inwards = wall.normal(places)
+        half_length = np.maximum(stretch, 0.1) * (last - first) / n_rings / 2
+        for place, facing, along, half, own in zip(places, inwards, foot.tangent, half_length, radius, strict=True):
+            ahead = along - (along @ facing) * facing
+            ahead = ahead / np.linalg.norm(ahead)
+            axes = np.stack([ahead, np.cross(facing, ahead), facing], axis=-1)
+            size = [half, own * tan(pi / around), HALF_THICKNESS_M]
+            add_box(spec, pipe, place - HALF_THICKNESS_M * facing, size, axes)

@@ -1,0 +1,145 @@
+"""Ring actuators: what all kinds have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from annelid.config.kinds import Kind
+from annelid.config.sections import Range
+from annelid.morphology import Array
+from annelid.registry import Registry
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.body.actuators.muscle import Rings
+    from annelid.body.estimates import Finding
+    from annelid.body.worm import WormBody
+
+
+class Slopes(Protocol):
+    """Slopes of the actuators of one worm."""
+
+    def __call__(self, length_m: Array, rate_m_per_s: Array, drive: Array, tension_N: Array) -> tuple[Array, Array]:
+        """Tells both slopes, never negative, since the engine drops what would destabilise it.
+
+        Args:
+            length_m: Lengths of the rings, m, ``(n_muscles,)``.
+            rate_m_per_s: Rates of their lengths, m/s.
+            drive: What the muscles' gain is multiplied by, their activation.
+            tension_N: Their tensions, N.
+
+        Returns:
+            Tension per length, N/m, and per rate, N s/m.
+        """
+        ...
+
+
+class ActuatorKind(Kind):
+    """Base of the ring actuators' sections: how they lie, between which lengths they work, and what is asked of them.
+
+    Attributes:
+        force_field: The field of its greatest force.
+    """
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.rings.kind", "annelid.body.actuators")
+    default: ClassVar[str] = "muscle"
+    force_field: ClassVar[str]
+
+    layout: Literal["whole", "halves"] = Field(
+        default="whole",
+        description="one actuator round the body, or a left (-y: segment 1 leads towards -x) and a right one",
+    )
+    length_range_m: Range | tuple[Range, ...] = Field(
+        default=(0.566, 1.067),
+        description="operating range of a whole ring, one pair for all or one pair a segment",
+    )
+
+    @field_validator("length_range_m")
+    @classmethod
+    def _ordered(cls, value: Any) -> Any:
+        if not value:
+            raise ValueError("needs one pair for all rings or one pair a segment")
+        for low, high in value if isinstance(value[0], tuple) else (value,):
+            if low >= high:
+                raise ValueError("each length range needs its lower bound below its upper bound")
+        return value
+
+    def length_ranges(self, n_segments: int) -> list[tuple[float, float]]:
+        """Returns one operating range for each segment's whole ring, m."""
+        if isinstance(self.length_range_m[0], tuple):
+            return [(float(low), float(high)) for low, high in self.length_range_m]  # type: ignore[misc]
+        low, high = self.length_range_m
+        return [(float(low), float(high))] * n_segments  # type: ignore[arg-type]
+
+    @abstractmethod
+    def forces(self, n_segments: int) -> list[float]:
+        """Returns the greatest force of every segment's actuators, N."""
+
+    @abstractmethod
+    def findings(self, body: WormBody) -> Iterator[Finding]:
+        """Holds its lengths and forces against the mesh, before anything runs."""
+
+    @abstractmethod
+    def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
+        """Adds one actuator.
+
+        Args:
+            spec: The worm's spec, which has a tendon of that name.
+            name: Of the tendon and of the actuator.
+            span_m: Shortest and longest operating length, m.
+            force_N: Its greatest force, N.
+        """
+
+    @abstractmethod
+    def slopes(self, model: mujoco.MjModel) -> Slopes:
+        """Returns how steeply the tensions of a compiled body rise, as the engine linearises them."""
+
+    @property
+    def muscle(self) -> Rings | None:
+        """The section itself where it is of muscles."""
+        return None
+
+    def first_act(self, model: mujoco.MjModel) -> Array:
+        """Returns the engine's actuator states at the start, ``(n_states,)``."""
+        return np.zeros(model.na)
+
+    def act_at_rest(self, spec: mujoco.MjSpec) -> Array:
+        """Returns the actuator states of a written model's keyframe at rest; empty where there are none to set."""
+        return np.zeros(0)
+
+    def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
+        """Tells what the engine's actuators get under an activation.
+
+        Args:
+            model: The compiled body.
+            activation: In [0, 1], ``(n_muscles,)``.
+            state: The engine's actuator states, ``(n_states,)``.
+            length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
+            time_s: Time for which it holds, s.
+
+        Returns:
+            Shape ``(n_muscles,)``; the activation itself unless the kind says otherwise.
+        """
+        return activation
+
+
+def not_empty(value: Any, actuators: str) -> Any:
+    """Returns a field that holds one number or one a segment, unless it holds none.
+
+    Raises:
+        ValueError: It is empty.
+    """
+    if value == ():
+        raise ValueError(f"needs one number for all {actuators} or one a segment")
+    return value
+
+
+def one_a_segment(value: float | tuple[float, ...], n_segments: int) -> list[float]:
+    """Returns a list of one number a segment."""
+    return list(value) if isinstance(value, tuple) else [value] * n_segments

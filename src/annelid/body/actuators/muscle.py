@@ -1,0 +1,223 @@
+"""Ring muscles: MuJoCo's force-length-velocity muscle on a closed ring or on two half-rings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import hypot, sin
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from annelid.body.actuators import ActuatorKind, Slopes, not_empty, one_a_segment
+from annelid.body.estimates import (
+    COLLAPSED,
+    SHRUNK,
+    UNSURE,
+    Finding,
+    bearable_force_N,
+    crushes,
+    rhombus_of,
+    strongest,
+    weak,
+)
+from annelid.config.sections import Positive
+from annelid.morphology import Array
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.body.worm import WormBody
+
+LOWEST_MUSCLE, SPAN_OF_MUSCLE = 0.75, 0.3
+"""The engine lays a muscle's length range from 0.75 to 1.05 of its optimal length."""
+MOST_OVER = 200.0
+"""Largest force of a muscle at rest length over what the mesh bears; the paper's is 100 times that."""
+ACTIVATION_TIMES_S = (0.01, 0.04)
+"""MuJoCo's time constants of muscle activation and deactivation."""
+
+
+class Rings(ActuatorKind):
+    """Ring muscles: MuJoCo's force-length-velocity muscle on a closed ring (or two half-rings).
+
+    The muscle's optimal length is ``(length_range[1] - length_range[0]) / (1.05 - 0.75)``: MuJoCo scales the
+    given range to 0.75-1.05 of it. The force is ``peak_force_N * (activation * FL * FV + FP)``.
+    """
+
+    force_field: ClassVar[str] = "peak_force_N"
+    kind: Literal["muscle"] = "muscle"
+    peak_force_N: Positive | tuple[Positive, ...] = Field(
+        default=117.57, description="isometric force at the optimal length, F0, one number for all or one a segment"
+    )
+    minimum_length: Annotated[float, Field(gt=0, lt=1)] = Field(
+        default=0.58, description="lmin, relative to the optimal length"
+    )
+    maximum_length: Annotated[float, Field(gt=1, le=1e6)] = Field(
+        default=1.6, description="lmax, relative to the optimal length"
+    )
+    maximum_velocity: Positive = Field(default=1.5, description="vmax, optimal lengths per second")
+    passive_peak: Positive = Field(default=1.3, description="fpmax, relative to the peak force")
+    lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
+    activation_dynamics: bool = Field(
+        default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
+    )
+
+    @field_validator("peak_force_N")
+    @classmethod
+    def _given(cls, value: Any) -> Any:
+        return not_empty(value, "muscles")
+
+    def forces(self, n_segments: int) -> list[float]:
+        """Returns the peak force of every segment's muscles, N."""
+        return one_a_segment(self.peak_force_N, n_segments)
+
+    @property
+    def muscle(self) -> Rings:
+        """The section itself."""
+        return self
+
+    def findings(self, body: WormBody) -> Iterator[Finding]:
+        """Holds the muscles' lengths without force against the ring at rest, and their force against the mesh."""
+        if self.minimum_length < 1.0 < self.maximum_length:
+            for low, high, force_N in strongest(self, body.n_segments):
+                yield from _findings(body, self, low, high, force_N)
+
+    def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
+        """Adds one muscle, as `ActuatorKind.add`."""
+        import mujoco
+
+        actuator = spec.add_actuator(
+            name=name,
+            target=name,
+            trntype=mujoco.mjtTrn.mjTRN_TENDON,
+            lengthrange=span_m,
+            ctrllimited=True,
+            ctrlrange=[0.0, 1.0],
+        )
+        actuator.set_to_muscle(
+            timeconst=ACTIVATION_TIMES_S,
+            tausmooth=0.0,
+            range=[0.75, 1.05],
+            force=force_N,
+            lmin=self.minimum_length,
+            lmax=self.maximum_length,
+            vmax=self.maximum_velocity,
+            fpmax=self.passive_peak,
+            fvmax=self.lengthening_peak,
+        )
+        if not self.activation_dynamics:
+            actuator.dyntype = mujoco.mjtDyn.mjDYN_NONE
+
+    def slopes(self, model: mujoco.MjModel) -> Slopes:
+        """Returns the slopes of ``F0 (activation FL(x) FV(v) + FP(x))``, with x and v in optimal lengths."""
+        return _slopes(model, self)
+
+
+def _findings(body: WormBody, rings: Rings, low: float, high: float, force_N: float) -> Iterator[Finding]:
+    """The muscle's lengths without force against the ring at rest, and its force against the mesh."""
+    rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
+    optimal = (high - low) / SPAN_OF_MUSCLE
+    none = low + (rings.minimum_length - LOWEST_MUSCLE) * optimal
+    at_rest = LOWEST_MUSCLE + (rest - low) / optimal
+    active, passive = active_share(at_rest, rings), passive_share(at_rest, rings)
+    field, fitting = "body.rings.length_range_m", f"set [{0.59 * rest:.3g}, {1.11 * rest:.3g}]"
+    if force_N * passive > 0.1 * bearable:
+        # Its passive force ends at the optimal length.
+        shrunk = low + (1.0 - LOWEST_MUSCLE) * optimal < SHRUNK * rest
+        severity = "error" if force_N * passive > UNSURE * bearable and shrunk else "warning"
+        problem = (
+            f"a ring is {rest:.3g} m long at rest, so that its muscle pulls {force_N * passive:.3g} N before anything "
+            f"is activated, where the mesh bears about {bearable:.2g} N"
+        )
+        yield Finding(field, [low, high], problem, fitting, severity)
+    elif active < 0.02:
+        where = f"at any length below {none:.3g} m" if at_rest < 1.0 else "beyond its longest length"
+        pull = f"its muscle pulls {force_N * active:.2g} N, and 0 N {where}"
+        problem = f"a ring is {rest:.3g} m long at rest, where {pull}"
+        yield Finding(field, [low, high], problem, fitting, "error" if at_rest < 1.0 else "warning")
+    elif force_N * active > MOST_OVER * bearable:
+        yield Finding(
+            f"body.rings.{rings.force_field}",
+            force_N,
+            f"at rest length a muscle begins to pull with {force_N * active:.3g} N, {force_N * active / bearable:.0f} "
+            "times what the mesh bears: its ring may shoot beyond the length at which the force ends",
+            f"set at most {MOST_OVER * bearable / active:.2g}",
+            "warning",
+        )
+    else:
+        yield from weak(body, rings.force_field, force_N, force_N * active)
+    shortest = _settled_m(body, rings, none, optimal, force_N)
+    if shortest < COLLAPSED * rest and force_N > UNSURE * bearable:
+        yield crushes(f"body.rings.{rings.force_field}", force_N, bearable, shortest / rest)
+
+
+def _settled_m(body: WormBody, rings: Rings, none_m: float, optimal_m: float, force_N: float) -> float:
+    """Length at which the muscle, fully activated, pulls no more than the mesh resists, m."""
+    shape = rhombus_of(body)
+    hypotenuse = hypot(shape.across_m, shape.along_m)
+    closed, open_ = 0.0, 1.0
+    for _ in range(30):
+        share = (closed + open_) / 2
+        ring = shape.n_per_plane * hypotenuse * sin(share * shape.opening_rad)
+        length = rings.minimum_length + (ring - none_m) / optimal_m
+        pull = force_N * active_share(length, rings)
+        closed, open_ = (closed, share) if pull > bearable_force_N(body, share) else (share, open_)
+    return shape.n_per_plane * hypotenuse * sin(closed * shape.opening_rad)
+
+
+def active_share(length: float, rings: Rings) -> float:
+    """Active force of a muscle over its peak, at a length in optimal lengths: the engine's two parabolas."""
+    reach = 1.0 - rings.minimum_length if length < 1.0 else rings.maximum_length - 1.0
+    away = min(1.0, abs(length - 1.0) / reach)
+    return 1.0 - 2.0 * away**2 if away < 0.5 else 2.0 * (1.0 - away) ** 2
+
+
+def passive_share(length: float, rings: Rings) -> float:
+    """Passive force of a muscle over its peak, at a length in optimal lengths."""
+    beyond = max(0.0, length - 1.0) / (0.5 * (rings.maximum_length - 1.0))
+    return rings.passive_peak * (0.5 * beyond**2 if beyond < 1.0 else beyond - 0.5)
+
+
+def _slopes(model: mujoco.MjModel, rings: Rings) -> Slopes:
+    """The muscle is ``F0 (activation FL(x) FV(v) + FP(x))``, with x and v in optimal lengths."""
+    shortest, longest = model.actuator_lengthrange.T.copy()
+    low, high = model.actuator_gainprm[0, :2]
+    optimal_m = (longest - shortest) / (high - low)
+    force = model.actuator_gainprm[:, 2].copy()
+    fastest_m_per_s = optimal_m * rings.maximum_velocity
+
+    def slopes(length_m: Array, rate_m_per_s: Array, drive: Array, tension_N: Array) -> tuple[Array, Array]:
+        x, v = low + (length_m - shortest) / optimal_m, rate_m_per_s / fastest_m_per_s
+        active, active_slope = _force_length(x, rings.minimum_length, rings.maximum_length)
+        speed, speed_slope = _force_velocity(v, rings.lengthening_peak)
+        passive_slope = _passive_slope(x, rings.maximum_length, rings.passive_peak)
+        per_length = force / optimal_m * (drive * active_slope * speed + passive_slope)
+        per_rate = force / fastest_m_per_s * drive * active * speed_slope
+        return per_length.clip(0.0), per_rate.clip(0.0)
+
+    return slopes
+
+
+def _force_length(x: Array, shortest: float, longest: float) -> tuple[Array, Array]:
+    """The active force's dependence on length, two parabolas on either side of 1, and its slope."""
+    reach = np.where(x < 1.0, 1.0 - shortest, longest - 1.0)
+    # Way from the optimum to where the muscle has no force, 0 to 1.
+    away = np.minimum(np.abs(x - 1.0) / reach, 1.0)
+    value = np.where(away < 0.5, 1.0 - 2.0 * away**2, 2.0 * (1.0 - away) ** 2)
+    steepness = np.where(away < 0.5, 4.0 * away, 4.0 * (1.0 - away)) / reach
+    return value, np.where(x < 1.0, steepness, -steepness)
+
+
+def _force_velocity(v: Array, lengthening_peak: float) -> tuple[Array, Array]:
+    """The active force's dependence on the rate of length, and its slope."""
+    excess = lengthening_peak - 1.0
+    shortening, lengthening = (v + 1.0).clip(0.0), (excess - v).clip(0.0)
+    shortens = v <= 0.0
+    value = np.where(shortens, shortening**2, lengthening_peak - lengthening**2 / excess)
+    return value, np.where(shortens, 2.0 * shortening, 2.0 * lengthening / excess)
+
+
+def _passive_slope(x: Array, longest: float, peak: float) -> Array:
+    """Slope of the passive force: a parabola from 1 to halfway to the longest, straight beyond."""
+    half = 0.5 * (longest - 1.0)
+    return peak * (x - 1.0).clip(0.0, half) / half**2

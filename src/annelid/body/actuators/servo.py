@@ -1,0 +1,175 @@
+"""Servos that wind a cable round each ring."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, field_validator
+
+from annelid.body.actuators import ActuatorKind, Slopes, not_empty, one_a_segment
+from annelid.body.estimates import (
+    COLLAPSED,
+    SHRUNK,
+    UNSURE,
+    Finding,
+    bearable_force_N,
+    crushes,
+    rhombus_of,
+    strongest,
+    weak,
+)
+from annelid.config.sections import NonNegative, Positive, Range
+from annelid.morphology import Array
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.body.worm import WormBody
+
+
+class ServoRings(ActuatorKind):
+    """Servos, each of which winds a cable that lies round a ring (or half of it) and can only pull.
+
+    Activation commands the cable's slack length, from the longest at 0 to the shortest at 1, and the servo winds or
+    pays out towards it at no more than its speed limit. The cable's tension is ``stiffness (length - slack length) +
+    damping rate``, kept between 0 and the force limit; at the limit the servo stalls, and winds on only as its ring
+    gives way.
+    """
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "the position servos"),)
+    force_field: ClassVar[str] = "force_limit_N"
+    kind: Literal["servo"] = "servo"
+    length_range_m: Range | tuple[Range, ...] = Field(
+        default=(0.62, 0.96),
+        description="shortest and longest cable of a whole ring (half-rings have half of it each), one pair for all or "
+        "one pair a segment",
+    )
+    force_limit_N: Positive | tuple[Positive, ...] = Field(
+        default=13.0, description="tension at which a servo stalls, one number for all or one a segment"
+    )
+    speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
+    stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
+    damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
+
+    @field_validator("force_limit_N")
+    @classmethod
+    def _given(cls, value: Any) -> Any:
+        return not_empty(value, "servos")
+
+    def forces(self, n_segments: int) -> list[float]:
+        """Returns the force limit of every segment's servos, N."""
+        return one_a_segment(self.force_limit_N, n_segments)
+
+    def findings(self, body: WormBody) -> Iterator[Finding]:
+        """Holds the cables' range against the ring at rest, and their force against the mesh."""
+        for low, high, force_N in strongest(self, body.n_segments):
+            yield from _findings(body, self, low, high, force_N)
+
+    def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
+        """Adds a cable whose slack length is the engine's state: its rate is the control, `winding_speed`."""
+        import mujoco
+
+        stiffness, speed = self.stiffness_N_per_m, self.speed_limit_m_per_s
+        spec.add_actuator(
+            name=name,
+            target=name,
+            trntype=mujoco.mjtTrn.mjTRN_TENDON,
+            dyntype=mujoco.mjtDyn.mjDYN_INTEGRATOR,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            gainprm=[stiffness, *[0.0] * 9],
+            biasprm=[0.0, -stiffness, -self.damping_Ns_per_m, *[0.0] * 7],
+            lengthrange=span_m,
+            ctrllimited=True,
+            ctrlrange=[-speed, speed],
+            actlimited=True,
+            actrange=span_m,
+            forcelimited=True,
+            forcerange=[-force_N, 0.0],
+        )
+
+    def slopes(self, model: mujoco.MjModel) -> Slopes:
+        """Returns the slopes of taut cables that do not stall."""
+        limits = -model.actuator_forcerange[:, 0].copy()
+
+        def slopes(length_m: Array, rate_m_per_s: Array, drive: Array, tension_N: Array) -> tuple[Array, Array]:
+            pulls = ((tension_N > 0.0) & (tension_N < limits)).astype(float)
+            return self.stiffness_N_per_m * pulls, self.damping_Ns_per_m * pulls
+
+        return slopes
+
+    def first_act(self, model: mujoco.MjModel) -> Array:
+        """Returns the slack lengths of cables that are paid out, m."""
+        return model.actuator_actrange[:, 1].copy()
+
+    def act_at_rest(self, spec: mujoco.MjSpec) -> Array:
+        """Returns the slack lengths of cables that are paid out, m."""
+        return np.array([actuator.actrange[1] for actuator in spec.actuators])
+
+    def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
+        """Returns `winding_speed`; the states are the slack lengths of the cables, m."""
+        limits = -model.actuator_forcerange[:, 0]
+        return winding_speed(activation, state, length_m, model.actuator_actrange, limits, self, time_s)
+
+
+def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:
+    """The cables' range against the ring at rest, and their force against the mesh."""
+    rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
+    paths = 1 if rings.layout == "whole" else 2
+    field, fitting = "body.rings.length_range_m", f"set [{0.65 * rest:.3g}, {rest:.3g}]"
+    if low >= rest:
+        problem = f"a ring is {rest:.3g} m long at rest, so that even the shortest cable of {low:.3g} m pulls 0 N"
+        yield Finding(field, [low, high], problem, fitting, "error")
+        return
+    idle = min(force_N, rings.stiffness_N_per_m * max(0.0, rest - high) / paths)
+    if idle > 0.1 * bearable:
+        severity = "error" if idle > UNSURE * bearable and high < SHRUNK * rest else "warning"
+        problem = (
+            f"a ring is {rest:.3g} m long at rest, so that the longest cable of {high:.3g} m pulls {idle:.3g} N before "
+            f"anything is activated, where the mesh bears about {bearable:.2g} N"
+        )
+        yield Finding(field, [low, high], problem, fitting, severity)
+    elif low > 0.98 * rest:
+        problem = f"a ring is {rest:.3g} m long at rest, so that a cable of {low:.3g} m hardly pulls"
+        yield Finding(field, [low, high], problem, fitting, "warning")
+    elif high > 1.5 * rest:
+        problem = f"a ring is {rest:.3g} m long at rest, so that most of the winding from {high:.3g} m is slack"
+        yield Finding(field, [low, high], problem, fitting, "warning")
+    pull = rings.stiffness_N_per_m * max(0.0, rest - low) / paths
+    yield from weak(body, "stiffness_N_per_m", rings.stiffness_N_per_m, pull)
+    yield from weak(body, rings.force_field, force_N, force_N)
+    if low < COLLAPSED * rest and force_N > UNSURE * bearable:
+        yield crushes(f"body.rings.{rings.force_field}", force_N, bearable, low / rest)
+
+
+def winding_speed(
+    activation: Array,
+    slack_m: Array,
+    length_m: Array,
+    range_m: Array,
+    force_limit_N: Array,
+    rings: ServoRings,
+    time_s: float,
+) -> Array:
+    """Rate at which servos change the slack length of their cables, m/s: negative while they wind.
+
+    Towards the commanded length, but never so short that the tension at rest would exceed the force limit: a stalled
+    servo does not wind on, gives way to what pulls harder, and lets go at once when it is told to.
+
+    Args:
+        activation: In [0, 1], shape ``(.., n_servos)``; commands a slack length between the ends of the range.
+        slack_m: Present slack lengths, m, same shape.
+        length_m: Present lengths of the cables' paths, m, same shape.
+        range_m: Shortest and longest slack length, m, ``(n_servos, 2)``.
+        force_limit_N: Tension at which a servo stalls, N, ``(n_servos,)``.
+        rings: Speed and stiffness.
+        time_s: For how long the rate is held, s: a cable does not overshoot the length that it is wound to.
+    """
+    shortest, longest = range_m[:, 0], range_m[:, 1]
+    commanded = longest + activation * (shortest - longest)
+    stalled = np.minimum(length_m - force_limit_N / rings.stiffness_N_per_m, longest)
+    rate = (np.maximum(commanded, stalled) - slack_m) / time_s
+    speed = rings.speed_limit_m_per_s
+    return np.minimum(np.maximum(rate, -speed), speed)

@@ -1,0 +1,91 @@
+"""How the engine computes the strands: what all formulations have in common."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from annelid.config.kinds import Kind
+from annelid.morphology import Array, MeshGeometry
+from annelid.registry import Registry
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.body.estimates import Finding
+    from annelid.body.worm import WormBody
+    from annelid.config.arena import ArenaKind
+    from annelid.config.run import RunConfig
+
+PinReader = Callable[[Mapping[str, Array]], Array]
+"""Reads the largest gap at a pin, m, from the engine's arrays."""
+
+
+class FormulationKind(Kind):
+    """Base of the formulations' sections.
+
+    Attributes:
+        is_papers: Whether it is the paper's own, which other formulations are compared with.
+        damps_material: Whether its model has the rows of `annelid.simulation.damping`.
+    """
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.formulation.kind", "annelid.body.formulations")
+    default: ClassVar[str] = "rods"
+    is_papers: ClassVar[bool] = False
+    damps_material: ClassVar[bool] = False
+
+    @property
+    @abstractmethod
+    def step_cost_ms(self) -> float:
+        """About how long a step of three segments with three elements a side takes, ms."""
+
+    @property
+    def has_rigid_crossings(self) -> bool:
+        """Whether the two strands of a crossing share a point."""
+        return False
+
+    @abstractmethod
+    def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:
+        """Estimates the time, s, and the memory, GB, that it takes to build a mesh."""
+
+    def check_body(self, body: WormBody) -> None:
+        """Checks the section against the rest of its body.
+
+        Raises:
+            ValueError: They do not fit.
+        """
+
+    @abstractmethod
+    def findings(self, config: RunConfig) -> Iterator[Finding]:
+        """Holds the physics step against what the formulation must resolve, before anything runs."""
+
+    @abstractmethod
+    def add(
+        self,
+        spec: mujoco.MjSpec,
+        geometry: MeshGeometry,
+        body: WormBody,
+        arena: ArenaKind,
+        *,
+        for_plant: bool,
+        vertices_touch: bool,
+    ) -> None:
+        """Adds the mesh with a site at every crossing, and the solver settings that it needs.
+
+        Args:
+            spec: An empty spec.
+            geometry: The mesh at rest.
+            body: Materials and pins.
+            arena: Contact settings, which the strands share with the floor.
+            for_plant: For a plant of annelid, which prepares every step.
+            vertices_touch: The ground is felt by a sphere at each vertex.
+        """
+
+    def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
+        """Returns what reads the largest gap at a pin, if pins can part, and the engine's arrays that it needs."""
+        return None, ()
+
+    def hastened(self, haste: float) -> Self:
+        """Returns the section with its viscous coefficients divided."""
+        return self

@@ -1,0 +1,133 @@
+"""The paper's formulation: rigid capsules on damped elastic joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import inf
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from annelid.body.estimates import Finding, rhombus_of, softened
+from annelid.body.formulations import FormulationKind, PinReader
+from annelid.config.sections import Impedance, NonNegative, Positive
+from annelid.morphology import Array, MeshGeometry, norm
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.body.worm import WormBody
+    from annelid.config.arena import ArenaKind
+    from annelid.config.run import RunConfig
+
+_RK4_DAMPED, _RK4_SWUNG = 2.78, 2.83
+"""Largest products of step and rate, or frequency, at which the explicit Runge-Kutta method is stable."""
+
+
+class Chain(FormulationKind):
+    """The paper's formulation: rigid capsules on damped elastic joints, with a point mass at every pin."""
+
+    is_papers: ClassVar[bool] = True
+    kind: Literal["chain"] = "chain"
+    joint: Literal["ball", "hinges"] = Field(
+        default="ball",
+        description="one isotropic ball joint, or three hinges with torsion apart from bending",
+    )
+    armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
+    pin_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the pin constraints")
+    pin_impedance: Impedance = Field(
+        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
+    )
+    pins: Literal["separate", "direct"] = Field(
+        default="separate", description="strands tied to a pin mass each, or straight to one another"
+    )
+    integrator: Literal["RK4", "Euler"] = Field(default="RK4", description="time integration")
+    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
+        default=500, description="PGS iterations at most"
+    )
+    solver_tolerance: NonNegative = Field(default=1e-8, description="PGS tolerance")
+
+    @property
+    def step_cost_ms(self) -> float:
+        """About how long a step takes, ms; the Runge-Kutta method evaluates the forces four times."""
+        return 3.8 * (4 if self.integrator == "RK4" else 1)
+
+    def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:
+        """Estimates time, s, and memory, GB; measured on one core."""
+        return 2e-6 * n_elements**2, 5e-5 * n_elements
+
+    def findings(self, config: RunConfig) -> Iterator[Finding]:
+        """Holds the step against the joints', the springs' and the pins' own rates."""
+        from annelid.body.worm import WormBody
+
+        body, step = config.body, config.clock.physics_timestep_s
+        assert isinstance(body, WormBody)
+        most = _largest_step_s(body, self)
+        if step > most:
+            yield Finding(
+                "clock.physics_timestep_s",
+                step,
+                f"the chain is integrated explicitly, which its joints and springs bear up to about {most:.2g} s",
+                f"set at most {most / 2:.1g}, or a larger body.formulation.armature_kg_m2",
+                "warning",
+            )
+        softest = self.pin_time_constant_s
+        if softest < 2.0 * step:
+            yield softened("body.formulation.pin_time_constant_s", softest, "pins", step)
+
+    def add(
+        self,
+        spec: mujoco.MjSpec,
+        geometry: MeshGeometry,
+        body: WormBody,
+        arena: ArenaKind,
+        *,
+        for_plant: bool,
+        vertices_touch: bool,
+    ) -> None:
+        """Adds the mesh as chains of capsules, which need no preparation before a step."""
+        from annelid.body.formulations.chain.capsules import add_chains
+
+        add_chains(spec, geometry, body, self, arena, vertices_touch=vertices_touch)
+
+    def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
+        """Reads the residual of the engine's connections, as `FormulationKind.pin_reader`."""
+        return _gap_at_connections(model, self.pins == "separate"), ("xpos", "xmat")
+
+
+def _largest_step_s(body: WormBody, formulation: Chain) -> float:
+    """Largest stable step of the explicit integrator, s, from the joints' and the springs' own rates."""
+    strands, shape = body.strands, rhombus_of(body)
+    element = shape.side_m / body.mesh.elements_per_side
+    inertia = formulation.armature_kg_m2 + strands.linear_density_kg_per_m * element**3 / 12.0
+    stiffness = strands.bending_rigidity_Nm2 / element
+    # Neighbouring joints act on one element: four times the rate of one at the shortest wave.
+    swung = [(4.0 * stiffness / inertia) ** 0.5]
+    mass = strands.linear_density_kg_per_m * element * 2.0
+    if formulation.pins == "separate":
+        mass = body.pins.mass_kg
+    swung.append((4.0 * body.springs.stiffness_N_per_m / mass) ** 0.5)
+    explicit = formulation.integrator == "RK4"
+    damped = 4.0 * strands.joint_damping(stiffness) / inertia if explicit else 0.0
+    limit = _RK4_SWUNG if explicit else 2.0
+    return min(limit / max(swung), _RK4_DAMPED / damped if damped else inf)
+
+
+def _gap_at_connections(model: mujoco.MjModel, separate: bool) -> PinReader:
+    """Reads the residual of the engine's connections; with a pin mass, two of them make one crossing."""
+    sides = ((model.eq_obj1id, model.eq_data[:, :3]), (model.eq_obj2id, model.eq_data[:, 3:6]))
+
+    def gap(engine: Mapping[str, Array]) -> Array:
+        position, turn = engine["xpos"], engine["xmat"]
+        turn = turn.reshape(*turn.shape[:-1], 3, 3)
+        first, second = (
+            position.take(body, axis=-2) + (turn.take(body, axis=-3) * local[:, np.newaxis]).sum(axis=-1)
+            for body, local in sides
+        )
+        residual = first - second
+        if separate:
+            residual = residual[..., 0::2, :] - residual[..., 1::2, :]
+        return norm(residual).max(axis=-1)
+
+    return gap

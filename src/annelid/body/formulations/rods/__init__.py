@@ -1,0 +1,152 @@
+"""The fast formulation: elastic rods."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from annelid.body.estimates import Finding
+from annelid.body.formulations import FormulationKind, PinReader
+from annelid.config.sections import NonNegative, Positive
+from annelid.morphology import Array, MeshGeometry, norm
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.body.worm import WormBody
+    from annelid.config.arena import ArenaKind
+    from annelid.config.run import RunConfig
+
+
+class Rods(FormulationKind):
+    """The fast formulation: elastic rods, which share one vertex at each crossing unless pins are separate."""
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (("bergou2008", "the rods of the mesh"),)
+    damps_material: ClassVar[bool] = True
+    kind: Literal["rods"] = "rods"
+    edge_time_constant_s: Positive = Field(default=0.001, description="time constant of the inextensible edges")
+    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
+        default=100, description="Newton iterations at most"
+    )
+    solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
+    friction_impedance_ratio: Positive = Field(
+        default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
+    )
+    lateral_damping_Nms_per_rad: NonNegative = Field(
+        default=0.0,
+        description="viscous resistance to bending across the plane of a strand's own curvature, for which the "
+        "engine's curved rods have none",
+    )
+    pins: Literal["shared", "separate"] = Field(
+        default="shared",
+        description="both strands of a crossing share its vertex, or a pin mass is tied to a vertex of each",
+    )
+    pin_stiffness_N_per_m: Positive = Field(
+        default=22.0, description="of the tie between a separate pin and each of its strands"
+    )
+    pin_damping_Ns_per_m: Positive = Field(default=0.88, description="of the same tie")
+    pin_inertance_kg: Positive = Field(
+        default=0.0094, description="of the same tie: its force per relative acceleration, numerical"
+    )
+
+    @property
+    def step_cost_ms(self) -> float:
+        """About how long a step takes, ms."""
+        return 4.5
+
+    @property
+    def has_rigid_crossings(self) -> bool:
+        """Whether the strands of a crossing share its vertex."""
+        return self.pins == "shared"
+
+    def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:
+        """Estimates time, s, and memory, GB; measured on one core: the factorisation fills with the helices."""
+        return 1e-8 * n_elements**2 * n_helices, 2e-6 * n_elements * n_helices
+
+    def check_body(self, body: WormBody) -> None:
+        """Checks that the dampers that are fixed in the world stand alone, on a worm that leads towards -x."""
+        lateral = self.lateral_damping_Nms_per_rad
+        if lateral > 0 and body.strands.material_damping_s is not None:
+            raise ValueError(
+                f"body.formulation.lateral_damping_Nms_per_rad = {lateral:g} must be 0 where body.strands gives the "
+                "damping of the material, which acts in every direction"
+            )
+        if lateral > 0 and body.heading_deg:
+            raise ValueError(
+                f"body.heading_deg = {body.heading_deg:g}: must be 0 with body.formulation.lateral_damping_Nms_per_rad "
+                f"= {lateral:g}, whose dampers are fixed in the world; give body.strands.damping_time_s instead"
+            )
+
+    def findings(self, config: RunConfig) -> Iterator[Finding]:
+        """Holds the step against the edges and the material's damping."""
+        from annelid.body.worm import WormBody
+
+        body, step = config.body, config.clock.physics_timestep_s
+        assert isinstance(body, WormBody)
+        if step > 0.04:
+            yield Finding(
+                "clock.physics_timestep_s",
+                step,
+                "rods are measured up to 0.04 s, where their edges stretch by 3 %",
+                "set at most 0.04",
+                "warning",
+            )
+        time_s = body.strands.material_damping_s or 0.0
+        if 0.0 < time_s < 2.0 * step:
+            yield Finding(
+                "clock.physics_timestep_s",
+                step,
+                f"the step damps rods as one to two steps more of damping time do, and the material has {time_s:g} s",
+                f"set at most {time_s / 5:.1g}",
+                "warning",
+            )
+
+    def add(
+        self,
+        spec: mujoco.MjSpec,
+        geometry: MeshGeometry,
+        body: WormBody,
+        arena: ArenaKind,
+        *,
+        for_plant: bool,
+        vertices_touch: bool,
+    ) -> None:
+        """Adds the mesh as a net of rods, whose vertices touch in any case."""
+        from annelid.body.formulations.rods.net import add_rods
+
+        add_rods(spec, geometry, body, self, arena, dampers=for_plant)
+
+    def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
+        """Reads separate pins, as `FormulationKind.pin_reader`."""
+        if self.pins == "shared":
+            return None, ()
+        return _gap_at_vertices(_pinned_bodies(model, geometry)), ("xpos",)
+
+    def hastened(self, haste: float) -> Self:
+        """Returns the section with its viscous coefficient divided."""
+        return self.model_copy(update={"lateral_damping_Nms_per_rad": self.lateral_damping_Nms_per_rad / haste})
+
+
+def _pinned_bodies(model: mujoco.MjModel, geometry: MeshGeometry) -> NDArray[np.int64]:
+    """Bodies of both strands at every crossing of rods with separate pins, ``(n_crossings, 2)``."""
+    vertices = geometry.crossing_vertex[geometry.crossing_plane]
+    from annelid.body.formulations.rods.net import vertex_name
+
+    return np.array(
+        [
+            [model.body(vertex_name(int(strand), int(vertex))).id for strand in strands]
+            for strands, vertex in zip(geometry.crossing_strands, vertices, strict=True)
+        ]
+    )
+
+
+def _gap_at_vertices(bodies: NDArray[np.int64]) -> PinReader:
+    def gap(engine: Mapping[str, Array]) -> Array:
+        ends = engine["xpos"].take(bodies, axis=-2)
+        return norm(ends[..., 1, :] - ends[..., 0, :]).max(axis=-1)
+
+    return gap

@@ -1,0 +1,270 @@
+"""The 3D worm's body: mesh, materials, springs, and any kind of ring actuators and formulation."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from math import pi
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from annelid.body.actuators import ActuatorKind
+from annelid.body.formulations import FormulationKind
+from annelid.config.kinds import BodyKind, Choice, default_of
+from annelid.config.sections import Length, Modulus, NonNegative, Positive, Section
+from annelid.errors import ConfigError
+
+if TYPE_CHECKING:
+    from annelid.body.actuators.muscle import Rings
+    from annelid.config.run import RunConfig
+    from annelid.protocols import Plant
+
+JOINT_DAMPING = 0.12
+"""The paper's, N m s/rad."""
+EQUAL_STIFFNESS_RADIUS_M = 0.00299
+"""Radius of a solid strand that bends as the robot's tube: the authors' choice of 2025."""
+LONGEST_BUILD_S = 100.0
+"""Estimated time to build a body, above which it is refused, s."""
+
+
+class Mesh(Section):
+    """Geometry of the helical mesh (lengths in m)."""
+
+    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
+    n_helices: Annotated[int, Field(ge=6, le=96)] = Field(
+        default=12, description="strands, half of each handedness; even"
+    )
+    radius_m: Length = Field(default=0.16, description="radius of the tube at rest")
+    angular_rate_rad_per_m: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
+        default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"
+    )
+    elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
+        default=3, description="straight elements between neighbouring crossings"
+    )
+    elements_per_end: Annotated[int, Field(ge=1, le=32)] | None = Field(
+        default=None, description="straight elements in each free end of a strand; default as many as in a side"
+    )
+    planes_between_rings: Annotated[int, Field(ge=2, le=50)] = Field(
+        default=4, description="crossing planes from one ring to the next"
+    )
+    free_planes_at_ends: Annotated[int, Field(ge=1, le=50)] = Field(
+        default=3, description="crossing planes before the first and after the last ring"
+    )
+    rear_overhang_m: Annotated[float, Field(ge=1e-4, le=1e3)] | None = Field(
+        default=None,
+        description="free strand behind the last crossing, along the body; default half a plane spacing",
+    )
+
+    @field_validator("n_helices")
+    @classmethod
+    def _even(cls, value: int) -> int:
+        if value % 2:
+            raise ValueError("the number of helices must be even, half of each handedness, and at least 6")
+        return value
+
+
+class Strands(Section):
+    """Material of the strands."""
+
+    radius_m: Length = Field(default=0.002, description="radius of the solid round cross-section")
+    young_modulus_Pa: Modulus = Field(default=0.3e9, description="resists bending")
+    shear_modulus_Pa: Modulus = Field(default=0.2e9, description="resists twisting")
+    linear_density_kg_per_m: Positive = Field(default=0.01291, description="mass per length of strand")
+    damping_time_s: NonNegative | None = Field(
+        default=None,
+        description="Kelvin-Voigt time of the material, its viscous over its elastic modulus, for bending in every "
+        "direction and twist (not set: loss_factor or joint_damping_Nms_per_rad)",
+    )
+    loss_factor: Annotated[float, Field(ge=0, le=10)] | None = Field(
+        default=None,
+        description="tan delta of the material at loss_frequency_Hz, instead of damping_time_s (not set: none)",
+    )
+    loss_frequency_Hz: Positive | None = Field(
+        default=None, description="frequency at which the loss factor holds (not set: none)"
+    )
+    joint_damping_Nms_per_rad: NonNegative = Field(
+        default=JOINT_DAMPING,
+        description="viscous resistance to bending between two elements whatever their length; not used where the "
+        "material's damping is given",
+    )
+
+    @model_validator(mode="after")
+    def _damped_in_one_way(self) -> Self:
+        if self.damping_time_s is not None and self.loss_factor is not None:
+            raise ValueError(
+                f"body.strands.damping_time_s = {self.damping_time_s:g} and body.strands.loss_factor = "
+                f"{self.loss_factor:g} both give the damping of the material: set one of them to 'none'"
+            )
+        if self.material_damping_s is not None and self.joint_damping_Nms_per_rad != JOINT_DAMPING:
+            raise ValueError(
+                f"body.strands.joint_damping_Nms_per_rad = {self.joint_damping_Nms_per_rad:g} has no effect where the "
+                "damping of the material is given: set body.strands.damping_time_s, or set that to 'none'"
+            )
+        if (self.loss_factor is None) != (self.loss_frequency_Hz is None):
+            raise ValueError(
+                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it holds, and "
+                "the other way round"
+            )
+        return self
+
+    @property
+    def material_damping_s(self) -> float | None:
+        """Kelvin-Voigt time of the material, s; None where each joint has a damping of its own instead."""
+        if self.loss_factor is not None and self.loss_frequency_Hz is not None:
+            return self.loss_factor / (2 * pi * self.loss_frequency_Hz)
+        return self.damping_time_s
+
+    @property
+    def bending_rigidity_Nm2(self) -> float:
+        """Bending moment per curvature, E I, N m^2."""
+        return self.young_modulus_Pa * pi * self.radius_m**4 / 4
+
+    def joint_damping(self, stiffness_Nm_per_rad: float) -> float:
+        """Returns the damping of a joint between two elements with a stiffness, N m s/rad."""
+        time_s = self.material_damping_s
+        return self.joint_damping_Nms_per_rad if time_s is None else time_s * stiffness_Nm_per_rad
+
+
+class Pins(Section):
+    """The pins that join two strands at a crossing."""
+
+    mass_kg: Positive = Field(default=0.00052, description="mass of one pin")
+    radius_m: Length = Field(default=0.005, description="radius of the drawn sphere")
+
+
+class Joints(Section):
+    """Resistance of the crossings to a change of the angle between their two strands."""
+
+    dry_friction_Nm: NonNegative = Field(
+        default=0.0, description="Coulomb torque of one crossing, at the angle it has at rest"
+    )
+    viscous_friction_Nms_per_rad: NonNegative = Field(
+        default=0.0, description="torque of one crossing per angular velocity, at the angle it has at rest"
+    )
+
+
+class Springs(Section):
+    """Axial springs between crossings two planes apart at the same angle."""
+
+    stiffness_N_per_m: NonNegative = Field(default=19.9, description="spring rate")
+    rest_length_m: Positive | None = Field(default=None, description="default: two plane spacings, unstretched at rest")
+    tension_only: bool = Field(default=False, description="true: slack below rest length; false: pushes as well")
+    sensors: Literal["all", "sides"] = Field(
+        default="all",
+        description="which of the springs that span a ring carry a stretch sensor: all, or the leftmost (-y) and the "
+        "rightmost",
+    )
+
+    @property
+    def first_sensor(self) -> str:
+        """Where the first stretch sensor of a segment lies, in words."""
+        return "first helix" if self.sensors == "all" else "left side"
+
+
+class WormBody(BodyKind):
+    """Any 3D worm of helical strands, rings and springs on the ground; what the engine and the analysis are told."""
+
+    cites: ClassVar[tuple[tuple[str, str], ...]] = (
+        ("todorov2012", "the physics engine"),
+        ("wang", "the robot that the 3D worm is a model of"),
+    )
+    needs_arena: ClassVar[bool] = True
+    has_skin: ClassVar[bool] = True
+    heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
+        default=0.0,
+        description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
+        "(90: towards -y)",
+    )
+    mesh: Mesh = Mesh()
+    strands: Strands = Strands()
+    pins: Pins = Pins()
+    joints: Joints | None = None
+    springs: Springs = Springs()
+    rings: Annotated[ActuatorKind, Choice()] = Field(default_factory=lambda: default_of(ActuatorKind))
+    formulation: Annotated[FormulationKind, Choice()] = Field(default_factory=lambda: default_of(FormulationKind))
+
+    def build(self, config: RunConfig) -> Plant:
+        """Builds the worm's plant, as `BodyKind.build`."""
+        # The simulation is built on this module, and loads the engine.
+        return import_module("annelid.simulation.worm").WormPlant(config)
+
+    @property
+    def has_halves(self) -> bool:
+        """Whether its rings are halved."""
+        return self.rings.layout == "halves"
+
+    @property
+    def n_segments(self) -> int:
+        """Number of actuated segments."""
+        return self.mesh.n_segments
+
+    @property
+    def muscles(self) -> Rings:
+        """The ring muscles.
+
+        Raises:
+            ConfigError: The rings have actuators of another kind.
+        """
+        if self.rings.muscle is None:
+            raise ConfigError(
+                f"body.rings.kind = {self.rings.kind!r} has no muscles; this needs body.rings.kind = 'muscle'"
+            )
+        return self.rings.muscle
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns the engine and the robot, and what formulation, strands and actuators rest on."""
+        robot = self.strands.radius_m == EQUAL_STIFFNESS_RADIUS_M
+        strands = (
+            ("riddle2025", "strands of the stiffness of the robot's tubes"),
+            ("riddle2025models", "its model files"),
+        )
+        return (*self.cites, *self.formulation.cited(), *(strands if robot else ()), *self.rings.cited())
+
+    @model_validator(mode="after")
+    def _can_be_built(self) -> Self:
+        mesh = self.mesh
+        planes = mesh.planes_between_rings * (mesh.n_segments - 1) + 2 * mesh.free_planes_at_ends
+        at_ends = 2 * (mesh.elements_per_end or mesh.elements_per_side)
+        elements = mesh.n_helices * (mesh.elements_per_side * planes + at_ends)
+        time_s, memory_GB = self.formulation.build_cost(elements, mesh.n_helices)
+        if time_s > LONGEST_BUILD_S:
+            raise ValueError(
+                f"body.mesh.n_segments = {mesh.n_segments}, body.mesh.n_helices = {mesh.n_helices} and "
+                f"body.mesh.elements_per_side = {mesh.elements_per_side} make {elements:,} elements, which take about "
+                f"{time_s:,.0f} s and {memory_GB:,.1f} GB to build; at most {LONGEST_BUILD_S:g} s are allowed: lower "
+                "one of them"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _parts_fit_together(self) -> Self:
+        self.formulation.check_body(self)
+        if self.strands.radius_m >= self.mesh.radius_m:
+            raise ValueError(
+                f"body.strands.radius_m = {self.strands.radius_m:g} must be less than "
+                f"body.mesh.radius_m = {self.mesh.radius_m:g}"
+            )
+        if self.rings.layout == "halves" and self.mesh.n_helices % 4:
+            raise ValueError(
+                f"body.rings.layout = 'halves' needs body.mesh.n_helices to be a multiple of 4, "
+                f"not {self.mesh.n_helices}: equal halves need an even number of crossings round a ring"
+            )
+        n = len(self.rings.length_ranges(self.mesh.n_segments))
+        if n != self.mesh.n_segments:
+            raise ValueError(
+                f"body.rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
+                "give one pair for each, or one for all, for example body.rings.length_range_m=[0.566,1.067]"
+            )
+        field, n = self.rings.force_field, len(self.rings.forces(self.mesh.n_segments))
+        if n != self.mesh.n_segments:
+            raise ValueError(
+                f"body.rings.{field} gives {n} values for {self.mesh.n_segments} segments: "
+                f"give one for each, or one for all, for example body.rings.{field}=13"
+            )
+        return self
+
+
+class HelicalWorm(WormBody):
+    """The 3D worm."""
+
+    kind: Literal["worm"] = "worm"

@@ -1,0 +1,91 @@
+"""What modules register by being imported, by name: annelid's own, and what other installed packages add."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from pkgutil import iter_modules
+from typing import Any, Generic, TypeVar
+
+from annelid.errors import AnnelidError, ConfigError, shown, suggest
+
+GROUP = "annelid.kinds"
+"""Entry points of other packages: each names a module that registers something."""
+
+Item = TypeVar("Item")
+
+
+@cache
+def load_home(home: str) -> None:
+    """Imports a module or, of a package, every module in it."""
+    package = import_module(home)
+    for module in iter_modules(getattr(package, "__path__", ()), f"{home}."):
+        import_module(module.name)
+
+
+@cache
+def load_extensions() -> None:
+    """Imports what other installed packages name; one that fails is told of and left out."""
+    for entry in entry_points(group=GROUP):
+        try:
+            entry.load()
+        except Exception as error:
+            package = entry.dist.name if entry.dist is not None else "an installed package"
+            warnings.warn(f"what {package} adds ({entry.value}) cannot be loaded: {error}", stacklevel=2)
+
+
+class Registry(Generic[Item]):
+    """Things of one sort by their names."""
+
+    def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError) -> None:
+        """Makes an empty one.
+
+        Args:
+            what: What the things are, for messages.
+            homes: Modules and packages of annelid that register some; they are imported on first use.
+            error: What is raised for an unknown name.
+        """
+        self._what, self._homes, self._error = what, homes, error
+        self._known: dict[str, Item] = {}
+
+    def add(self, name: str, item: Item) -> Item:
+        """Registers a thing, and returns it.
+
+        Raises:
+            ConfigError: Another one has that name; the same one of a module that is loaded anew takes its own place.
+        """
+        other = self._known.setdefault(name, item)
+        if _origin(other) != _origin(item):
+            raise ConfigError(f"{_origin(item)}: {self._what} {shown(name)} is taken by {_origin(other)}")
+        self._known[name] = item
+        return item
+
+    def all(self) -> dict[str, Item]:
+        """Returns everything that is registered, in the order of the names."""
+        for home in self._homes:
+            load_home(home)
+        load_extensions()
+        return dict(sorted(self._known.items()))
+
+    def find(self, name: str) -> Item:
+        """Returns the thing of a name.
+
+        Raises:
+            AnnelidError: There is none; the sentence suggests the nearest.
+        """
+        known = self.all()
+        if name not in known:
+            raise self._error(f"unknown {self._what} {shown(name)}: {suggest(name, known)}")
+        return known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Goes through the names."""
+        return iter(self.all())
+
+
+def _origin(item: Any) -> Any:
+    """Tells where a class or a function was written, anything else as it is."""
+    return f"{item.__module__}.{item.__qualname__}" if hasattr(item, "__qualname__") else item

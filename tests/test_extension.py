@@ -1,0 +1,106 @@
+"""Kinds, figures and formats of other people's, each in one file of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+EXTEND = Path(__file__).parent.parent / "examples" / "extend"
+OUTPUT = {"own_study": "--output"}
+TOLD = {
+    "own_study": "friction 0.1",
+    "own_arena": "waves of 20 mm",
+    "own_actuator": "greatest force",
+    "own_formulation": "10 g a crossing",
+    "own_outputs": "rings.txt",
+}
+
+
+def answer(*command: str, path: Path | None = None) -> str:
+    environment = os.environ | ({"PYTHONPATH": str(path)} if path is not None else {})
+    done = subprocess.run(
+        [sys.executable, *command], capture_output=True, text=True, timeout=200, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_one_file_is_enough(name: str, tmp_path: Path) -> None:
+    option = [OUTPUT[name]] if name in OUTPUT else []
+    assert TOLD[name] in answer(str(EXTEND / f"{name}.py"), *option, str(tmp_path))
+
+
+def test_every_example_is_tried() -> None:
+    assert {path.stem for path in EXTEND.glob("*.py")} == TOLD.keys()
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
+    """A folder as pip would make it of the example package."""
+    package = EXTEND / "standing_wave"
+    project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    (module,) = package.glob("*.py")
+    (tmp_path / module.name).write_text(module.read_text(encoding="utf-8"), encoding="utf-8")
+    about = tmp_path / f"{module.stem}-{project['version']}.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    lines = [
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
+        for group, entries in project["entry-points"].items()
+    ]
+    (about / "entry_points.txt").write_text("".join(lines), encoding="utf-8")
+    return tmp_path
+
+
+def test_a_package_adds_a_kind_by_its_entry_point(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(installed)
+    told = answer(
+        "-c",
+        "from annelid import load_config, simulate, open_run\n"
+        "from annelid.references import bibtex, references_of\n"
+        "kind = {'controller.kind': 'standing-wave', 'controller.period': 1.0, 'duration_s': 1.0}\n"
+        "run = simulate(load_config('riddle2022-planar', kind), 'wave')\n"
+        "config = open_run('wave').config\n"
+        "print(config.controller.period_s, run.data['activation'].values[1].round(2).tolist())\n"
+        "print('A standing wave' in bibtex(references_of(config)))\n",
+        path=installed,
+    )  # fmt: skip
+    assert told.splitlines() == ["1.0 [1.0, 0.0, 1.0]", "True"]
+
+
+def test_the_code_of_another_package_s_kind_is_part_of_a_kept_run_s_key(installed: Path) -> None:
+    code = (
+        "from annelid.experiment.case import Case\n"
+        "from annelid.experiment.store import case_key\n"
+        "print(case_key(Case('riddle2022-planar', {'controller.kind': 'standing-wave'})))\n"
+    )
+    module = installed / "annelid_standing_wave.py"
+    text = module.read_text(encoding="utf-8")
+    keys = []
+    for changed in (text, text.replace("Contracts odd", "Draws in odd"), text.replace("0.5 * (1.0", "0.4 * (1.0")):
+        module.write_text(changed, encoding="utf-8")
+        keys.append(answer("-c", code, path=installed))
+    assert keys[0] == keys[1] != keys[2]
+
+
+def test_an_unknown_kind_is_refused_without_it() -> None:
+    from annelid import load_config
+    from annelid.errors import ConfigError
+
+    with pytest.raises(ConfigError, match=r"controller\.kind = 'standing-wave': must be one of 'sns', 'adaptive'"):
+        load_config("riddle2022-planar", {"controller.kind": "standing-wave"})
+
+
+def test_a_package_that_fails_is_told_of_and_left_out(installed: Path) -> None:
+    (installed / "annelid_standing_wave.py").write_text("raise RuntimeError('broken')\n")
+    code = "from annelid import load_config; load_config('riddle2022-planar')"
+    environment = os.environ | {"PYTHONPATH": str(installed)}
+    command = [sys.executable, "-W", "error::UserWarning", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    assert "what annelid-standing-wave adds (annelid_standing_wave) cannot be loaded: broken" in done.stderr

@@ -19,7 +19,10 @@ from annelid.draw.canvas import canvas, save
 from annelid.planar.huang import segment_length
 
 PROGRAM = {"kind": "program", "contractions": [{"segment": 2, "start_s": 0.0, "stop_s": 0.8}]}
-WORMS = {"riddle2023-rods": ("tight rods", "#c2410c", "--"), "riddle2023-fast": ("sprung rods", "0.45", ":")}
+WORMS = {
+    "riddle2023-rods": ("rods with rigid crossings", "#c2410c", "--"),
+    "riddle2023-fast": ("rods with soft crossings", "0.45", ":"),
+}
 REST_RING_M, REST_SEGMENT_M, N_PER_PLANE = 0.960, 0.0748, 6
 
 

@@ -8,13 +8,13 @@ from typing import Any
 from annelid.experiment.case import Case
 
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
-"""The three worms that the examinations lay side by side: the paper's, tight pins, soft pins in seconds."""
+"""The three worms that the examinations lay side by side: the paper's, rigid crossings, soft crossings in seconds."""
 PLANAR = "riddle2022-planar"
 PAPERS_MESH = {"body.mesh.elements_per_side": 3, "body.formulation.solver_tolerance": 1e-6}
 """How the rods are compared with the chain; their preset solves less sharply."""
 
 RODS_STEP_S = 0.01
-"""Step of the tight rods in the examinations, s."""
+"""Step of the rods with rigid crossings in the examinations, s."""
 
 HOLD_S, REST_S = 0.8, 0.4
 """In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
@@ -26,7 +26,7 @@ def chain(changes: Mapping[str, Any] | None = None) -> Case:
 
 
 def rods(changes: Mapping[str, Any] | None = None) -> Case:
-    """The worm of tight rods with the paper's three elements a side, at steps of `RODS_STEP_S`."""
+    """The worm of rods with rigid crossings with the paper's three elements a side, at steps of `RODS_STEP_S`."""
     return Case(RODS, {**PAPERS_MESH, "clock.physics_timestep_s": RODS_STEP_S, **(changes or {})})
 
 

@@ -54,7 +54,7 @@ def contracted(config: RunConfig, force_N: float, seconds: float) -> tuple[np.nd
     return tendon_lengths(model, data, "ring_"), tendon_lengths(model, data, "spring_")
 
 
-@pytest.mark.parametrize("formulation", [RODS, TIGHT_CHAIN, SOFT_CHAIN], ids=["rods", "tight chain", "soft chain"])
+@pytest.mark.parametrize("formulation", [RODS, TIGHT_CHAIN, SOFT_CHAIN], ids=["rods", "stiff chain", "soft chain"])
 @pytest.mark.parametrize("segments", [3, 5])
 def test_mass_and_rest_lengths_are_those_of_the_configuration(formulation: dict[str, Any], segments: int) -> None:
     config = worm(formulation, **{"body.mesh.n_segments": segments})

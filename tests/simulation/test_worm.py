@@ -16,7 +16,7 @@ CHAIN = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler
 FORMULATIONS = {
     "rods": {},
     "soft chain": CHAIN,
-    "tight chain": {
+    "stiff chain": {
         **CHAIN,
         "body.formulation.pins": "direct",
         "body.formulation.pin_time_constant_s": 0.01,
@@ -51,7 +51,7 @@ def test_lengths_are_the_engine_s_at_the_end_of_the_step(formulation: str) -> No
     assert felt.center_of_mass_m == pytest.approx(plant.data.subtree_com[0], abs=1e-9)
 
 
-@pytest.mark.parametrize("formulation", ["rods", "soft chain", pytest.param("tight chain", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("formulation", ["rods", "soft chain", pytest.param("stiff chain", marks=pytest.mark.slow)])
 def test_the_floor_carries_the_weight_of_a_resting_worm(formulation: str) -> None:
     plant = WormPlant(config(formulation, **{"body.strands.joint_damping_Nms_per_rad": 0.02}))
     plant.reset(0)

@@ -140,7 +140,10 @@ def test_answers_follow_the_rhythm(short, tmp_path):
     silent = SPRINGS.examine(
         results(SPRINGS, "full", lambda c: synthetic(short, c, 0.4, SILENT)), "full", tmp_path / "b"
     )
-    assert "keep the order 1-2-3: the paper's chain, sprung rods and tight rods; these do not: none" in walking.answer
+    assert (
+        "keep the order 1-2-3: the paper's chain, rods with soft crossings and rods with rigid crossings; these do "
+        "not: none" in walking.answer
+    )
     assert "keep the order 1-2-3: none; these do not: the paper's chain (silent" in silent.answer
     assert silent.numbers["verdict_tension_only_chain"] == "silent after 0.70 s"
 

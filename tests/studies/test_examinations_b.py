@@ -13,7 +13,7 @@ from annelid.config import load_config
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store, case_key
 from annelid_studies.riddle2023.examination import Effort, Examination, Results
-from annelid_studies.riddle2023.examinations.design import TIGHT
+from annelid_studies.riddle2023.examinations.design import RIGID
 from annelid_studies.riddle2023.examinations.discretization import DISCRETIZATION, convergence_order
 from annelid_studies.riddle2023.examinations.gate import FLAT, GATE, read_beat
 from annelid_studies.riddle2023.examinations.noise import (
@@ -118,7 +118,7 @@ def test_no_order_is_told_where_there_is_none() -> None:
 
 
 def test_tight_rods_keep_within_the_muscles_limit(tmp_path: Path) -> None:
-    case = start_case(TIGHT, 0.005)
+    case = start_case(RIGID, 0.005)
     store = Store(tmp_path)
     outcomes = store.compute([case], jobs=1)
     outcome = Results(outcomes, case_key)[case]
@@ -144,5 +144,5 @@ def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytes
 
 
 def test_the_presets_worms_are_on_the_maps() -> None:
-    tight = next(chart for chart in MAPS["full"] if chart.worm is TIGHT)
-    assert case_key(tight.cell(TIGHT.case(None).config.sensor.tolerance_m, 0.0)[0]) == case_key(rods())
+    tight = next(chart for chart in MAPS["full"] if chart.worm is RIGID)
+    assert case_key(tight.cell(RIGID.case(None).config.sensor.tolerance_m, 0.0)[0]) == case_key(rods())

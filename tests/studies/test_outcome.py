@@ -19,13 +19,13 @@ PROGRAM = one_after_the_other(hold_s=HOLD_S, rest_s=REST_S)
 
 @pytest.fixture(scope="module")
 def held(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A worm with soft pins whose segments contract one after the other."""
+    """A worm with soft crossings whose segments contract one after the other."""
     return simulate(Case(FAST, PROGRAM).config, tmp_path_factory.mktemp("held"), progress=False)
 
 
 @pytest.fixture(scope="module")
 def cut(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A worm with tight pins, its run over in the middle of the third contraction."""
+    """A worm with rigid crossings, its run over in the middle of the third contraction."""
     case = Case(RODS, {**PROGRAM, "duration_s": 1.15})
     return simulate(case.config, tmp_path_factory.mktemp("cut"), progress=False)
 

@@ -122,7 +122,7 @@ def test_rigid_crossings_are_explained_in_the_table_that_compares_them() -> None
     twice = replace(paper, elongation_mean_max_m=[2.1 * (one or 0.0) for one in paper.elongation_mean_max_m])
     assert "crossings are rigid, and a segment elongates 2.1 times as far" in legend(twice, RODS)
     assert "rigid" not in legend(twice, FAST)
-    assert "soft pins" in " ".join(printed_of(twice))
+    assert "soft crossings" in " ".join(printed_of(twice))
 
 
 def printed_of(numbers: Summary) -> list[str]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
-"""What runs where no preset is named: the paper's worm with its soft pins, or the one with rigid crossings."""
+"""What runs where no preset is named: the paper's worm with its soft crossings, or the one with rigid crossings."""
 
 Preset = Annotated[
     str | None,

@@ -411,7 +411,8 @@ def _about_rigid_crossings(numbers: Summary) -> str:
         else "segments elongate farther"
     )
     gap = f"{1e3 * (theirs.pin_gap_max_m or 0.0):.0f} mm"
-    return f"Here crossings are rigid, and {times}: {FORMULATION} has the paper's soft pins, which part by up to {gap}."
+    theirs_give = f"{FORMULATION} has the paper's soft crossings, which part by up to {gap}"
+    return f"Here crossings are rigid, and {times}: {theirs_give}."
 
 
 def _first_of_order(order: Sequence[int]) -> str:

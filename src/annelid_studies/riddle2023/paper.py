@@ -296,8 +296,9 @@ def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim])
         paragraphs.append(f"Verdicts on the {len(claims)} claims of the paper that are examined here: {tally(claims)}.")
     paragraphs.append(
         f"Three worms stand side by side in what follows: the paper's chain (preset {CHAIN}, in the examinations at "
-        f"steps of 2 ms), whose pins give; sprung rods ({FAST}), the same robot in seconds with pins of the same "
-        f"stiffness; and tight rods ({RODS}, with the paper's three elements a side and steps of "
+        f"steps of 2 ms), whose pins give; rods with soft crossings ({FAST}), the same robot in seconds with pins of "
+        "the same "
+        f"stiffness; and rods with rigid crossings ({RODS}, with the paper's three elements a side and steps of "
         f"{MM * RODS_STEP_S:g} ms), whose pins hold."
     )
     return paragraphs

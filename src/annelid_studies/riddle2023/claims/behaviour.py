@@ -58,7 +58,8 @@ def control_claims(evidence: Evidence) -> list[Claim]:
             f"update order of the network {sum(gates['toolbox'])} of {len(gates['toolbox'])}, with gates that start at "
             f"rest {sum(gates['steady'])} of {len(gates['steady'])}",
             "Neurons, synapses and conductances are the same on the planar worm, the paper's chain, its fast form and "
-            "the tight rods. What had to change lies around the network: the map from potentials to activation (Eq. "
+            "the rods with rigid crossings. What had to change lies around the network: the map from potentials to "
+            "activation (Eq. "
             "2), the sensors' tolerance (0.1 mm to 10 mm), and a hold of the first sensor for 0.2 s. The gates of the "
             "sodium current start as in SNS-Toolbox; where they start at rest, all that differs is told above.",
             f"{PLANAR_CASES[300].command}; {MAIN.command}",

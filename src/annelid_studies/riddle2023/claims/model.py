@@ -235,7 +235,8 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
             "section 2.2",
             "0.58",
             f"rings held at {span(usual, 100, 1)} cm with 0.58, at {span(short, 100, 1)} cm with 0.5",
-            f"Every ring of sprung and tight rods, {len(usual)} contractions in open loop with each value. The paper "
+            f"Every ring of the rods, with soft and with rigid crossings, {len(usual)} contractions in open loop with "
+            "each value. The paper "
             "does not say from what length on a mesh is over-contracted; what is compared is whether 0.58 keeps rings "
             "longer, which the law of the force all but says: a weak test.",
             rods(SHORT_MINIMUM).command,

@@ -52,9 +52,9 @@ class Worm:
 
 
 PAPERS = Worm("chain", "the paper's chain", "chain", chain, "o", "-", "#1b2a6b")
-SPRUNG = Worm("fast", "sprung rods", "sprung", fast, "s", "--", "#6b7280")
-TIGHT = Worm("rods", "tight rods", "tight", rods, "^", ":", "#e07b39")
-WORMS = (PAPERS, SPRUNG, TIGHT)
+SOFT = Worm("fast", "rods with soft crossings", "soft", fast, "s", "--", "#6b7280")
+RIGID = Worm("rods", "rods with rigid crossings", "rigid", rods, "^", ":", "#e07b39")
+WORMS = (PAPERS, SOFT, RIGID)
 
 
 @dataclass(frozen=True)

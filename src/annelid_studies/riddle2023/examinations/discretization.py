@@ -15,7 +15,7 @@ from annelid.experiment.case import Case
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, TIGHT, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Point, Reading, Worm
 from annelid_studies.riddle2023.examinations.words import CM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import one_after_the_other
@@ -25,12 +25,12 @@ EULER = {"body.formulation.integrator": "Euler", "clock.physics_timestep_s": 0.0
 PRESETS_ELEMENTS = 3
 """Elements a side in the presets, and in the paper."""
 HELD: Mapping[Effort, Mapping[Worm, Sequence[int]]] = {
-    "quick": {TIGHT: (1, 2, 3, 6)},
-    "full": {TIGHT: (1, 2, 3, 4, 6), PAPERS: (1, 2, 3, 4)},
+    "quick": {RIGID: (1, 2, 3, 6)},
+    "full": {RIGID: (1, 2, 3, 4, 6), PAPERS: (1, 2, 3, 4)},
 }
 """Elements a side with which each worm is held contracted, the finest last."""
 WALKED: Mapping[Effort, Sequence[int]] = {"quick": (1, 2, 3), "full": (1, 2, 3, 4, 6)}
-"""Elements a side with which tight rods walk."""
+"""Elements a side with which rods with rigid crossings walk."""
 
 
 def _points(effort: Effort) -> list[Point]:
@@ -38,7 +38,7 @@ def _points(effort: Effort) -> list[Point]:
     for worm, elements in HELD[effort].items():
         for n in elements:
             mesh = {"body.mesh.elements_per_side": n}
-            walk = worm.case(mesh) if worm is TIGHT and n in WALKED[effort] else None
+            walk = worm.case(mesh) if worm is RIGID and n in WALKED[effort] else None
             integrator = EULER if worm is PAPERS else {}
             points.append(Point(worm, n, walk, worm.case({**mesh, **integrator, **one_after_the_other()})))
     return points
@@ -176,7 +176,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             "Left: relative difference of held contractions from the finest mesh over the number of elements a rhombus "
             f"side ({words.listed(f'{found.worm.label} against {found.elements[-1]}' for found in held)} elements; "
             f"{words.listed(f'{found.worm.label} {lines[found.worm.line]}' for found in held)}), root mean square over "
-            f"the three segments. Right: largest elongation of each segment of {TIGHT.label} in closed loop (mean of "
+            f"the three segments. Right: largest elongation of each segment of {RIGID.label} in closed loop (mean of "
             f"its springs), {len(walks)} runs; a cross over a marker: the run does not walk 1-2-3."
         ),
         table=tabulated(
@@ -217,7 +217,7 @@ def _walks_in_words(walks: Sequence[Reading]) -> str:
     spread = float((np.ptp(elongations, axis=0) / elongations.mean(axis=0)).max()) if good else None
     periods = [one.period_s for one in good if one.period_s is not None]
     return (
-        f"In closed loop {TIGHT.label} walk 1-2-3 with {words.listed(f'{one.value:g}' for one in good)} elements a "
+        f"In closed loop {RIGID.label} walk 1-2-3 with {words.listed(f'{one.value:g}' for one in good)} elements a "
         f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s, "
         f"and fail with {words.listed(bad)}."
     )
@@ -242,7 +242,7 @@ def _draw(held: Sequence[Convergence], walks: Sequence[Reading], stem: Path) -> 
                 "difference from the finest (%)",
                 {n for one in held for n in one.elements[:-1]},
             ),
-            (right, f"Walking, {TIGHT.label}", "largest elongation (cm)", {one.value for one in walks}),
+            (right, f"Walking, {RIGID.label}", "largest elongation (cm)", {one.value for one in walks}),
         ):
             plots.label_panel(axes, title, "elements per rhombus side", label, sorted(counts), logarithmic=True)
         left.set_yscale("log")

@@ -50,7 +50,7 @@ def _hold(worm: Worm, friction: float) -> Case | None:
 
 
 def _solved(effort: Effort) -> dict[tuple[float, float], Case]:
-    """Tight rods at the paper's friction, by physics step (s) and impedance ratio of the friction cone."""
+    """Rods with rigid crossings at the paper's friction, by physics step (s) and the cone's impedance ratio."""
     return {
         (step, ratio): rods({"clock.physics_timestep_s": step, "body.formulation.friction_impedance_ratio": ratio})
         for step in TIMESTEPS_S
@@ -140,7 +140,8 @@ def _convergence(solved: dict[tuple[float, float], float]) -> str:
     spread, scale = max(travels) - min(travels), float(np.mean(np.abs(travels)))
     artefact = "is no artefact of step or friction cone" if spread < 0.2 * scale else "is known to that accuracy only"
     return (
-        f"Convergence, tight rods at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. The spread is "
+        f"Convergence, rods with rigid crossings at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. The "
+        "spread is "
         f"{words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel {artefact}."
     )
 

@@ -19,7 +19,7 @@ from annelid.morphology import Array
 from annelid.simulation.runfile import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, SPRUNG, TIGHT, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import PLANAR
 
@@ -34,14 +34,14 @@ ALL = tuple((start, scheme) for start in STARTS for scheme in SCHEMES)
 VARIANTS: Mapping[Effort, Mapping[Worm, Sequence[tuple[str, str]]]] = {
     "quick": {
         PAPERS: (("toolbox", "euler"),),
-        SPRUNG: (("toolbox", "euler"), ("steady", "euler")),
-        TIGHT: (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler")),
+        SOFT: (("toolbox", "euler"), ("steady", "euler")),
+        RIGID: (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler")),
         FLAT: ALL,
     },
     "full": {
         PAPERS: (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler"), ("steady", "toolbox")),
-        SPRUNG: ALL,
-        TIGHT: ALL,
+        SOFT: ALL,
+        RIGID: ALL,
         FLAT: ALL,
     },
 }

@@ -1,4 +1,4 @@
-"""Sensor tolerance and noise: where the rhythm holds, with the paper's pins and with tight ones."""
+"""Sensor tolerance and noise: where the rhythm holds, with the paper's crossings and with rigid ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from annelid.draw.style import panel_title
 from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import words
-from annelid_studies.riddle2023.examinations.design import PAPERS, SPRUNG, TIGHT, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
 from annelid_studies.riddle2023.examinations.words import MM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import CHAIN
@@ -66,13 +66,13 @@ class NoiseMap:
 MAPS: Mapping[Effort, Sequence[NoiseMap]] = {
     "quick": (
         NoiseMap(PAPERS, (0.010,), (0.0,), 2),
-        NoiseMap(SPRUNG, (0.0085, 0.010), (0.0, 0.001), 2),
-        NoiseMap(TIGHT, (0.008, 0.015), (0.0, 0.002), 2),
+        NoiseMap(SOFT, (0.0085, 0.010), (0.0, 0.001), 2),
+        NoiseMap(RIGID, (0.008, 0.015), (0.0, 0.002), 2),
     ),
     "full": (
         NoiseMap(PAPERS, (0.008, 0.010, 0.012, 0.015), (0.0, 0.001, 0.002), 5),
-        NoiseMap(SPRUNG, (0.007, 0.008, 0.0085, 0.009, 0.010, 0.012), (0.0, 0.001, 0.002), 5),
-        NoiseMap(TIGHT, (0.005, 0.008, 0.010, 0.012, 0.015, 0.020, 0.030), (0.0, 0.001, 0.002, 0.005), 5),
+        NoiseMap(SOFT, (0.007, 0.008, 0.0085, 0.009, 0.010, 0.012), (0.0, 0.001, 0.002), 5),
+        NoiseMap(RIGID, (0.005, 0.008, 0.010, 0.012, 0.015, 0.020, 0.030), (0.0, 0.001, 0.002, 0.005), 5),
     ),
 }
 AT_THE_PAPERS_STEP = {tolerance_m: Case(CHAIN, {"sensor.tolerance_m": tolerance_m}) for tolerance_m in (0.008, 0.012)}
@@ -287,11 +287,11 @@ def _fragility_in_words(maps: Sequence[_Read], in_common: bool) -> str:
     fact = f"Of the runs in {where}, {parts} walk, {even_parts} evenly."
     if not in_common:
         return fact
-    wider = sum(measure[TIGHT] > 1.05 * max(measure[PAPERS], measure[SPRUNG]) for measure in measures)
+    wider = sum(measure[RIGID] > 1.05 * max(measure[PAPERS], measure[SOFT]) for measure in measures)
     verdict = {
-        len(measures): "a good part of the loop's fragility is the soft pins'",
-        0: "the loop's fragility is not that of the soft pins",
-    }.get(wider, "the soft pins are a part of the loop's fragility, though not by every measure")
+        len(measures): "a good part of the loop's fragility is the soft crossings'",
+        0: "the loop's fragility is not that of the soft crossings",
+    }.get(wider, "the soft crossings are a part of the loop's fragility, though not by every measure")
     return f"{fact} So {verdict}."
 
 
@@ -305,7 +305,7 @@ def _by_noise(one: _Read) -> str:
 
 def _sensor_in_words(maps: Sequence[_Read]) -> str:
     most = max(noise for one in maps for noise in one.chart.noises_m)
-    config = TIGHT.case(None).config
+    config = RIGID.case(None).config
     assert isinstance(config.body, WormBody)
     n_springs = config.body.mesh.n_helices // 2
     return (

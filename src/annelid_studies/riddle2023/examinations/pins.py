@@ -1,4 +1,4 @@
-"""Pins from soft to tight: how far they part, and what that costs in elongation."""
+"""Crossings from soft to rigid: how far they part, and what that costs in elongation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, SPRUNG, TIGHT, Point, Reading
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
 from annelid_studies.riddle2023.examinations.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
@@ -83,7 +83,7 @@ def _sprung_damping_s() -> float | None:
 
 
 _OWN_DAMPING = rods({**one_after_the_other(), "body.rings.length_range_m": compiled_ranges()})
-# Muscles and damping as the sprung rods have them, so that the pins alone differ.
+# Muscles and damping as the rods with soft crossings have them, so that the pins alone differ.
 _HELD_TIGHT = _OWN_DAMPING.but({"body.strands.damping_time_s": _sprung_damping_s()})
 
 
@@ -96,18 +96,18 @@ def _points(effort: Effort) -> list[Point]:
         chains += [paper.but(changes) for changes in (*stiffer, _DIRECT)]
     walked = STIFFNESSES_N_PER_M if effort == "full" else STIFFNESSES_N_PER_M[1::3]
     sprung = [
-        Point(SPRUNG, k, fast(_tied(k)) if k in walked else None, fast({**one_after_the_other(), **_tied(k)}))
+        Point(SOFT, k, fast(_tied(k)) if k in walked else None, fast({**one_after_the_other(), **_tied(k)}))
         for k in STIFFNESSES_N_PER_M
     ]
     return [
         *(Point(PAPERS, 0.0, hold=case) for case in chains),
         *sprung,
-        Point(TIGHT, 0.0, rods(), _HELD_TIGHT),
+        Point(RIGID, 0.0, rods(), _HELD_TIGHT),
     ]
 
 
 def _settling(effort: Effort) -> list[Case]:
-    """Tight rods whose segment 1 is held contracted for long, with the sprung rods' damping and with their own."""
+    """Rods with rigid crossings, segment 1 held contracted for long: the damping of soft crossings, and their own."""
     long = one_after_the_other(1, hold_s=LONG_S)
     return [case.but(long) for case in (_HELD_TIGHT, _OWN_DAMPING)] if effort == "full" else []
 
@@ -120,7 +120,7 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     points = [replace(one, value=tie_stiffness_N_per_m(one.hold)) for one in _points(effort) if one.hold]
     readings = design.read(points, results)
     groups = design.by_worm(readings)
-    chains, sprung, [tight] = groups[PAPERS], groups[SPRUNG], groups[TIGHT]
+    chains, sprung, [tight] = groups[PAPERS], groups[SOFT], groups[RIGID]
     _draw(readings, stem)
 
     paper, stiffest = chains[0], chains[-1]
@@ -135,12 +135,13 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     largest = max(abs(one.held_m[0] / _between(sprung, one.value) - 1.0) for one in common)
     remarks = [
         f"At {words.listed(f'{one.value:.0f}' for one in common)} N/m the chain's elongation is within "
-        f"{PERCENT * largest:.0f} % of that of sprung rods, read between their own values"
+        f"{PERCENT * largest:.0f} % of that of rods with soft crossings, read between their own values"
         f"{': the stiffness of the pins is what the two formulations have in common' if largest < 0.15 else ''}.",
-        f"In closed loop the sensor tolerance is {MM * SPRUNG.tolerance_m:g} mm, which was chosen for ties of "
+        f"In closed loop the sensor tolerance is {MM * SOFT.tolerance_m:g} mm, which was chosen for ties of "
         f"{tie_stiffness_N_per_m(fast()):g} N/m. With it the rods walk 1-2-3 at {ordered} N/m, and not at {others} "
-        f"N/m. Tight pins at {MM * TIGHT.tolerance_m:g} mm: {words.rhythm(tight.rhythm)}.",
-        "The tight rods here have the muscles and the damping of the sprung ones, so that only the pins differ. "
+        f"N/m. Rigid crossings at {MM * RIGID.tolerance_m:g} mm: {words.rhythm(tight.rhythm)}.",
+        "The rods with rigid crossings here have the muscles and the damping of those with soft ones, so that only "
+        "the pins differ. "
         f"With the damping of their own preset they elongate by {words.in_cm(own_m)} cm, {_beside(own_m, tight_m)}.",
     ]
     if settled:
@@ -149,18 +150,20 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             1,
             "The stiffest chain here, its strands tied to each other without pin masses, has ties of about "
             f"{_rounded(stiffest.value)} N/m and elongates by {words.in_cm(stiffest.held_m[0])} cm, "
-            f"{_beside(stiffest.held_m[0], tight_m)} the tight rods.",
+            f"{_beside(stiffest.held_m[0], tight_m)} the rods with rigid crossings.",
         )
         remarks.append(
-            f"Held for {LONG_S:g} s in place of {HOLD_S:g} s, tight rods elongate by {words.in_cm(settled[0])} cm with "
-            f"the sprung rods' damping and {words.in_cm(settled[1])} cm with their own: what the damping changes "
+            f"Held for {LONG_S:g} s in place of {HOLD_S:g} s, rods with rigid crossings elongate by "
+            f"{words.in_cm(settled[0])} cm with "
+            f"the damping of soft crossings and {words.in_cm(settled[1])} cm with their own: what the damping changes "
             f"{'passes; the readings are of meshes still on their way to rest' if passes else 'lasts'}."
         )
     return Findings(
         answer=(
             f"The paper's pins give like springs of {paper.value:.0f} N/m: with segment 1 held contracted, strands "
             f"part by up to {words.in_cm(gaps_m[0], 1)} cm at a pin, and the segment elongates by "
-            f"{words.in_cm(paper_m)} cm. Tight pins give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} times as "
+            f"{words.in_cm(paper_m)} cm. Rigid crossings give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} "
+            "times as "
             f"much, at rings of {words.in_unit(ring_m)} and {words.in_unit(tight_ring_m)} m. Rods with ties of "
             f"{sprung[-1].value:g} N/m reach {words.in_percent(sprung[-1].held_m[0] / tight_m)} % of that."
         ),
@@ -168,13 +171,13 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             "Open loop: each of the three segments is held contracted for 0.8 s in turn. Its elongation (mean of six "
             "springs), the largest gap at any pin, and its ring's length, over the stiffness of the tie between pin "
             f"and strand. One run a point; {len(chains)} of the paper's chain, {len(sprung)} of rods with sprung pins, "
-            "one of rods with tight pins, drawn at the right edge. The rhythm is that of closed loops of 5 s."
+            "one of rods with rigid crossings, drawn at the right edge. The rhythm is that of closed loops of 5 s."
         ),
         table=tabulated(
             readings,
             {
                 "worm": lambda one: one.worm.label,
-                "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "tight",
+                "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
                 "elongation of 1 / 2 / 3 (cm)": lambda one: words.all_in_cm(one.held_m),
                 "largest gap (cm)": lambda one: words.all_in_cm(one.at_holds("pin_gap_m")) if one is not tight else "0",
                 "ring (m)": lambda one: words.each_in_unit(_rings(one), digits=3),
@@ -204,7 +207,7 @@ def _rings(reading: Reading) -> np.ndarray:
 
 
 def _between(sprung: Sequence[Reading], stiffness: float) -> float:
-    """Elongation of the first segment of sprung rods at a stiffness between those that were run."""
+    """Elongation of the first segment of rods with soft crossings at a stiffness between those that were run."""
     known, elongation_m = [one.value for one in sprung], [one.held_m[0] for one in sprung]
     return float(np.interp(np.log(stiffness), np.log(known), elongation_m))
 
@@ -221,7 +224,7 @@ def _beside(value: float, reference: float) -> str:
 
 
 def _draw(readings: Sequence[Reading], stem: Path) -> None:
-    edge = 6.0 * max(one.value for one in readings if one.worm is not TIGHT)
+    edge = 6.0 * max(one.value for one in readings if one.worm is not RIGID)
 
     def place(one: Reading) -> float:
         return min(one.value, edge)
@@ -234,10 +237,10 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
             (gap, lambda one: CM * one.at_holds("pin_gap_m")),
             (ring, _rings),
         ):
-            plots.draw_over(axes, groups[SPRUNG], numbers)
+            plots.draw_over(axes, groups[SOFT], numbers)
             plots.draw_over(axes, groups[PAPERS], numbers, hollow=True)
             if axes is not gap:
-                plots.draw_over(axes, groups[TIGHT], numbers, at=place, linestyle="none", markersize=6.0)
+                plots.draw_over(axes, groups[RIGID], numbers, at=place, linestyle="none", markersize=6.0)
         kinds = plots.draw_rhythms(rhythm, readings, at=place)
         decades = [10.0**k for k in range(1, 6) if 10.0**k < 0.2 * edge]
         for axes, title, label in (
@@ -247,7 +250,7 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
             (rhythm, "Rhythm in closed loop", ""),
         ):
             plots.label_panel(axes, title, "stiffness of a tie (N/m)", label, logarithmic=True)
-            axes.set_xticks([*decades, edge], [*(f"{value:g}" for value in decades), "tight"])
+            axes.set_xticks([*decades, edge], [*(f"{value:g}" for value in decades), "rigid"])
             axes.minorticks_off()
             axes.set_xlim(9.0, 1.5 * edge)
         elongation.set_ylim(bottom=0.0)
@@ -256,15 +259,15 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
         steps = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
         low, high = gap.get_ylim()
         gap.set_yticks(shown := [step for step in steps if low <= step <= high], [f"{step:g}" for step in shown])
-        looks = [{**worm.look, "color": "0.25", "hollow": worm is PAPERS} for worm in (PAPERS, SPRUNG)]
-        worms = [plots.look_handle(**look) for look in (*looks, {**TIGHT.look, "color": "0.25", "linestyle": "none"})]
+        looks = [{**worm.look, "color": "0.25", "hollow": worm is PAPERS} for worm in (PAPERS, SOFT)]
+        worms = [plots.look_handle(**look) for look in (*looks, {**RIGID.look, "color": "0.25", "linestyle": "none"})]
         plots.legend_below(figure, [*plots.segment_handles(), *worms, *kinds], 3)
         save_both(figure, stem)
 
 
 PINS = Examination(
     name="pins",
-    title="Pins, from soft to tight",
+    title="Crossings, from soft to rigid",
     question="The paper ties its strands with the engine's soft constraints. How soft are they, and what would tight "
     "pins change?",
     cases=_cases,

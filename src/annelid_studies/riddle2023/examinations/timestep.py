@@ -18,7 +18,7 @@ from annelid.morphology import Array
 from annelid.simulation.runfile import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, SPRUNG, TIGHT, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading, Worm
 from annelid_studies.riddle2023.examinations.words import CM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import chain, one_after_the_other
@@ -45,18 +45,18 @@ EULER = replace(
     line="-.",
 )
 WALKS: Mapping[Effort, Mapping[Worm, Sequence[float]]] = {
-    "quick": {RK4: (0.001, 0.002), SPRUNG: (0.010, 0.020), TIGHT: (0.005, 0.010, 0.020)},
+    "quick": {RK4: (0.001, 0.002), SOFT: (0.010, 0.020), RIGID: (0.005, 0.010, 0.020)},
     "full": {
         RK4: (0.0005, 0.001, 0.002, 0.004),
         EULER: (0.001, 0.002),
-        SPRUNG: (0.002, 0.005, 0.010, 0.020),
-        TIGHT: (0.001, 0.002, 0.005, 0.010, 0.020),
+        SOFT: (0.002, 0.005, 0.010, 0.020),
+        RIGID: (0.001, 0.002, 0.005, 0.010, 0.020),
     },
 }
 """Steps, s, at which each worm walks."""
 STARTS: Mapping[Effort, Mapping[Worm, Sequence[float]]] = {
-    "quick": {RK4: (0.002, 0.001, 0.0005), TIGHT: (0.005, 0.0005)},
-    "full": {RK4: (0.002, 0.001, 0.0005, 0.00025), TIGHT: (0.005, 0.002, 0.0005)},
+    "quick": {RK4: (0.002, 0.001, 0.0005), RIGID: (0.005, 0.0005)},
+    "full": {RK4: (0.002, 0.001, 0.0005, 0.00025), RIGID: (0.005, 0.002, 0.0005)},
 }
 """Steps, s, at which the beginning of a contraction is resolved."""
 

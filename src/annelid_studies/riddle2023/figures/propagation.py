@@ -224,7 +224,7 @@ def _muscle(posture: Posture, measured: Measured) -> str:
 
 
 def _pin_remark(posture: Posture, segment: int) -> str:
-    """A sentence where the contracted ring's pins part from their strands, as soft pins do."""
+    """A sentence where the contracted ring's pins part from their strands, as soft crossings do."""
     geometry = posture.geometry
     ring = geometry.rings[segment]
     vertex = geometry.crossing_vertex[geometry.ring_planes[segment]]

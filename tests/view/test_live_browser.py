@@ -130,7 +130,7 @@ def test_a_click_pokes_the_worm(live: tuple[Show, Page]) -> None:
     ask(show, page, show.player.pause)
     page.wait_for_timeout(500)
     points = show.picture.strands.reshape(-1, 3).astype(float)
-    x, y = screen_place(show, points[np.abs(points - show.picture.middle).sum(axis=1).argmin()] + show.shift_m)
+    x, y = screen_place(show, points[np.abs(points - show.picture.middle).sum(axis=1).argmin()] + show.stage.shift_m)
     canvas = page.locator("canvas").first.bounding_box()
     assert canvas is not None
     page.mouse.click(canvas["x"] + x * canvas["width"], canvas["y"] + y * canvas["height"])

@@ -14,8 +14,7 @@ from annelid.config import load_config, preset_names
 from annelid.draw.scene import upright
 from annelid.draw.skeleton import Skeleton
 from annelid.errors import ConfigError, RunFileError
-from annelid.live.knobs import knobs_of
-from annelid.live.living import LivingWorm
+from annelid.live.living import LivingWorm, knobs_of
 from annelid.live.moments import Moment, Reel, reel_of
 from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of

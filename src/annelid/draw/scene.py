@@ -15,13 +15,12 @@ from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, pict
 from annelid.draw.gl import Canvas, find_backend
 from annelid.draw.style import CONTRACTED, activation_color
 from annelid.errors import RunFileError
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     import mujoco
 
     from annelid.simulation.runfile import Run
-
-Array = NDArray[np.float64]
 
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.draw.render import Progress
 from annelid.draw.skeleton import Skeleton
 from annelid.errors import RunFileError
 from annelid.live.guard import content_policy
@@ -28,9 +28,6 @@ FRAMES_A_SECOND = 25.0
 GRAIN_M = 2.0**-13
 """Places are rounded to an eighth of a millimetre, which halves the page."""
 PAGE_SUFFIXES = (".html", ".htm")
-
-Progress = Callable[[int, int], object]
-"""Called with the number of frames done and their total."""
 
 
 def export_page(

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.config import Knob
 from annelid.draw.style import CONTRACTED, RELAXED, segment_colors
-from annelid.live.knobs import Knob
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from annelid.config import RunConfig
+from annelid.config import Knob, RunConfig
 from annelid.draw.skeleton import Skeleton
 from annelid.errors import AnnelidError
-from annelid.live.knobs import Knob, knobs_of
+from annelid.live.living import knobs_of
 from annelid.live.moments import Moment
 from annelid.live.panel import Panel, legend_html, status_html
 from annelid.live.picture import Painter, struck
@@ -21,7 +21,6 @@ from annelid.live.player import config_of, player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
 from annelid.live.traces import SECONDS, plots_of
-from annelid.morphology import Array
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -116,11 +115,6 @@ class Show:
                 self._update_panel(begun)
                 panel_due = begun + PANEL_INTERVAL_S
             self._ending.wait(max(0.0, begun + 1.0 / FRAMES_A_SECOND - perf_counter()))
-
-    @property
-    def shift_m(self) -> Array:
-        """Where the model's origin is in the page, m, ``(3,)``."""
-        return self.stage.shift_m
 
     def clients(self) -> list[viser.ClientHandle]:
         """Returns the browsers that look on, each with its camera."""

@@ -21,7 +21,7 @@ from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.config.arena import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
-from annelid.draw.scene import upright
+from annelid.draw.scene import ROOM, upright
 from annelid.live.picture import CONTACT_COLOR, Colors, Picture
 from annelid.morphology import Array, heading_turn
 
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 ASPECT = 1.0
 """Of the canvas beside the panel, for which the camera is placed."""
-ROOM = 1.3
-"""Share that the worm is seen from farther than it would just fit: it grows longer and moves."""
 STRAND_PIXELS, RING_PIXELS, SPRING_PIXELS = 3.0, 6.0, 3.5
 """Widths of lines; lines that grow thinner with distance take twice as long to draw without a graphics card."""
 LAYERS = ("strands", "rings", "springs", "contacts", "ground")

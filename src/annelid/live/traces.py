@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+from annelid.nervous.layout import by_segment, role_of
 
 MOST_SEGMENTS = 4
 """With more than these the expansion neurons are left out of the first plot."""
 SECONDS = 5.0
 """How far back the plots go, in simulated time."""
-_OF_SEGMENT = re.compile(r"(?P<role>\w+?)_(?P<segment>\d+)")
 
 
 @dataclass(frozen=True)
@@ -53,23 +53,16 @@ def plots_of(names: Sequence[str]) -> dict[str, Plot]:
     Args:
         names: Signals of a reel: neurons as ``role_segment`` or plain names, then ``activation_1`` and so on.
     """
-    by_segment: dict[int, list[str]] = {}
-    others: list[str] = []
-    for name in names:
-        match = _OF_SEGMENT.fullmatch(name)
-        if match is None:
-            others.append(name)
-        elif match["role"] != "activation":
-            by_segment.setdefault(int(match["segment"]), []).append(name)
+    muscles = [name for name in names if name.startswith("activation_")]
+    segments, others = by_segment(name for name in names if name not in muscles)
     plots: dict[str, Plot] = {}
-    if by_segment:
-        plots["half-centres"] = _half_centres(by_segment)
-        for segment, neurons in by_segment.items():
-            labels = [neuron.rsplit("_", 1)[0] for neuron in neurons]
+    if segments:
+        plots["half-centres"] = _half_centres(segments)
+        for segment, neurons in segments.items():
+            labels = [role_of(neuron) for neuron in neurons]
             plots[f"neurons of segment {segment}"] = _plot(f"segment {segment}: potentials (mV)", neurons, labels)
     if others:
         plots["other neurons"] = _plot("potentials (mV)", others, others)
-    muscles = [name for name in names if name.startswith("activation_")]
     numbers = [name.removeprefix("activation_") for name in muscles]
     plots["activation"] = _plot("activation of the muscles", muscles, numbers, (-0.05, 1.05))
     return plots
@@ -80,12 +73,12 @@ def _plot(title: str, signals: Sequence[str], labels: Sequence[str], limits: tup
     return Plot(title, curves, len(curves), limits)
 
 
-def _half_centres(by_segment: dict[int, list[str]]) -> Plot:
+def _half_centres(segments: dict[int, list[str]]) -> Plot:
     curves: list[Curve] = []
-    for number, (segment, neurons) in enumerate(by_segment.items()):
+    for number, (segment, neurons) in enumerate(segments.items()):
         if f"contraction_{segment}" in neurons:
             curves.append(Curve(f"contraction_{segment}", str(segment), number))
-        if f"expansion_{segment}" in neurons and len(by_segment) <= MOST_SEGMENTS:
+        if f"expansion_{segment}" in neurons and len(segments) <= MOST_SEGMENTS:
             curves.append(Curve(f"expansion_{segment}", f"{segment} exp.", number, dashed=True))
     words = ", expansion dashed" if any(curve.dashed for curve in curves) else ""
-    return Plot(f"contraction{words} (mV)", tuple(curves), len(by_segment))
+    return Plot(f"contraction{words} (mV)", tuple(curves), len(segments))

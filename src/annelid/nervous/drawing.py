@@ -125,9 +125,9 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
             numbers.append(Words(strength_of(link), place, 7.0, halo=True))
     for stub in layout.inputs:
         arrow = arrow_shapes(np.array([stub.outer, stub.rim]), f"input-{stub.name}-{stub.neuron}")
-        front += [*arrow, _name_of(stub)]
+        front += [*arrow, *_name_of(stub)]
     for stub in layout.outputs:
-        front += [*arrow_shapes(np.array([stub.rim, stub.outer]), f"output-{stub.name}"), _name_of(stub)]
+        front += [*arrow_shapes(np.array([stub.rim, stub.outer]), f"output-{stub.name}"), *_name_of(stub)]
     for name, place in layout.places.items():
         neuron = network.neurons[name]
         spiking, gated = neuron.firing is not None, bool(neuron.channels)
@@ -210,13 +210,14 @@ def _column(name: str, places: Array) -> list[Shape]:
     return [Line(rounded(corners, 0.2), "none", 0.0, "#f1f1f1"), header]
 
 
-def _name_of(stub: Stub) -> Words:
+def _name_of(stub: Stub) -> list[Shape]:
     """Writes an input's or output's name, unless that is the neuron's, beyond its outer end."""
+    if stub.name == stub.neuron:
+        return []
     sideways, upwards = direction = (stub.outer - stub.rim) / STUB
     across = "center" if abs(sideways) < 0.3 else "left" if sideways > 0 else "right"
     along = "center" if abs(upwards) < 0.3 else "bottom" if upwards > 0 else "top"
-    label = "" if stub.name == stub.neuron else stub.name.replace("_", " ")
-    return Words(label, stub.outer + 0.06 * direction, 8.0, across, along)
+    return [Words(stub.name.replace("_", " "), stub.outer + 0.06 * direction, 8.0, across, along)]
 
 
 def _polygon(center: Array, radius: float, n_corners: int) -> Array:

@@ -69,7 +69,8 @@ def lay_out(network: Network) -> Layout:
     networks are laid out on a circle. A connection is straight where no neuron is in its way, and bent otherwise;
     one from the last column back to the first passes below.
     """
-    columns = _columns(network.neurons)
+    segments, others = by_segment(network.neurons)
+    columns = {} if others else segments
     places = _in_columns(columns) if columns else _on_circle(list(network.neurons))
     routes = tuple(_routes(network, places, columns))
     busy = _busy_directions(network, places, routes)
@@ -88,15 +89,17 @@ def role_of(name: str) -> str:
     return match[1] if match else name
 
 
-def _columns(names: Iterable[str]) -> dict[int, list[str]]:
-    """Names by the number they end in, in ascending order; empty if one of them has none."""
-    columns: dict[int, list[str]] = {}
+def by_segment(names: Iterable[str]) -> tuple[dict[int, list[str]], list[str]]:
+    """Names by the segment's number they end in, in ascending order, and those that end in none."""
+    segments: dict[int, list[str]] = {}
+    others = []
     for name in names:
         match = _NUMBERED.fullmatch(name)
         if match is None:
-            return {}
-        columns.setdefault(int(match[2]), []).append(name)
-    return dict(sorted(columns.items()))
+            others.append(name)
+        else:
+            segments.setdefault(int(match[2]), []).append(name)
+    return dict(sorted(segments.items())), others
 
 
 def _in_columns(columns: Mapping[int, list[str]]) -> dict[str, Array]:

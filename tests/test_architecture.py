@@ -1,4 +1,4 @@
-"""The rooms of the house: who may import whom, and what `import annelid` does not load."""
+"""Who may import whom, and what `import annelid` does not load."""
 
 from __future__ import annotations
 

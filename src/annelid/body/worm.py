@@ -188,6 +188,10 @@ class WormBody(BodyKind):
         # The simulation is built on this module, and loads the engine.
         return import_module("annelid.simulation.worm").WormPlant(config)
 
+    def refuse_fidelity(self, level: str) -> None:
+        """Refuses a level where the formulation does."""
+        self.formulation.refuse_fidelity(level)
+
     @property
     def has_halves(self) -> bool:
         """Whether its rings are halved."""

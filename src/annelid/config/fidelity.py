@@ -55,37 +55,20 @@ LEVELS = {
 """The levels by name, from the slowest to the fastest."""
 
 
-def fidelity_changes(level: str, tree: Mapping[str, Any], home: Mapping[str, Any]) -> dict[str, Any]:
+def fidelity_changes(level: str, home: Mapping[str, Any]) -> dict[str, Any]:
     """Tells what a level changes in a configuration.
 
     Args:
         level: One of `LEVELS`.
-        tree: The configuration as a tree of tables, not yet checked.
         home: The tree of the preset `HOME`.
 
     Returns:
         Values of `RESOLUTION` by dotted path.
 
     Raises:
-        ConfigError: There is no such level, or the body is not one of rods with shared pins.
+        ConfigError: There is no such level.
     """
-    find_level(level)
-    kind = _value(tree, "body.kind") or "worm"
-    if kind != "worm":
-        raise ConfigError(f"fidelity = {level!r} is for the 3D worm (body.kind = 'worm'), not for body.kind = {kind!r}")
-    formulation = _value(tree, "body.formulation.kind") or "rods"
-    if formulation != "rods":
-        raise ConfigError(
-            f"fidelity = {level!r} is for worms of rods, not for body.formulation.kind = {formulation!r}: set "
-            "body.mesh.elements_per_side and clock.physics_timestep_s, or take the preset riddle2023-rods"
-        )
-    if _value(tree, "body.formulation.pins") == "separate":
-        raise ConfigError(
-            f"fidelity = {level!r} is for rods that share their pins; those of body.formulation.pins = 'separate' are "
-            "fitted to their mesh and step: take the preset riddle2023-rods, or set body.mesh.elements_per_side and "
-            "clock.physics_timestep_s and fit the pins again"
-        )
-    return {path: _value(home, path) for path in RESOLUTION} | dict(LEVELS[level].changes)
+    return {path: _value(home, path) for path in RESOLUTION} | dict(find_level(level).changes)
 
 
 def find_level(name: str) -> Fidelity:

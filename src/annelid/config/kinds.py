@@ -18,6 +18,7 @@ from pydantic import SerializeAsAny, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from annelid.config.sections import Section
+from annelid.errors import ConfigError
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
@@ -110,11 +111,14 @@ class ControllerKind(Kind):
 
     Attributes:
         sensor_fields: Fields of the section ``sensor`` that it uses.
+        tuned: What `annelid tune` varies unless the user says otherwise, its timing and its sensors' switching: each
+            ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log``.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("controller.kind", "annelid.control")
     default: ClassVar[str] = "sns"
     sensor_fields: ClassVar[frozenset[str]] = frozenset()
+    tuned: ClassVar[tuple[str, ...]] = ()
 
     @property
     def laid_down(self) -> tuple[Contraction, ...]:
@@ -192,6 +196,16 @@ class BodyKind(Kind):
     is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
     touches_ground: ClassVar[bool] = True
+
+    def refuse_fidelity(self, level: str) -> None:
+        """Refuses a level of fidelity (`annelid.config.fidelity`) where it was not measured.
+
+        Raises:
+            ConfigError: The levels are not for this body.
+        """
+        raise ConfigError(
+            f"fidelity = {level!r} is for the 3D worm (body.kind = 'worm'), not for body.kind = {self.kind!r}"
+        )
 
     @property
     def wall_distance_m(self) -> float | None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from annelid.config.arena import SHARED
 from annelid.config.checking import check_config, whole_path
-from annelid.config.fidelity import HOME, fidelity_changes
+from annelid.config.fidelity import HOME, fidelity_changes, find_level
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.textfiles import check_depth, parse_toml, read_toml
@@ -98,7 +98,9 @@ def load_config(
     """
     tree = _read_tree(source)
     if fidelity is not None:
-        tree = _overridden(tree, fidelity_changes(fidelity, tree, _read_tree(HOME)))
+        find_level(fidelity)
+        check_config(_overridden(tree, overrides or {})).body.refuse_fidelity(fidelity)
+        tree = _overridden(tree, fidelity_changes(fidelity, _read_tree(HOME)))
     if arena is not None:
         tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     return check_config(_overridden(tree, overrides or {}))

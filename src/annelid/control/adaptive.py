@@ -29,6 +29,12 @@ class AdaptiveSns(ControllerKind):
     """
 
     sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.drive=0:1",
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "sensor.tolerance_m=0.001:0.03:log",
+        "sensor.hysteresis_m=0:0.02",
+    )
     kind: Literal["adaptive"] = "adaptive"
     network: Sns = Sns()
     drive: Annotated[float, Field(ge=0, le=1)] = Field(

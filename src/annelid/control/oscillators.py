@@ -44,6 +44,11 @@ class HeteroclinicChannel(ControllerKind):
         ("shaw2012", "limit cycles near a heteroclinic orbit"),
         ("stone1990", "the dwell time under noise"),
     )
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.growth_rate_per_s=5:100:log",
+        "controller.bias_per_s=1e-5:0.1:log",
+        "controller.stretch_cue_m=0.005:0.08:log",
+    )
     kind: Literal["shc"] = "shc"
     growth_rate_per_s: Annotated[float, Field(gt=0, le=500)] = Field(
         default=20.0, description="rate at which activities settle and decay; at most 0.5 over the control timestep"
@@ -99,6 +104,11 @@ class PhaseChain(ControllerKind):
     """
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (("ijspeert2007", "the phase oscillators under a drive"),)
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.slowing=0.3:10:log",
+        "controller.waves=0.5:3",
+        "controller.drive=3:5",
+    )
     kind: Literal["phase-chain"] = "phase-chain"
     drive: Annotated[float, Field(ge=0, le=10)] = Field(
         default=4.0, description="descending drive at the start: the body swims in 3 .. 5, is silent outside 1 .. 5"

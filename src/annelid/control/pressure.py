@@ -29,6 +29,14 @@ class PressureSns(ControllerKind):
     """
 
     sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "controller.hold=0:2",
+        "controller.release=0:6",
+        "controller.landing=0:0.2",
+        "controller.exchange=0:2",
+        "sensor.tolerance_m=0.001:0.03:log",
+    )
     kind: Literal["sns-pressure"] = "sns-pressure"
     network: Sns = Sns()
     light_N: NonNegative = Field(default=2.5, description="load of a segment up to which its pressure neuron rests")

@@ -58,6 +58,10 @@ class RobustSns(ControllerKind):
         ("riddle2022", "the neurons"),
         ("szczecinski2017", "the rules by which synapses are designed"),
     )
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.turn_ms=150:1500:log",
+        "controller.activation_slope_per_mV=0.1:2:log",
+    )
     kind: Literal["sns-robust"] = "sns-robust"
     capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C of the fast neurons")
     leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")

@@ -33,6 +33,12 @@ class Sns(ControllerKind):
     """The paper's synthetic nervous system: one half-centre a segment, gated by its neighbour's stretch."""
 
     sensor_fields: ClassVar[frozenset[str]] = frozenset({"tolerance_m", "noise_m"})
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.gate_time_constant_ms=80:900:log",
+        "controller.activation_slope_per_mV=0.1:2:log",
+        "sensor.tolerance_m=0.001:0.03:log",
+        "sensor.hysteresis_m=0:0.02",
+    )
     kind: Literal["sns"] = "sns"
     capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C")
     leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 class SineWave(ControllerKind):
     """Open loop: a sinusoidal wave from front to rear, segment 1 contracted at the start."""
 
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.period_s=0.8:10:log",
+        "controller.waves=1:3",
+    )
     kind: Literal["sine"] = "sine"
     period_s: Positive = Field(default=2.625, description="time of one cycle; the paper's three segments take 2.625")
     waves: Annotated[float, Field(ge=-100, le=100)] = Field(
@@ -43,6 +47,12 @@ class TimedWave(ControllerKind):
     """
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "the timed wave"),)
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.rise_s=0.05:2:log",
+        "controller.hold_s=0.05:2:log",
+        "controller.fall_s=0.05:2:log",
+        "controller.interval_s=0.1:2:log",
+    )
     kind: Literal["timed"] = "timed"
     rise_s: NonNegative = Field(default=1.0, description="time to contract; 0 for a step")
     hold_s: NonNegative = Field(default=1.0, description="time contracted")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from annelid.config.kinds import Kind
+from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry
 from annelid.registry import Registry
 
@@ -85,6 +86,17 @@ class FormulationKind(Kind):
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
         """Returns what reads the largest gap at a pin, if pins can part, and the engine's arrays that it needs."""
         return None, ()
+
+    def refuse_fidelity(self, level: str) -> None:
+        """Refuses a level of fidelity, as `BodyKind.refuse_fidelity`.
+
+        Raises:
+            ConfigError: The levels were not measured with this formulation.
+        """
+        raise ConfigError(
+            f"fidelity = {level!r} is for worms of rods, not for body.formulation.kind = {self.kind!r}: set "
+            "body.mesh.elements_per_side and clock.physics_timestep_s, or take the preset riddle2023-rods"
+        )
 
     def hastened(self, haste: float) -> Self:
         """Returns the section with its viscous coefficients divided."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments
@@ -13,55 +13,16 @@ LOG = "log"
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
 
 
-_CONTROLLERS: Mapping[str, tuple[str, ...]] = {
-    "sns": (
-        "controller.gate_time_constant_ms=80:900:log",
-        "controller.activation_slope_per_mV=0.1:2:log",
-        "sensor.tolerance_m=0.001:0.03:log",
-        "sensor.hysteresis_m=0:0.02",
-    ),
-    "adaptive": (
-        "controller.drive=0:1",
-        "controller.network.gate_time_constant_ms=80:900:log",
-        "sensor.tolerance_m=0.001:0.03:log",
-        "sensor.hysteresis_m=0:0.02",
-    ),
-    "sns-pressure": (
-        "controller.network.gate_time_constant_ms=80:900:log",
-        "controller.hold=0:2",
-        "controller.release=0:6",
-        "controller.landing=0:0.2",
-        "controller.exchange=0:2",
-        "sensor.tolerance_m=0.001:0.03:log",
-    ),
-    "sns-robust": ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log"),
-    "sine": ("controller.period_s=0.8:10:log", "controller.waves=1:3"),
-    "timed": (
-        "controller.rise_s=0.05:2:log",
-        "controller.hold_s=0.05:2:log",
-        "controller.fall_s=0.05:2:log",
-        "controller.interval_s=0.1:2:log",
-    ),
-    "shc": (
-        "controller.growth_rate_per_s=5:100:log",
-        "controller.bias_per_s=1e-5:0.1:log",
-        "controller.stretch_cue_m=0.005:0.08:log",
-    ),
-    "phase-chain": ("controller.slowing=0.3:10:log", "controller.waves=0.5:3", "controller.drive=3:5"),
-}
-"""What is varied unless the user says otherwise, by the controller's kind: its timing and its sensors' switching."""
-
-
 def default_variables(config: RunConfig) -> list[Variable]:
     """Returns the variables of a configuration's controller.
 
     Raises:
         ConfigError: The controller has no timing of its own to vary.
     """
-    kind = config.controller.kind
-    if kind not in _CONTROLLERS:
+    kind, tuned = config.controller.kind, config.controller.tuned
+    if not tuned:
         raise ConfigError(f"controller.kind = {kind!r} has no fields that are varied by default: {HOW} with --vary")
-    return [parse_variable(text, config) for text in _CONTROLLERS[kind]]
+    return [parse_variable(text, config) for text in tuned]
 
 
 def variables_of(texts: Sequence[str], config: RunConfig) -> list[Variable]:

@@ -12,6 +12,7 @@ from pydantic import Field
 from annelid.body.estimates import Finding
 from annelid.body.formulations import FormulationKind, PinReader
 from annelid.config.sections import NonNegative, Positive
+from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm
 
 if TYPE_CHECKING:
@@ -125,6 +126,15 @@ class Rods(FormulationKind):
         if self.pins == "shared":
             return None, ()
         return _gap_at_vertices(_pinned_bodies(model, geometry)), ("xpos",)
+
+    def refuse_fidelity(self, level: str) -> None:
+        """Refuses any level for separate pins, which are fitted to their mesh and step."""
+        if self.pins == "separate":
+            raise ConfigError(
+                f"fidelity = {level!r} is for rods that share their pins; those of body.formulation.pins = 'separate' "
+                "are fitted to their mesh and step: take the preset riddle2023-rods, or set "
+                "body.mesh.elements_per_side and clock.physics_timestep_s and fit the pins again"
+            )
 
     def hastened(self, haste: float) -> Self:
         """Returns the section with its viscous coefficient divided."""

@@ -97,12 +97,12 @@ def load_config(
         ConfigError: Unknown preset, arena, level or field, unreadable file, or a value out of its range.
     """
     tree = _read_tree(source)
+    if arena is not None:
+        tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     if fidelity is not None:
         find_level(fidelity)
         check_config(_overridden(tree, overrides or {})).body.refuse_fidelity(fidelity)
         tree = _overridden(tree, fidelity_changes(fidelity, _read_tree(HOME)))
-    if arena is not None:
-        tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     return check_config(_overridden(tree, overrides or {}))
 
 

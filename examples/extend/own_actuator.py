@@ -20,7 +20,7 @@ from pydantic import Field
 
 from annelid import load_config, simulate
 from annelid.body import ActuatorKind
-from annelid.config.sections import Positive
+from annelid.body.actuators import PerSegment
 
 if TYPE_CHECKING:
     from annelid.body.actuators import Slopes
@@ -33,11 +33,7 @@ class Winch(ActuatorKind):
 
     force_field: ClassVar[str] = "pull_N"
     kind: Literal["winch"] = "winch"
-    pull_N: Positive = Field(default=2.0, description="tension at full activation")
-
-    def forces(self, n_segments: int) -> list[float]:
-        """Returns the greatest force of every segment."""
-        return [self.pull_N] * n_segments
+    pull_N: PerSegment = Field(default=2.0, description="tension at full activation")
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
         """Doubts nothing."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -19,7 +19,6 @@ from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
 from annelid.morphology import Array
-from annelid.output import write_csv
 from annelid_studies.tables import tabulated, terminal_table
 
 if TYPE_CHECKING:
@@ -240,11 +239,6 @@ def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
         "slip ratio": lambda one: "-" if one.slip_ratio is None else f"{one.slip_ratio:.2f}",
     }
     return terminal_table(tabulated(readings, columns), "Pipes", n_words=2)
-
-
-def write_readings(readings: Sequence[Reading], path: Path) -> Path:
-    """Writes readings as CSV, one row each; returns the path."""
-    return write_csv(path, Reading.__slots__, map(astuple, readings))
 
 
 def pipes_picture(found: Passages, stem: str | Path) -> Path:

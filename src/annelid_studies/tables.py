@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import astuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from annelid.draw.markdown import Table
+from annelid.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
@@ -42,3 +45,20 @@ def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str =
     for row in table.rows:
         shown.add_row(*row)
     return shown
+
+
+def write_fields(kind: type[Any], readings: Iterable[Any], path: Path) -> Path:
+    """Writes readings as CSV, a column for every field and a row each.
+
+    Args:
+        kind: Their dataclass, with slots.
+        readings: What was read.
+        path: The file to write.
+
+    Returns:
+        The path.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    return write_csv(path, kind.__slots__, map(astuple, readings))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ from annelid.draw.style import panel_title, segment_colors
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
-from annelid.output import write_csv
 from annelid_studies.tables import tabulated, terminal_table
 
 if TYPE_CHECKING:
@@ -163,11 +162,6 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
         "radius (m)": lambda one: f"{one.radius_m:.2f}",
     }
     return terminal_table(tabulated(readings, columns), "Turning")
-
-
-def write_readings(readings: Sequence[Reading], path: Path) -> Path:
-    """Writes readings as CSV, one row each; returns the path."""
-    return write_csv(path, Reading.__slots__, map(astuple, readings))
 
 
 def turning_picture(turned: Turned, stem: str | Path) -> Path:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from annelid.analysis.passage import Passage, passage_through
 from annelid.analysis.track import Track
-from annelid.arena.kinds.pipe import Pipe, course_of
+from annelid.arena.kinds.pipe import Pipe
 from annelid.body import mesh_of
 from annelid.body.worm import Mesh
 
@@ -21,7 +21,7 @@ SPACING_M, RADIUS_M = 0.11, 0.12
 
 def laid(pipe: Pipe, time_s: np.ndarray, front_m: np.ndarray) -> Track:
     """A worm whose rings are circles about the centre line, evenly spaced behind a front that moves as it is told."""
-    course, angle = course_of(pipe), 2 * pi * np.arange(GEOMETRY.n_per_plane) / GEOMETRY.n_per_plane
+    course, angle = pipe.centre_line(), 2 * pi * np.arange(GEOMETRY.n_per_plane) / GEOMETRY.n_per_plane
     crossing = np.zeros((len(time_s), len(GEOMETRY.crossings_m), 3))
     for segment, ring in enumerate(GEOMETRY.rings):
         foot = course.at(front_m - segment * SPACING_M)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.kinds.pipe import Pipe, PipeWall, bore_of, course_of
+from annelid.arena.kinds.pipe import Pipe, PipeWall
 from annelid.arena.kinds.relief import Rough, Steps
 from annelid.arena.surface import surface_of
 from annelid.config import ArenaKind
@@ -48,7 +48,7 @@ def places(arena: ArenaKind, seed: int = 0, n: int = 400) -> Array:
     off = rng.uniform(-REACH_M, REACH_M, n)
     surface = surface_of(arena)
     if isinstance(arena, Pipe):
-        course, bore = course_of(arena), bore_of(arena)
+        course, bore = arena.centre_line(), arena.bore()
         foot = course.at(rng.uniform(-0.5, 4.0, n))
         across = np.cross(foot.tangent, rng.normal(size=(n, 3)))
         across /= np.linalg.norm(across, axis=-1, keepdims=True)
@@ -141,14 +141,14 @@ def test_a_taper_is_a_cone_between_its_rounded_ends() -> None:
 def test_an_hourglass_is_narrowest_midway_and_a_taper_stays_narrow() -> None:
     for profile, far in (("hourglass", 0.18), ("taper", 0.12)):
         pipe = Pipe(bore_m=0.18, profile=profile, narrowest_m=0.12, profile_start_m=0.2, profile_length_m=1.0)  # type: ignore[arg-type]
-        bore = bore_of(pipe)
+        bore = pipe.bore()
         arc = np.linspace(-1.0, 3.0, 4001)
         radius, slope = bore.at(arc)
         assert radius.min() == pytest.approx(0.12, abs=1e-12)
         assert radius[-1] == pytest.approx(far, abs=1e-12)
         assert radius[0] == pytest.approx(0.183, abs=1e-12)
         assert np.abs(np.gradient(radius, arc) - slope).max() < 0.02
-    waist = bore_of(Pipe(bore_m=0.18, profile="hourglass", narrowest_m=0.12, profile_start_m=0.2, profile_length_m=1.0))
+    waist = Pipe(bore_m=0.18, profile="hourglass", narrowest_m=0.12, profile_start_m=0.2, profile_length_m=1.0).bore()
     assert waist.at(np.array(0.7))[0] == pytest.approx(0.12)
     # The parabola of the authors: 0.18 - 0.06 (1 - (2 u - 1)^2), at a quarter of its length.
     assert waist.at(np.array(0.45))[0] == pytest.approx(0.18 - 0.06 * 0.75, abs=2e-3)
@@ -156,7 +156,8 @@ def test_an_hourglass_is_narrowest_midway_and_a_taper_stays_narrow() -> None:
 
 @pytest.mark.parametrize("name", ["bend", "s", "helix"])
 def test_a_centre_line_is_smooth_and_its_arc_length_is_its_length(name: str) -> None:
-    course = course_of(ARENAS[name])  # type: ignore[arg-type]
+    course = ARENAS[name].centre_line()
+    assert course is not None
     arc = np.linspace(-0.5, 6.0, 20001)
     foot = course.at(arc)
     steps = np.linalg.norm(np.diff(foot.point_m, axis=0), axis=-1)
@@ -167,15 +168,15 @@ def test_a_centre_line_is_smooth_and_its_arc_length_is_its_length(name: str) -> 
 
 
 def test_pipes_turn_to_the_side_that_they_say() -> None:
-    end = {turn: course_of(Pipe(course="bend", turn_deg=turn)).at(np.array(2.0)).point_m for turn in (90.0, -90.0)}
+    end = {turn: Pipe(course="bend", turn_deg=turn).centre_line().at(np.array(2.0)).point_m for turn in (90.0, -90.0)}
     assert end[90.0][1] < -0.5
     assert end[-90.0][1] > 0.5
-    back = course_of(Pipe(course="bend", turn_deg=180.0, radius_m=0.3)).at(np.array(2.0))
+    back = Pipe(course="bend", turn_deg=180.0, radius_m=0.3).centre_line().at(np.array(2.0))
     assert back.tangent == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)
     assert back.point_m[1] == pytest.approx(-0.6)
-    parallel = course_of(Pipe(course="s", turn_deg=60.0)).at(np.array(3.0))
+    parallel = Pipe(course="s", turn_deg=60.0).centre_line().at(np.array(3.0))
     assert parallel.tangent == pytest.approx([-1.0, 0.0, 0.0], abs=1e-12)
-    climb = course_of(Pipe(course="helix", radius_m=0.6, turn_deg=720.0))
+    climb = Pipe(course="helix", radius_m=0.6, turn_deg=720.0).centre_line()
     heights = climb.at(np.array([0.2, 0.2 + 2 * 2 * pi * sqrt(0.6**2 + (0.5 / 2 / pi) ** 2)])).point_m[:, 2]
     lean = np.arctan(0.5 / (2 * pi * 0.6))
     assert heights[1] - heights[0] == pytest.approx(2 * 0.5 * np.cos(lean))

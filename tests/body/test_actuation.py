@@ -177,7 +177,7 @@ def test_a_worm_feels_the_springs_that_have_sensors() -> None:
     [
         ({"body.rings.peak_force_N": 20.0}, "body.rings.peak_force_N"),
         ({"body.rings.force_limit_N": [1.0, 2.0]}, "2 values for 4 segments"),
-        ({"body.rings.force_limit_N": []}, "one number for all servos"),
+        ({"body.rings.force_limit_N": []}, "one number for all segments or one for each"),
         ({"body.rings.speed_limit_m_per_s": 0.0}, "body.rings.speed_limit_m_per_s = 0"),
         ({"body.rings.length_range_m": [0.96, 0.62]}, "lower bound below its upper bound"),
         ({"body.rings.kind": "rope"}, "body.rings.kind = 'rope'"),
@@ -190,9 +190,10 @@ def test_what_a_servo_cannot_be_is_refused_by_the_field_s_name(changes: dict[str
 
 
 @pytest.mark.parametrize(
-    ("forces", "words"), [([31.0, 16.0], "2 values for 3 segments"), ([], "one number for all muscles")]
+    ("forces", "words"),
+    [([31.0, 16.0], "2 values for 3 segments"), ([], "one number for all segments")],
 )
-def test_muscles_have_one_peak_force_or_one_a_segment(forces: list[float], words: str) -> None:
+def test_muscles_have_one_peak_force_or_one_per_segment(forces: list[float], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         load_config("riddle2023-rods", {"body.rings.peak_force_N": forces})
 

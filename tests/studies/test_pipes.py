@@ -26,8 +26,8 @@ from annelid_studies.pipes import (
     pipes_picture,
     pipes_table,
     trials,
-    write_readings,
 )
+from annelid_studies.tables import write_fields
 
 
 def reading(**changes: object) -> Reading:
@@ -80,7 +80,7 @@ def test_quick_trials_are_some_of_all() -> None:
 
 def test_readings_are_written_and_told(tmp_path: Path) -> None:
     readings = [reading(), reading(arena="taper", radius_m=0.0, passed=False, in_order=None, work_J_per_m=None)]
-    with write_readings(readings, tmp_path / "pipes.csv").open(newline="", encoding="utf-8") as file:
+    with write_fields(Reading, readings, tmp_path / "pipes.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["passed"] for row in rows] == ["True", "False"]
     assert rows[0]["command"] == "annelid run x"

@@ -29,11 +29,6 @@ def contact_options(arena: ArenaKind) -> dict[str, list[float]]:
     }
 
 
-def has_moving_planes(arena: ArenaKind) -> bool:
-    """Tells whether the skin feels the ground through planes that move with it, not through a plane of the engine."""
-    return not arena.is_plane or arena.has_setae
-
-
 def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
     """Returns the geoms of the skin that can touch the ground, in the order of the spec, each with a name."""
     skin = [geom for geom in spec.geoms if geom.conaffinity and not geom.contype]

@@ -7,7 +7,7 @@ import warnings
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import add_moving_planes, has_moving_planes
+from annelid.arena.contact import add_moving_planes
 from annelid.arena.gravity import gravity_of
 from annelid.arena.scenery import add_scenery, add_walls
 from annelid.body.actuation import add_ring_actuators, add_springs
@@ -69,7 +69,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
-    laid = for_plant and has_moving_planes(arena)
+    laid = for_plant and arena.has_moving_planes
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
@@ -79,7 +79,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{arena.friction_cone.upper()}")
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
-    body.formulation.add(spec, geometry, body, arena, for_plant=for_plant, vertices_touch=laid)
+    body.formulation.add(spec, geometry, body, arena, for_plant=for_plant)
     add_springs(spec, geometry, body.springs)
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:

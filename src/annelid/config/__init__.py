@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from annelid.config.checking import check_config, field_paths, field_value, fields_of, unit_of, whole_path
     from annelid.config.cluster import Cluster, find_cluster
     from annelid.config.fidelity import LEVELS, Fidelity, find_level
-    from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, kind_named, kinds_of
+    from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, kinds_of
     from annelid.config.loading import (
         arena_names,
         arena_summary,
@@ -42,7 +42,7 @@ _HOME = {
     "checking": ("check_config", "field_paths", "field_value", "fields_of", "unit_of", "whole_path"),
     "cluster": ("Cluster", "find_cluster"),
     "fidelity": ("LEVELS", "Fidelity", "find_level"),
-    "kinds": ("BodyKind", "ControllerKind", "Knob", "TurningKind", "kind_named", "kinds_of"),
+    "kinds": ("BodyKind", "ControllerKind", "Knob", "TurningKind", "kinds_of"),
     "loading": (
         "arena_names",
         "arena_summary",
@@ -96,7 +96,6 @@ __all__ = [
     "fields_of",
     "find_cluster",
     "find_level",
-    "kind_named",
     "kinds_of",
     "load_config",
     "load_study",

@@ -68,6 +68,11 @@ class ArenaKind(Kind):
         return self.backward_friction not in (None, self.friction)
 
     @property
+    def has_moving_planes(self) -> bool:
+        """Whether the skin feels the ground through planes that move with it, not through a plane of the engine."""
+        return not self.is_plane or self.has_setae
+
+    @property
     def is_plane(self) -> bool:
         """Whether its ground is one plane."""
         return False

@@ -121,8 +121,8 @@ class ControllerKind(Kind):
     tuned: ClassVar[tuple[str, ...]] = ()
 
     @property
-    def laid_down(self) -> tuple[Contraction, ...]:
-        """The contractions that are laid down beforehand, none for a controller that makes them itself."""
+    def scheduled(self) -> tuple[Contraction, ...]:
+        """The contractions that are scheduled beforehand, none for a controller that makes them itself."""
         return ()
 
     @abstractmethod
@@ -250,15 +250,6 @@ def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
     return {name: kind for name, kind in kinds if issubclass(kind, family)}
 
 
-def kind_named(family: type[Family], name: str) -> type[Family]:
-    """Returns a kind by its name.
-
-    Raises:
-        ConfigError: The family has no kind of that name; the sentence suggests the nearest.
-    """
-    return family.registry.find(name)
-
-
 def every_kind() -> list[type[Kind]]:
     """Returns the kinds of all families."""
     # The families of arenas and of the body's parts are defined beside them.
@@ -282,7 +273,7 @@ def class_named(name: str) -> type[Kind] | None:
 
 def default_of(family: type[Family]) -> Family:
     """Returns the kind of a family that is meant where none is named, with the defaults of all its fields."""
-    return kind_named(family, family.default).model_validate({})
+    return family.registry.find(family.default).model_validate({})
 
 
 class Choice:

@@ -48,7 +48,7 @@ class Program(ControllerKind):
     ramp_s: NonNegative = Field(default=0.0, description="time that a rise or fall between 0 and the full level takes")
 
     @property
-    def laid_down(self) -> tuple[Contraction, ...]:
+    def scheduled(self) -> tuple[Contraction, ...]:
         """As `contractions`."""
         return self.contractions
 

@@ -104,7 +104,7 @@ def read_outcome(path: Path, reader: str) -> Outcome:
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:
-    contractions, data = run.config.controller.laid_down, run.data
+    contractions, data = run.config.controller.scheduled, run.data
     if not contractions or not data.sizes.get("time"):
         return ()
     times = data["time"].values

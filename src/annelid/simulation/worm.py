@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.contact import has_moving_planes
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.body.worm import WormBody
@@ -108,7 +107,7 @@ class Worm(ABC):
         self._surface = surface_of(config.arena)
         in_pipe = config.arena.is_closed
         self._height_words = "distance of a crossing from the pipe's wall" if in_pipe else "height of a crossing"
-        moving = has_moving_planes(config.arena)
+        moving = config.arena.has_moving_planes
         self.ground = MovingGround(anatomy.model, anatomy.geometry, config.arena) if moving else None
         body = config.body
         assert isinstance(body, WormBody)

@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from annelid.arena.course import AHEAD, UP, Bore, Course, Curve, Straight
 from annelid.arena.kinds.floor import refuse_heading
 from annelid.arena.shapes import AROUND, ENTRY_SHOWN_M, EXIT_SHOWN_M, PIPE_GRAIN_M, Shape, grid_faces
-from annelid.arena.surface import Implicit, Level, Surface, lengths
+from annelid.arena.surface import Implicit, Level, lengths
 from annelid.config.arena import ArenaKind
 from annelid.config.sections import NonNegative, Positive
 from annelid.protocols import Array
@@ -107,21 +107,43 @@ class Pipe(ArenaKind):
             )
         refuse_heading(config, f"arena.kind = {self.kind!r}")
 
-    def ground(self) -> Surface:
+    def ground(self) -> PipeWall:
         """Returns the inside of the wall."""
-        return PipeWall(course_of(self), bore_of(self))
+        return PipeWall(self.centre_line(), self.bore())
 
     def centre_line(self) -> Course:
-        """Returns `course_of`."""
-        return course_of(self)
+        """Returns the centre line in the coordinates of the worm's model; arc lengths count from the worm's front."""
+        start = self.bore_m * UP
+        if self.course == "straight":
+            return Course((Straight(start, AHEAD, -inf, inf),), ())
+        turn = radians(self.turn_deg)
+        rise = self.pitch_m / (2 * pi) if self.course == "helix" else 0.0
+        curve = _curve(start + self.straight_m * AHEAD, AHEAD, UP, self.radius_m, rise, turn, self.straight_m)
+        pieces: list[Straight | Curve] = [Straight(start, AHEAD, -inf, self.straight_m), curve]
+        if self.course == "s":
+            end = curve.at(np.array(curve.last_m))
+            pieces.append(_curve(end.point_m, end.tangent, UP, self.radius_m, 0.0, -turn, curve.last_m))
+        last = pieces[-1].at(np.array(pieces[-1].last_m))
+        pieces.append(Straight(last.point_m, last.tangent, pieces[-1].last_m, inf))
+        return Course(tuple(pieces), tuple(piece.last_m for piece in pieces[:-1]))
 
     def bore(self) -> Bore:
-        """Returns `bore_of`."""
-        return bore_of(self)
+        """Returns the bore: wider at the entry by the clearance, then as the profile says."""
+        parts = [_ramp(0.0, ENTRY_RAMP_M, -self.entry_clearance_m)]
+        change = self.narrowest_m - self.bore_m
+        if self.profile == "taper":
+            parts.append(_ramp(self.profile_start_m, self.profile_length_m, change))
+        if self.profile == "hourglass":
+            parts.append(_waist(self.profile_start_m, self.profile_length_m, change))
+        arc = np.unique(np.concatenate([knots for knots, _ in parts]))
+        slope = sum((np.interp(arc, *part, left=0.0, right=0.0) for part in parts), np.zeros(len(arc)))
+        rises = np.diff(arc) * (slope[1:] + slope[:-1]) / 2
+        radius = self.bore_m + self.entry_clearance_m + np.concatenate([[0.0], np.cumsum(rises)])
+        return Bore(arc, slope, radius)
 
     def reach_m(self) -> tuple[float, float]:
         """Returns where the pipe bends or changes its bore; both 0 for a plain straight one."""
-        joints = course_of(self).joints_m
+        joints = self.centre_line().joints_m
         parts = [(joints[0], joints[-1])] if joints else []
         if self.profile != "even":
             parts.append((self.profile_start_m, self.profile_start_m + self.profile_length_m))
@@ -129,28 +151,11 @@ class Pipe(ArenaKind):
 
     def shape(self, length_m: float) -> Shape:
         """Returns the tube to be drawn."""
-        return _tube(PipeWall(course_of(self), bore_of(self)), length_m)
+        return _tube(self.ground(), length_m)
 
     def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
         """Adds flat panels that are tangent to the wall in their middles."""
         add_pipe_panels(spec, self, length_m)
-
-
-def course_of(pipe: Pipe) -> Course:
-    """Returns a pipe's centre line in the coordinates of the worm's model; arc lengths count from the worm's front."""
-    start = pipe.bore_m * UP
-    if pipe.course == "straight":
-        return Course((Straight(start, AHEAD, -inf, inf),), ())
-    turn = radians(pipe.turn_deg)
-    rise = pipe.pitch_m / (2 * pi) if pipe.course == "helix" else 0.0
-    curve = _curve(start + pipe.straight_m * AHEAD, AHEAD, UP, pipe.radius_m, rise, turn, pipe.straight_m)
-    pieces: list[Straight | Curve] = [Straight(start, AHEAD, -inf, pipe.straight_m), curve]
-    if pipe.course == "s":
-        end = curve.at(np.array(curve.last_m))
-        pieces.append(_curve(end.point_m, end.tangent, UP, pipe.radius_m, 0.0, -turn, curve.last_m))
-    last = pieces[-1].at(np.array(pieces[-1].last_m))
-    pieces.append(Straight(last.point_m, last.tangent, pieces[-1].last_m, inf))
-    return Course(tuple(pieces), tuple(piece.last_m for piece in pieces[:-1]))
 
 
 def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, turn_rad: float, arc_m: float) -> Curve:
@@ -159,21 +164,6 @@ def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, 
     lean = atan2(rise, radius)
     onwards, axis = cos(lean) * tangent - sin(lean) * up, sin(lean) * tangent + cos(lean) * up
     return Curve(start - radius * outwards, outwards, onwards, axis, radius, rise, abs(turn_rad), arc_m)
-
-
-def bore_of(pipe: Pipe) -> Bore:
-    """Returns a pipe's bore: wider at the entry by the clearance, then as the profile says."""
-    parts = [_ramp(0.0, ENTRY_RAMP_M, -pipe.entry_clearance_m)]
-    change = pipe.narrowest_m - pipe.bore_m
-    if pipe.profile == "taper":
-        parts.append(_ramp(pipe.profile_start_m, pipe.profile_length_m, change))
-    if pipe.profile == "hourglass":
-        parts.append(_waist(pipe.profile_start_m, pipe.profile_length_m, change))
-    arc = np.unique(np.concatenate([knots for knots, _ in parts]))
-    slope = sum((np.interp(arc, *part, left=0.0, right=0.0) for part in parts), np.zeros(len(arc)))
-    rises = np.diff(arc) * (slope[1:] + slope[:-1]) / 2
-    radius = pipe.bore_m + pipe.entry_clearance_m + np.concatenate([[0.0], np.cumsum(rises)])
-    return Bore(arc, slope, radius)
 
 
 def _ramp(start: float, length: float, change: float) -> tuple[Array, Array]:
@@ -257,7 +247,7 @@ def add_pipe_panels(spec: mujoco.MjSpec, pipe: Pipe, length_m: float, around: in
     """
     from annelid.arena.contact import add_box
 
-    wall = PipeWall(course_of(pipe), bore_of(pipe))
+    wall = pipe.ground()
     first, last = -(length_m + ENTRY_SHOWN_M), last_change_m(wall.course, wall.bore) + EXIT_SHOWN_M
     n_rings = int((last - first) / PANEL_LENGTH_M) + 1
     arc = first + (np.arange(n_rings) + 0.5) * (last - first) / n_rings

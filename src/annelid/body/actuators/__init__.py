@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from annelid.config.kinds import Kind
-from annelid.config.sections import Range
+from annelid.config.sections import Positive, Range
 from annelid.morphology import Array
 from annelid.registry import Registry
 
@@ -20,6 +20,16 @@ if TYPE_CHECKING:
     from annelid.body.actuators.muscle import Rings
     from annelid.body.estimates import Finding
     from annelid.body.worm import WormBody
+
+
+def _not_empty(value: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    if value == ():
+        raise ValueError("needs one number for all segments or one for each")
+    return value
+
+
+PerSegment = Annotated[Positive | tuple[Positive, ...], AfterValidator(_not_empty)]
+"""One number for all segments, or one for each."""
 
 
 class Slopes(Protocol):
@@ -44,7 +54,7 @@ class ActuatorKind(Kind):
     """Base of the ring actuators' sections: how they lie, between which lengths they work, and what is asked of them.
 
     Attributes:
-        force_field: The field of its greatest force.
+        force_field: The field of its greatest force, of type `PerSegment`.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("body.rings.kind", "annelid.body.actuators")
@@ -77,9 +87,10 @@ class ActuatorKind(Kind):
         low, high = self.length_range_m
         return [(float(low), float(high))] * n_segments  # type: ignore[arg-type]
 
-    @abstractmethod
     def forces(self, n_segments: int) -> list[float]:
         """Returns the greatest force of every segment's actuators, N."""
+        value = getattr(self, self.force_field)
+        return list(value) if isinstance(value, tuple) else [value] * n_segments
 
     @abstractmethod
     def findings(self, body: WormBody) -> Iterator[Finding]:
@@ -127,19 +138,3 @@ class ActuatorKind(Kind):
             Shape ``(n_muscles,)``; the activation itself unless the kind says otherwise.
         """
         return activation
-
-
-def not_empty(value: Any, actuators: str) -> Any:
-    """Returns a field that holds one number or one a segment, unless it holds none.
-
-    Raises:
-        ValueError: It is empty.
-    """
-    if value == ():
-        raise ValueError(f"needs one number for all {actuators} or one a segment")
-    return value
-
-
-def one_a_segment(value: float | tuple[float, ...], n_segments: int) -> list[float]:
-    """Returns a list of one number a segment."""
-    return list(value) if isinstance(value, tuple) else [value] * n_segments

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import hypot, sin
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from annelid.body.actuators import ActuatorKind, Slopes, not_empty, one_a_segment
+from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
 from annelid.body.estimates import (
     COLLAPSED,
     SHRUNK,
@@ -46,7 +46,7 @@ class Rings(ActuatorKind):
 
     force_field: ClassVar[str] = "peak_force_N"
     kind: Literal["muscle"] = "muscle"
-    peak_force_N: Positive | tuple[Positive, ...] = Field(
+    peak_force_N: PerSegment = Field(
         default=117.57, description="isometric force at the optimal length, F0, one number for all or one a segment"
     )
     minimum_length: Annotated[float, Field(gt=0, lt=1)] = Field(
@@ -61,15 +61,6 @@ class Rings(ActuatorKind):
     activation_dynamics: bool = Field(
         default=False, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
     )
-
-    @field_validator("peak_force_N")
-    @classmethod
-    def _given(cls, value: Any) -> Any:
-        return not_empty(value, "muscles")
-
-    def forces(self, n_segments: int) -> list[float]:
-        """Returns the peak force of every segment's muscles, N."""
-        return one_a_segment(self.peak_force_N, n_segments)
 
     @property
     def muscle(self) -> Rings:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from annelid.body.actuators import ActuatorKind, Slopes, not_empty, one_a_segment
+from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
 from annelid.body.estimates import (
     COLLAPSED,
     SHRUNK,
@@ -46,21 +46,12 @@ class ServoRings(ActuatorKind):
         description="shortest and longest cable of a whole ring (half-rings have half of it each), one pair for all or "
         "one pair a segment",
     )
-    force_limit_N: Positive | tuple[Positive, ...] = Field(
+    force_limit_N: PerSegment = Field(
         default=13.0, description="tension at which a servo stalls, one number for all or one a segment"
     )
     speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
     stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
     damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
-
-    @field_validator("force_limit_N")
-    @classmethod
-    def _given(cls, value: Any) -> Any:
-        return not_empty(value, "servos")
-
-    def forces(self, n_segments: int) -> list[float]:
-        """Returns the force limit of every segment's servos, N."""
-        return one_a_segment(self.force_limit_N, n_segments)
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
         """Holds the cables' range against the ring at rest, and their force against the mesh."""

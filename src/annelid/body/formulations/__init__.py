@@ -63,14 +63,7 @@ class FormulationKind(Kind):
 
     @abstractmethod
     def add(
-        self,
-        spec: mujoco.MjSpec,
-        geometry: MeshGeometry,
-        body: WormBody,
-        arena: ArenaKind,
-        *,
-        for_plant: bool,
-        vertices_touch: bool,
+        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
         """Adds the mesh with a site at every crossing, and the solver settings that it needs.
 
@@ -80,7 +73,6 @@ class FormulationKind(Kind):
             body: Materials and pins.
             arena: Contact settings, which the strands share with the floor.
             for_plant: For a plant of annelid, which prepares every step.
-            vertices_touch: The ground is felt by a sphere at each vertex.
         """
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:

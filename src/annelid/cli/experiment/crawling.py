@@ -144,11 +144,12 @@ def turning_command(
     annelid experiment turning --quick
     annelid experiment turning -o turning
     """
-    from annelid_studies.turning import MODULATIONS, QUICK, turning, turning_picture, turning_table, write_readings
+    from annelid_studies.tables import write_fields
+    from annelid_studies.turning import MODULATIONS, QUICK, Reading, turning, turning_picture, turning_table
 
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)
-    path = write_readings(turned.readings, output / "turning.csv")
+    path = write_fields(Reading, turned.readings, output / "turning.csv")
     written = path, turning_picture(turned, path.with_suffix(""))
     print_results(written, turning_table(turned.readings), quiet=quiet)
 
@@ -176,10 +177,11 @@ def pipes_command(
     annelid experiment pipes --quick
     annelid experiment pipes -o pipes
     """
-    from annelid_studies.pipes import pass_pipes, pipes_picture, pipes_table, trials, write_readings
+    from annelid_studies.pipes import Reading, pass_pipes, pipes_picture, pipes_table, trials
+    from annelid_studies.tables import write_fields
 
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
         found = pass_pipes(store, trials(quick), jobs=jobs, progress=progress)
-    path = write_readings(found.readings, output / "pipes.csv")
+    path = write_fields(Reading, found.readings, output / "pipes.csv")
     written = path, pipes_picture(found, path.with_suffix(""))
     print_results(written, pipes_table(found.readings), quiet=quiet)

@@ -1,4 +1,4 @@
-"""The paper's figures drawn anew, one module each."""
+"""Figures of runs and of what many runs tell, one module each."""
 
 from __future__ import annotations
 

@@ -77,19 +77,13 @@ class Chain(FormulationKind):
             yield softened("body.formulation.pin_time_constant_s", softest, "pins", step)
 
     def add(
-        self,
-        spec: mujoco.MjSpec,
-        geometry: MeshGeometry,
-        body: WormBody,
-        arena: ArenaKind,
-        *,
-        for_plant: bool,
-        vertices_touch: bool,
+        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
         """Adds the mesh as chains of capsules, which need no preparation before a step."""
         from annelid.body.formulations.chain.capsules import add_chains
 
-        add_chains(spec, geometry, body, self, arena, vertices_touch=vertices_touch)
+        # Planes that move with the skin find spheres, not capsules.
+        add_chains(spec, geometry, body, self, arena, vertices_touch=for_plant and arena.has_moving_planes)
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
         """Reads the residual of the engine's connections, as `FormulationKind.pin_reader`."""

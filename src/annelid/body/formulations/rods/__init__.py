@@ -107,14 +107,7 @@ class Rods(FormulationKind):
             )
 
     def add(
-        self,
-        spec: mujoco.MjSpec,
-        geometry: MeshGeometry,
-        body: WormBody,
-        arena: ArenaKind,
-        *,
-        for_plant: bool,
-        vertices_touch: bool,
+        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
         """Adds the mesh as a net of rods, whose vertices touch in any case."""
         from annelid.body.formulations.rods.net import add_rods

@@ -212,10 +212,6 @@ class BodyKind(Kind):
         """Distance of the walls that a planar worm crawls between; None where there are none."""
         return None
 
-    def published_period_s(self, config: RunConfig) -> float | None:
-        """Returns the period that was published for this very worm, s; None where none was."""
-        return None
-
     if TYPE_CHECKING:
 
         @property

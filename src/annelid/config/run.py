@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from importlib import resources
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from annelid.config.arena import ArenaKind
 from annelid.config.kinds import BodyKind, Choice, ControllerKind, TurningKind, default_of, kinds_of
 from annelid.config.sections import Line, NonNegative, Positive, Section, Seed
 from annelid.config.sensor import StretchSensor
+from annelid.errors import listed
+from annelid.textfiles import parse_toml
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
 MOST_SAMPLES = 10_000_000
@@ -19,6 +23,19 @@ MOST_SAMPLES = 10_000_000
 def _is_multiple(large: float, small: float) -> bool:
     ratio = large / small
     return round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-6 * ratio
+
+
+@cache
+def published_worms() -> Mapping[str, list[dict[str, Any]]]:
+    """Returns what ``data/published.toml`` has under each name: worms, each with the fields given and its numbers."""
+    file = resources.files("annelid") / "data" / "published.toml"
+    return parse_toml(file.read_text(encoding="utf-8"), file.name)
+
+
+def _known(name: str) -> str:
+    if name not in published_worms():
+        raise ValueError(f"must be one of {listed(sorted(published_worms()))}")
+    return name
 
 
 class Clock(Section):
@@ -69,6 +86,9 @@ class RunConfig(Section):
         default="custom", max_length=200, description="name of the preset or of the user's own configuration"
     )
     summary: Line = Field(default="", max_length=1000, description="one line for the list of presets")
+    published: Annotated[str, AfterValidator(_known)] | None = Field(
+        default=None, description="published numbers that its runs are compared with, where they are of such a worm"
+    )
     duration_s: Positive = Field(default=5.0, description="simulated time")
     seed: Seed = Field(default=0, description="seed of every random draw")
     body: Annotated[BodyKind, Choice()] = Field(default_factory=lambda: default_of(BodyKind))

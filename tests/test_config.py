@@ -102,7 +102,7 @@ def test_the_whole_of_a_file_of_the_user_s_names_what_is_inherited(tmp_path: Pat
 
 def test_published_numbers_are_named_not_found_by_a_path() -> None:
     for name in ("../data/riddle2023.json", "riddle2023.toml", "", "riddle2023-rods"):
-        with pytest.raises(ConfigError, match="published = .*: must be one of riddle2022, riddle2023, wang"):
+        with pytest.raises(ConfigError, match=r"published = .*: must be one of riddle2022, riddle2023, wang"):
             load_config("crawler", {"published": name})
     assert load_config("riddle2023", {"published": "none"}).published is None
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config.arena import SHARED
-from annelid.config.checking import check_config, whole_path
-from annelid.config.fidelity import HOME, fidelity_changes, find_level
+from annelid.config.checking import check_config, field_value, whole_path
+from annelid.config.fidelity import HOME, RESOLUTION, find_level
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
@@ -46,9 +46,9 @@ def preset_text(source: str | Path) -> str:
     defaults = load_config(source).model_dump(exclude_none=True)
     headings: list[str] = []
     tree: dict[str, Any] = {}
-    *ancestors, own = _layers(source)
-    for name, fields in (*ancestors, own):
-        origin, heading = "" if name == own[0] else name, []
+    layers = _layers(source)
+    for depth, (name, fields) in enumerate(layers, start=1):
+        origin, heading = name if depth < len(layers) else "", []
         if name in preset_names():
             text = _text("presets", "preset", name)
             fields = tomlkit.parse(text)
@@ -124,9 +124,10 @@ def load_config(
     if arena is not None:
         tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     if fidelity is not None:
-        find_level(fidelity)
+        level = find_level(fidelity)
         check_config(_overridden(tree, overrides or {})).body.refuse_fidelity(fidelity)
-        tree = _overridden(tree, fidelity_changes(fidelity, _read_tree(HOME)))
+        home = check_config(_read_tree(HOME))
+        tree = _overridden(tree, {path: field_value(home, path) for path in RESOLUTION} | dict(level.changes))
     return check_config(_overridden(tree, overrides or {}))
 
 

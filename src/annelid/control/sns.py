@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from annelid.config.kinds import ControllerKind
+from annelid.config.run import StretchSensor
 from annelid.config.sections import NonNegative, Positive
-from annelid.config.sensor import StretchSensor
 from annelid.control.neural import NeuralController, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
 from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis_network

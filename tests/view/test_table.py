@@ -89,10 +89,8 @@ def test_a_worm_of_another_name_is_compared_with_the_nearest_preset(tmp_path: Pa
     mine = tmp_path / "mine.toml"
     mine.write_text('extends = "riddle2023-fast"\nseed = 3\n', encoding="utf-8")
     assert closing_sentence(formulation(), load_config(mine)).startswith("mine reproduces order")
-    changed = load_config(mine, {"arena.friction": 0.3})
-    assert closing_sentence(formulation(), changed).startswith(
-        "this run differs from riddle2023-fast in arena.friction:"
-    )
+    changed = closing_sentence(formulation(), load_config(mine, {"arena.friction": 0.3}))
+    assert changed.startswith("this run differs from riddle2023-fast in arena.friction:")
 
 
 def test_what_only_records_or_names_is_no_change() -> None:

@@ -47,7 +47,7 @@ class Published:
 def published(config: RunConfig) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
-    These are the numbers that its field ``published`` names, in ``annelid/data/published.toml``, where the controller is
+    These are the numbers that its field ``published`` names, in ``data/published.toml``, where the controller is
     the paper's and the fields that the numbers are given for have those values.
     """
     if config.published is None or paper_controller(config.controller) is None:

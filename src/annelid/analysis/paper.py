@@ -25,8 +25,8 @@ PERIOD_WITHIN, ELONGATION_WITHIN = 0.01, 0.05
 _IN_ITS_RUN = ("period_s", "elongation_mean_max_m", "middle_deficit_mean", "ring_length_min_m", "pin_gap_max_m")
 SPREAD = ("elongation_least_pp_m", "elongation_most_pp_m")
 """The range over a segment's sensors, in which one published sensor may lie."""
-# What says how a run is recorded and guarded, and what it is called.
-_BESIDE_THE_WORM = ("name", "summary", "published", "record.", "guard.")
+# What says how a run is recorded and guarded.
+_BESIDE_THE_WORM = ("record.", "guard.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,8 @@ Python's ``{expression:format}`` for numbers; published numbers are written out:
 
     <!-- end of table -->
 
-The line below ``for each`` is repeated for every record, with the record's columns as names. In any other line a record
-goes by the text of its first column: ``{crawler.speed_m_per_s:.3f}``. Characters that no name may have are underscores:
+A record goes by the text of its first column: ``{crawler.speed_m_per_s:.3f}``. The line below ``for each`` is repeated
+for every record, with its columns as names. Characters that no name may have are underscores:
 ``arena.friction`` is ``arena_friction``. ``results/bench.json:cases`` takes records from within a JSON file; a whole
 one is a record that goes by the file's name. Columns ``speed_1``, ``speed_2`` .. are together ``speed``, an array whose
 numbers are written side by side. True and false read yes and no, what is missing a dash. A table whose file
@@ -110,11 +110,11 @@ def records_of(file: str, docs: Path) -> Iterator[dict[str, Any]]:
         rows = [{"name": label, **row} for label, row in rows.items()]
     for row in rows:
         record = {identifier(column): read(value) for column, value in flat(row)}
-        lists: dict[str, list[float]] = {}
-        for column, value in record.items():
-            if (numbered := re.fullmatch(r"(.+)_\d+", column)) and isinstance(value, int | float):
-                lists.setdefault(numbered[1], []).append(value)
-        yield {name: np.array(values).view(PerSegment) for name, values in lists.items()} | record
+        numbered: dict[str, list[float]] = {}
+        for column, number in record.items():
+            if (found := re.fullmatch(r"(.+)_\d+", column)) and isinstance(number, int | float):
+                numbered.setdefault(found[1], []).append(number)
+        yield record | {name: np.array(numbers).view(PerSegment) for name, numbers in numbered.items()}
 
 
 def identifier(text: str) -> str:
@@ -149,7 +149,7 @@ def table(template: Sequence[str], records: Sequence[Mapping[str, Any]]) -> str:
     lines, names = [], [by_label]
     for line in template:
         if each := EACH.fullmatch(line):
-            names = [record for record in records if evaluated(each["condition"] or "True", record)]
+            names = [by_label | record for record in records if evaluated(each["condition"] or "True", record)]
         else:
             lines += [re.sub(r"\bnan\b", "–", evaluated(f"rf'''{line}'''", each_of)) for each_of in names]
             names = [by_label]
@@ -164,16 +164,16 @@ def evaluated(expression: str, names: Mapping[str, Any]) -> Any:
         raise FillError(f"{expression}: {error}") from error
 
 
-def main(check: bool) -> int:
+def main(check: bool, root: Path = ROOT) -> int:
     """Fills or checks README and all pages, and names what is waited for."""
-    differing = False
-    for path in (ROOT / "README.md", *sorted(DOCS.rglob("*.md"))):
-        page, name = path.read_text(encoding="utf-8"), path.relative_to(ROOT)
+    differing, docs = False, root / "docs"
+    for path in (root / "README.md", *sorted(docs.rglob("*.md"))):
+        page, name = path.read_text(encoding="utf-8"), path.relative_to(root)
         try:
-            new = filled(page)
+            new = filled(page, docs)
         except FillError as error:
             raise SystemExit(f"{name}: {error}") from error
-        for file, command in waiting(page).items():
+        for file, command in waiting(page, docs).items():
             print(f"{name}: waits for docs/{file}, made by: {command}")
         if new != page:
             differing = True

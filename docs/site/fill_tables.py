@@ -46,7 +46,7 @@ MARKED = re.compile(
     rf"(?:[^<]|<(?!!--))*{END}",
     re.MULTILINE,
 )
-FILE = re.compile(r"results/(?P<stem>\w+)\.(?:csv|json)(?::(?P<key>\w+))?")
+FILE = re.compile(r"results/\w+\.(?:csv|json:\w+|json)")
 EACH = re.compile(r"for each(?: if (?P<condition>.+))?:")
 
 

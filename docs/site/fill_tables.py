@@ -54,7 +54,7 @@ class PerSegment(np.ndarray):
     """Numbers of all segments, which stand side by side in a table."""
 
     def __format__(self, form: str) -> str:
-        return " / ".join(format(float(number), form) for number in self.ravel())
+        return " / ".join(format(float(number), form) for number in self.ravel()) or "–"
 
 
 class FillError(Exception):
@@ -113,7 +113,7 @@ def records_of(file: str, docs: Path) -> Iterator[dict[str, Any]]:
         numbered: dict[str, list[float]] = {}
         for column, number in record.items():
             if (found := re.fullmatch(r"(.+)_\d+", column)) and isinstance(number, int | float):
-                numbered.setdefault(found[1], []).append(number)
+                numbered.setdefault(found[1], []).extend([] if math.isnan(number) else [number])
         yield record | {name: np.array(numbers).view(PerSegment) for name, numbers in numbered.items()}
 
 

@@ -54,7 +54,7 @@ class PerSegment(np.ndarray):
     """Numbers of all segments, which stand side by side in a table."""
 
     def __format__(self, form: str) -> str:
-        return " / ".join(format(float(number), form) for number in self.ravel()) or "–"
+        return " / ".join(format(float(number), form) for number in self.ravel())
 
 
 class FillError(Exception):
@@ -112,9 +112,9 @@ def records_of(file: str, docs: Path) -> Iterator[dict[str, Any]]:
         record = {identifier(column): read(value) for column, value in flat(row)}
         numbered: dict[str, list[float]] = {}
         for column, number in record.items():
-            if (found := re.fullmatch(r"(.+)_\d+", column)) and isinstance(number, int | float):
-                numbered.setdefault(found[1], []).extend([] if math.isnan(number) else [number])
-        yield record | {name: np.array(numbers).view(PerSegment) for name, numbers in numbered.items()}
+            if (name_of_all := re.fullmatch(r"(.+)_\d+", column)) and isinstance(number, int | float):
+                numbered.setdefault(name_of_all[1], []).extend([] if math.isnan(number) else [number])
+        yield record | {name: np.array(found or [math.nan]).view(PerSegment) for name, found in numbered.items()}
 
 
 def identifier(text: str) -> str:

@@ -71,7 +71,7 @@ FILLED = """
 | gait | of friction | speed | elongation |
 |---|---|---|---|
 | slow one | 0.3 | 2.0 cm/s | 100 / 100 % |
-| none | – | – cm/s | – % |
+| none | – | – cm/s | – / – % |
 | `fast`, ordered: yes | | 2.5 times | published: 4 / 5 cm |
 """
 

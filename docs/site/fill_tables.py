@@ -149,7 +149,7 @@ def table(template: Sequence[str], records: Sequence[Mapping[str, Any]]) -> str:
     lines, names = [], [by_label]
     for line in template:
         if each := EACH.fullmatch(line):
-            names = [by_label | record for record in records if evaluated(each["condition"] or "True", record)]
+            names = [{**by_label, **record} for record in records if evaluated(each["condition"] or "True", record)]
         else:
             lines += [re.sub(r"\bnan\b", "–", evaluated(f"rf'''{line}'''", each_of)) for each_of in names]
             names = [by_label]

@@ -16,9 +16,9 @@ from time import perf_counter, process_time
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options, touching
+from annelid.arena.geoms import contact_options, touching
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.kinds.pipe import Pipe, add_pipe_panels
+from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.body.worm import WormBody
@@ -84,7 +84,7 @@ def panels(around: int) -> Ground:
 
     def add(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
         if isinstance(arena, Pipe):
-            add_pipe_panels(spec, arena, length_m, around)
+            arena.add_panels(spec, length_m, around)
         else:
             arena.add_panels(spec, length_m)
 

@@ -7,9 +7,8 @@ import warnings
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import add_moving_planes
-from annelid.arena.gravity import gravity_of
-from annelid.arena.scenery import add_scenery, add_walls
+from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
+from annelid.arena.surface import gravity_of
 from annelid.body.actuation import add_ring_actuators, add_springs
 from annelid.body.elimination import order_elimination
 from annelid.body.friction import add_joint_friction

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.scenery import (
+from annelid.arena.geoms import (
     FLOOR_HALF_SIZE_M,
     PIPE_RGBA,
     POST_HALF_HEIGHT_M,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from annelid.arena.contact import set_friction
+from annelid.arena.geoms import set_friction
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import State, Stateful

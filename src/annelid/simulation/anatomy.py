@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.contact import touching
+from annelid.arena.geoms import touching
 from annelid.arena.surface import Surface
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors

@@ -11,7 +11,7 @@ from annelid.morphology import Array, MeshGeometry
 
 
 class MovingGround:
-    """Lays the planes of `annelid.arena.contact.add_moving_planes` before every step.
+    """Lays the planes of `annelid.arena.geoms.add_moving_planes` before every step.
 
     What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
     the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options
+from annelid.arena.geoms import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.formulations.rods.net import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
 from annelid.body.worm import Strands, WormBody

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options
+from annelid.arena.geoms import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
 from annelid.body.worm import Strands, WormBody

@@ -61,20 +61,16 @@ class Plant(Protocol):
     @property
     def n_segments(self) -> int:
         """Number of actuated segments."""
-        ...
 
     @property
     def n_muscles(self) -> int:
         """Number of ring muscles: one a segment, or two with half-rings (left, right, segment by segment)."""
-        ...
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the initial posture at time zero, and the first sensation."""
-        ...
 
     def step(self, activation: Array) -> Sensation:
         """Advances by one control step under ``activation``, shape ``(n_muscles,)``, each in [0, 1]."""
-        ...
 
 
 class Controller(Protocol):
@@ -82,11 +78,9 @@ class Controller(Protocol):
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; ``seed`` fixes every random draw that follows."""
-        ...
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step; returns activation in [0, 1], shape ``(n_muscles,)``."""
-        ...
 
 
 @runtime_checkable
@@ -98,14 +92,12 @@ class MultiRatePlant(Protocol):
 
         Until then the sensation stays what it is, but for its time.
         """
-        ...
 
     def stride(self, activation: Array, n_steps: int) -> Sensation:
         """Advances by ``n_steps`` control steps, at most `steps_to_move`; the same as so many calls of ``step``.
 
         ``activation`` is that of the last of them, the only one in which the body may move.
         """
-        ...
 
 
 @runtime_checkable
@@ -118,7 +110,6 @@ class StridingController(Protocol):
         ``sensation`` is that of the first step. Those of the others differ from it in their times only, which are
         multiples of the control timestep. Returns the activation after the last.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +154,9 @@ class Records(Protocol):
 
     def recordable(self) -> Recordable:
         """Names every signal that `read` returns."""
-        ...
 
     def read(self, frame: bool) -> Values:
         """Reads the present values: of the frame signals if ``frame``, else of all others."""
-        ...
 
 
 @runtime_checkable
@@ -176,11 +165,9 @@ class Stateful(Protocol):
 
     def get_state(self) -> State:
         """Returns copies of all that the next step depends on."""
-        ...
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
-        ...
 
 
 @runtime_checkable
@@ -189,7 +176,6 @@ class Doubtful(Protocol):
 
     def doubts(self) -> tuple[str, ...]:
         """Returns a sentence for everything doubtful since time zero."""
-        ...
 
 
 @runtime_checkable
@@ -198,4 +184,3 @@ class Watched(Protocol):
 
     def alarm(self) -> str | None:
         """Returns one sentence naming the quantity, its value and its limit, or None while all is well."""
-        ...

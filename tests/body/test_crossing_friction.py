@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, mesh_of
-from annelid.body.friction import add_diagonal_friction
+from annelid.body.actuation import add_diagonal_friction
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, compile_spec
-from annelid.body.damping import damper_name, damper_rows
+from annelid.body.damping import MaterialDamping, damper_name, damper_rows
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.worm import Strands, WormBody
@@ -17,7 +17,6 @@ from annelid.config import load_config, parse_assignments
 from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.plausibility import check
-from annelid.simulation.damping import MaterialDamping
 from annelid.simulation.worm import WormPlant
 
 TIME_S = 0.145

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
+from annelid.body.damping import MaterialDamping, add_damper_rows
 from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
 from annelid.config import RunConfig
@@ -22,7 +23,6 @@ from annelid.morphology import Array, MeshGeometry, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, State
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
-from annelid.simulation.damping import MaterialDamping, add_damper_rows
 from annelid.simulation.energies import EnergyTotals, Engine
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.placing import at_rest, turned

@@ -33,9 +33,9 @@ PerSegment = Annotated[Positive | tuple[Positive, ...], AfterValidator(_not_empt
 
 
 Slopes = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
-"""Slopes of the tensions of one worm: per length, N/m, and per rate of length, N s/m, ``(n_muscles,)`` each, never
-negative, since the engine drops what would destabilise it. From lengths, m, their rates, m/s, what the actuators' gain is
-multiplied by (the muscles' activation), and tensions, N, ``(n_muscles,)`` each."""
+"""Slopes of the tensions of one worm, ``(n_muscles,)`` each: per length, N/m, and per rate of length, N s/m; never
+negative, since the engine drops what would destabilise it. From lengths, m, their rates, m/s, what the actuators' gain
+is multiplied by (the muscles' activation), and tensions, N, ``(n_muscles,)`` each."""
 
 
 class ActuatorKind(Kind):

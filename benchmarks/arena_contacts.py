@@ -25,7 +25,7 @@ from annelid.body.worm import WormBody
 from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.assemble import build_controller
-from annelid.simulation.worm import Worm, WormPlant
+from annelid.simulation.worm import WormPlant
 
 WORM = {
     "arena.friction": 0.7,
@@ -59,10 +59,8 @@ class StillGround(WormPlant):
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.delete(spec.geom("floor"))
         _add_contact_sensors(spec)
-        Worm.__init__(self, config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
+        super().__init__(config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
         self.ground = None
-        self.data = mujoco.MjData(self.model)
-        self._outputs = {name: getattr(self.data, name) for name in self.anatomy.outputs}
 
 
 def _add_contact_sensors(spec: mujoco.MjSpec) -> None:

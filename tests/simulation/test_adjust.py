@@ -46,7 +46,7 @@ def posture_after(simulation: Simulation) -> np.ndarray:
     for _ in range(AFTER_STEPS):
         simulation.advance()
     assert isinstance(simulation.plant, WormPlant)
-    return simulation.plant.qpos().copy()
+    return simulation.plant.qpos.copy()
 
 
 @settings(max_examples=3, deadline=None)

@@ -99,5 +99,5 @@ def test_a_stride_equals_its_control_steps() -> None:
         one, many = steps.step(pull), strides.stride(pull, n)
         assert one.time_s == many.time_s
         assert np.array_equal(one.stretch_m, many.stretch_m)
-        assert np.array_equal(steps.qpos(), strides.qpos())
+        assert np.array_equal(steps.qpos, strides.qpos)
     assert strides.data.time == pytest.approx(0.03)

@@ -41,7 +41,7 @@ class Pictures:
         if drawn not in self._scenes:
             self._scenes[drawn] = PostureScene(config, self._width, self._height, self._camera)
         caption = f"{episode.sensation.time_s:.2f} s"
-        return self._scenes[drawn].picture(episode.worm.qpos(), episode.activation, caption)
+        return self._scenes[drawn].picture(episode.worm.qpos, episode.activation, caption)
 
     def close(self) -> None:
         """Frees what was opened."""

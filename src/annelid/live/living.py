@@ -124,7 +124,7 @@ class LivingWorm:
         self.reel.add(
             Moment(
                 self.time_s,
-                self.plant.qpos().astype(np.float32),
+                self.plant.qpos.astype(np.float32),
                 self.simulation.activation.astype(np.float32),
                 self.simulation.sensation.contact_force_N.astype(np.float32),
             )

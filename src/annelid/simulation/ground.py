@@ -1,4 +1,4 @@
-"""The ground under a moving worm: tangent planes laid under its skin, and friction that feels which way it slides."""
+"""The ground under a moving worm: tangent planes laid under its skin, and friction by the direction of sliding."""
 
 from __future__ import annotations
 
@@ -22,26 +22,23 @@ class MovingGround:
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: ArenaKind) -> None:
-        """Finds the planes.
-
-        Args:
-            model: The compiled worm; of one with setae nobody else may use it, since friction is set in it.
-            geometry: The mesh at rest.
-            arena: The ground.
-        """
+        """Finds the planes; the compiled model of a worm with setae is its own, since friction is set in it."""
         self._model = model
         self.depth_m = -np.inf
         self._surface = arena.ground()
-        self._skin, self._planes = _skin_and_planes(model)
-        self._bodies = model.geom_bodyid[self._skin]
+        # The engine may have swapped the two geoms of a pair, the skin's and that of the plane on a mocap body.
+        geoms = np.stack([model.pair_geom1, model.pair_geom2])
+        mocap = model.body_mocapid[model.geom_bodyid[geoms]]
+        plane, pair = (mocap[1] >= 0).astype(int), np.arange(model.npair)
+        skin, self._planes = geoms[1 - plane, pair], mocap[plane, pair]
+        self._skin, self._bodies = skin, model.geom_bodyid[skin]
         self._roots = model.body_rootid[self._bodies]
-        self._setae = _Setae(model, geometry, arena, self._skin) if arena.has_setae else None
+        self._setae = _Setae(model, geometry, arena, skin) if arena.has_setae else None
 
     def lay(self, data: mujoco.MjData) -> None:
         """Lays every plane where the ground is nearest to its part of the skin, and sets friction.
 
-        Args:
-            data: Positions and velocities; its kinematics are brought up to date.
+        Of the data, positions and velocities are read, and its kinematics are brought up to date.
         """
         model = self._model
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
@@ -59,23 +56,8 @@ class MovingGround:
                 model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
 
 
-def _skin_and_planes(model: mujoco.MjModel) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Returns the geom of the skin and the mocap body of the plane of every pair, which the engine may have swapped."""
-    geoms = np.stack([model.pair_geom1, model.pair_geom2])
-    mocap = model.body_mocapid[model.geom_bodyid[geoms]]
-    plane, pair = (mocap[1] >= 0).astype(int), np.arange(model.npair)
-    return geoms[1 - plane, pair], mocap[plane, pair]
-
-
 def facing(normal: Array) -> Array:
-    """Returns quaternions that turn the z axis to unit normals by the shortest way.
-
-    Args:
-        normal: Unit vectors, ``(n, 3)``.
-
-    Returns:
-        Unit quaternions, scalar first, ``(n, 4)``.
-    """
+    """Returns unit quaternions, ``(n, 4)``, that turn the z axis to unit normals, ``(n, 3)``, by the least angle."""
     x, y, z = normal.T
     turn = np.stack([1.0 + z, -y, x, np.zeros(len(z))], axis=-1)
     # Straight down any half turn about a level axis will do.
@@ -86,7 +68,7 @@ def facing(normal: Array) -> Array:
 class _Setae:
     """Friction of each part of the skin by the sign of its velocity along the worm's axis there.
 
-    A part that sticks creeps the way it is pushed, since contacts are soft, so the sign tells at rest too.
+    A part that sticks creeps towards where it is pushed, since contacts are soft, so the sign holds at rest too.
     """
 
     def __init__(
@@ -99,11 +81,10 @@ class _Setae:
         self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        x = data.geom_xpos[skin, :1]
-        self._plane = np.abs(x - geometry.plane_x_m).argmin(axis=1)
+        self._plane = np.abs(data.geom_xpos[skin, :1] - geometry.plane_x_m).argmin(axis=1)
 
     def friction(self, data: mujoco.MjData, velocity: Array) -> Array:
-        """Returns the coefficient of every part of the skin by its velocity, m/s, ``(n_skin, 3)``; ``(n_skin,)``."""
+        """Returns the coefficient, ``(n_skin,)``, of every part of the skin by its velocity, m/s, ``(n_skin, 3)``."""
         centres = self._mean @ data.site_xpos[self._crossing_site]
         along = np.empty_like(centres)
         along[1:-1] = centres[:-2] - centres[2:]

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
-from numpy.typing import NDArray
 
 from annelid.arena.surface import surface_of
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
-from annelid.simulation.anatomy import Anatomy, Movement, Posture
-from annelid.simulation.worm import Worm, compile_worm, engine_stopped, owns_model
+from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture
+from annelid.simulation.worm import Worm, body_and_arena, compile_worm, engine_stopped, owns_model
 
 _NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
 _TIMES_GIVEN = 1
-"""Column of the engine batch's warnings that counts them; the other holds their last information."""
+"""Column of the engine batch's warnings that counts them; the other has their last information."""
 
 
 class BodyBatch:
@@ -33,49 +30,37 @@ class BodyBatch:
 
     Attributes:
         worms: The worms, each also a plant by itself.
+        batch: The engine's batch.
+        bound: The engine's arrays by name, a row for each worm.
+        scratch: Data of one worm, in which what is not part of a step is computed.
     """
 
     def __init__(self, configs: Sequence[RunConfig], anatomies: Sequence[Anatomy]) -> None:
         """Makes the bodies.
 
         Args:
-            configs: One configuration for each worm, alike in what `structure.ALIKE` names.
+            configs: One configuration for each worm, alike in what `annelid.simulation.batch.ALIKE` names.
             anatomies: Their compiled bodies, as `compile_worms` returns them.
 
         Raises:
             ConfigError: Two models' arrays differ in size.
         """
-        models = [anatomy.model for anatomy in anatomies]
-        self._anatomy = anatomies[0]
-        self._batch = Batch(models[0], len(models), nthread=1)
-        if owns_model(configs[0]) or any(model is not models[0] for model in models):
+        model, n = anatomies[0].model, len(anatomies)
+        self.batch = Batch(model, n, nthread=1)
+        if owns_model(configs[0]) or any(anatomy.model is not model for anatomy in anatomies):
             try:
-                self._batch.set_models(models)
+                self.batch.set_models([anatomy.model for anatomy in anatomies])
             except ValueError as error:
                 raise ConfigError(f"these worms differ too much for one batch: {error}") from None
-        bind = self._batch.bind
-        self._time, self._ctrl, self._qpos, self._qvel = (bind(name) for name in ("time", "ctrl", "qpos", "qvel"))
-        self._plastic: Array = bind("plastic") if models[0].nplastic else np.empty((len(models), 0))
-        self._act: Array = bind("act") if models[0].na else np.empty((len(models), 0))
-        self._mass_matrix = bind("M")
-        self._mocap = (bind("mocap_pos"), bind("mocap_quat")) if models[0].nmocap else None
-        self._outputs: dict[str, Array] = {name: bind(name) for name in self._anatomy.outputs}
-        self._work: dict[str, NDArray[Any]] = {name: bind(name) for name in self._anatomy.energy_meter.outputs}
-        self._scratch = mujoco.MjData(models[0])
-        self.worms = [
-            BatchWorm(config, anatomy, self, row)
-            for row, (config, anatomy) in enumerate(zip(configs, anatomies, strict=True))
-        ]
-
-    def reset(self, row: int, state: Array | None) -> None:
-        """Resets one body, and gives it a state of the engine if there is one."""
-        self._batch.reset([row], stage=_NO_STAGE)
-        worm = self.worms[row]
-        self._act[row] = worm.anatomy.first_act
-        if worm.start is not None:
-            self._qpos[row], self._plastic[row] = worm.start
-        if state is not None:
-            self._batch.state[row] = state
+        self._anatomy = anatomies[0]
+        names = {"time", "ctrl", "qpos", "qvel", "M", *self._anatomy.outputs, *self._anatomy.energy_meter.outputs}
+        names |= {"mocap_pos", "mocap_quat"} if model.nmocap else set()
+        self.bound = {name: self.batch.bind(name) for name in sorted(names)}
+        for name, size in (("plastic", model.nplastic), ("act", model.na)):
+            self.bound[name] = self.batch.bind(name) if size else np.empty((n, 0))
+        self.scratch = mujoco.MjData(model)
+        worms = enumerate(zip(configs, anatomies, strict=True))
+        self.worms = [BatchWorm(config, anatomy, self, row) for row, (config, anatomy) in worms]
 
     def move(self, rows: Sequence[int], activation: Array, n_steps: int) -> dict[int, str]:
         """Takes physics steps with some of the bodies.
@@ -88,94 +73,52 @@ class BodyBatch:
         Returns:
             Why the engine gave up, for every body that it could not step.
         """
-        for row, own in zip(rows, activation, strict=True):
-            self._ctrl[row] = self.worms[row].control(own, n_steps)
         going, reasons = dict(zip(rows, activation, strict=True)), {}
+        for row, own in going.items():
+            self.bound["ctrl"][row] = self.worms[row].control(own, n_steps)
         for _ in range(n_steps):
             for row in going:
-                self._prepare(row)
-            stopped = self._step({row: self.worms[row].drive(own, self._act[row]) for row, own in going.items()})
+                self._prepare(self.worms[row], row)
+            stopped = self._step({row: self.worms[row].drive(own) for row, own in going.items()})
             reasons |= stopped
             going = {row: own for row, own in going.items() if row not in stopped}
         return reasons
 
     def _step(self, drives: Mapping[int, Array]) -> dict[int, str]:
         """Takes one physics step with the bodies that are driven, and has their worms add it to their energy totals."""
-        if not drives:
-            return {}
         reasons: dict[int, str] = {}
+        if not drives:
+            return reasons
         try:
-            self._batch.step(list(drives), 1)
+            self.batch.step(list(drives), 1)
         except SimulationError as failure:
             for row in map(int, failure.ids):
-                reasons[row] = engine_stopped(float(self._time[row]), self._batch.error(row))
-        for row, drive in drives.items():
-            if row not in reasons:
-                self.worms[row].book({name: values[row] for name, values in self._work.items()}, drive)
+                reasons[row] = engine_stopped(float(self.bound["time"][row]), self.batch.error(row))
+        for row in drives.keys() - reasons:
+            self.worms[row].add_step(drives[row])
         return reasons
 
-    def _prepare(self, row: int) -> None:
+    def _prepare(self, worm: Worm, row: int) -> None:
         """Gives one body's dampers their coefficients, and lays the planes under its skin."""
-        worm = self.worms[row]
         if worm.damping is not None:
-            worm.damping.renew(self._qpos[row])
-        ground, scratch = worm.ground, self._scratch
-        if ground is None or self._mocap is None:
-            return
-        scratch.qpos[:], scratch.qvel[:] = self._qpos[row], self._qvel[row]
-        ground.lay(scratch)
-        for bound, laid in zip(self._mocap, (scratch.mocap_pos, scratch.mocap_quat), strict=True):
-            bound[row] = laid
+            worm.damping.renew(worm.qpos)
+        if worm.ground is not None:
+            scratch, bound = self.scratch, self.bound
+            scratch.qpos[:], scratch.qvel[:] = worm.qpos, bound["qvel"][row]
+            worm.ground.lay(scratch)
+            bound["mocap_pos"][row], bound["mocap_quat"][row] = scratch.mocap_pos, scratch.mocap_quat
 
     def moved(self, rows: Sequence[int]) -> list[Movement]:
         """Reads what the last movement of some bodies has come to."""
-        outputs = self._outputs
-        if len(rows) < len(self.worms):
-            outputs = {name: values[rows] for name, values in outputs.items()}
-        postures, forces = self._postures(rows).each(), self._anatomy.forces(outputs).each()
-        return [Movement(*one) for one in zip(postures, forces, self._anatomy.ground(outputs), strict=True)]
-
-    def _postures(self, rows: Sequence[int]) -> Posture:
-        """Reads the postures of some bodies, with an axis of them in front."""
-        crossing = np.empty((len(rows), self._anatomy.geometry.n_crossings, 3))
-        center_of_mass = np.empty((len(rows), 3))
-        skin = np.empty((len(rows), len(self._anatomy.skin.segment), 3))
-        for place, row in enumerate(rows):
-            crossing[place], center_of_mass[place], skin[place] = self.located(row)
-        return self._anatomy.posture(crossing, center_of_mass, skin)
-
-    def located(self, row: int) -> tuple[Array, Array, Array]:
-        """Returns a body's crossings, centre of mass and skin as `Anatomy.locate` does."""
-        self._scratch.qpos[:] = self._qpos[row]
-        return self.worms[row].anatomy.locate(self._scratch)
-
-    def kinetic_energy_J(self, row: int) -> float:
-        """Kinetic energy of a body, from the mass matrix of its last step, J."""
-        scratch = self._scratch
-        scratch.qvel[:] = self._qvel[row]
-        scratch.M[:] = self._mass_matrix[row]
-        mujoco.mj_energyVel(self.worms[row].model, scratch)
-        return float(scratch.energy[1])
-
-    def actuator_state(self, row: int) -> Array:
-        """Returns a body's actuator states, ``(n_states,)``."""
-        return self._act[row]
-
-    def qpos(self, row: int) -> Array:
-        """Returns a body's generalised positions, ``(nq,)``."""
-        return self._qpos[row]
-
-    def plastic(self, row: int) -> Array:
-        """Returns what the engine keeps of the rods' frames of a body, ``(nplastic,)``."""
-        return self._plastic[row]
-
-    def engine_state(self, row: int) -> Array:
-        """Returns a copy of a body's engine state."""
-        return self._batch.state[row].copy()
-
-    def warnings(self, row: int) -> NDArray[np.int32]:
-        """Returns how often the engine has given each of its warnings to a body."""
-        return self._batch.warning[row, :, _TIMES_GIVEN]
+        if not rows:
+            return []
+        anatomy, all_of_them = self._anatomy, len(rows) == len(self.worms)
+        engine = {name: self.bound[name] if all_of_them else self.bound[name][rows] for name in anatomy.outputs}
+        forces, ground = anatomy.forces(engine)
+        located = zip(*(self.worms[row].located() for row in rows), strict=True)
+        postures = zip(*anatomy.posture(*(np.stack(parts) for parts in located)), strict=True)
+        each = zip(map(Posture._make, postures), map(Forces._make, zip(*forces, strict=True)), ground, strict=True)
+        return [Movement(*one) for one in each]
 
 
 class BatchWorm(Worm):
@@ -184,12 +127,10 @@ class BatchWorm(Worm):
     def __init__(self, config: RunConfig, anatomy: Anatomy, bodies: BodyBatch, row: int) -> None:
         """Makes the worm of one row."""
         super().__init__(config, anatomy)
-        self._bodies = bodies
-        self._row = row
-
-    def reset_engine(self, state: Array | None = None) -> None:
-        """Resets its row, and gives it a state that `engine_state` returned if there is one."""
-        self._bodies.reset(self._row, state)
+        self._bodies, self._row = bodies, row
+        self.engine = {name: values[row] for name, values in bodies.bound.items()}
+        self.qpos, self.plastic, self.act = (self.engine[name] for name in ("qpos", "plastic", "act"))
+        self.warned = bodies.batch.warning[row, :, _TIMES_GIVEN]
 
     def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps with this worm alone.
@@ -202,33 +143,32 @@ class BatchWorm(Worm):
             raise SimulationStopped(reasons[self._row])
         return self._bodies.moved([self._row])[0]
 
-    def actuator_state(self) -> Array:
-        """Returns the engine's actuator states, ``(n_states,)``."""
-        return self._bodies.actuator_state(self._row)
-
-    def locate(self) -> Posture:
-        """Reads the posture from its row's coordinates."""
-        return self.anatomy.posture(*self._bodies.located(self._row))
-
-    def qpos(self) -> Array:
-        """Returns the generalised positions, ``(nq,)``."""
-        return self._bodies.qpos(self._row)
-
-    def plastic(self) -> Array:
-        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
-        return self._bodies.plastic(self._row)
-
-    def engine_state(self) -> Array:
-        """Returns a copy of all that the engine's next step depends on."""
-        return self._bodies.engine_state(self._row)
-
-    def warnings(self) -> NDArray[np.int32]:
-        """Returns how often the engine has given each of its warnings."""
-        return self._bodies.warnings(self._row)
+    def located(self) -> tuple[Array, Array, Array]:
+        """Returns crossings, centre of mass and skin as `Anatomy.locate` does."""
+        self._bodies.scratch.qpos[:] = self.qpos
+        return self.anatomy.locate(self._bodies.scratch)
 
     def kinetic_energy_J(self) -> float:
-        """Kinetic energy of the whole body, J."""
-        return self._bodies.kinetic_energy_J(self._row)
+        """Kinetic energy of the whole body, from the mass matrix of its last step, J."""
+        scratch = self._bodies.scratch
+        scratch.qvel[:] = self.engine["qvel"]
+        scratch.M[:] = self.engine["M"]
+        mujoco.mj_energyVel(self.model, scratch)
+        return float(scratch.energy[1])
+
+    def _reset_engine(self, state: Array | None = None) -> None:
+        self._bodies.batch.reset([self._row], stage=_NO_STAGE)
+        self.act[:] = self.anatomy.first_act
+        if self.start is not None:
+            self.qpos[:], self.plastic[:] = self.start
+        if state is not None:
+            self._bodies.batch.state[self._row] = state
+
+    def _engine_state(self) -> Array:
+        return self._bodies.batch.state[self._row].copy()
+
+    def _locate(self) -> Posture:
+        return self.anatomy.posture(*self.located())
 
 
 def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
@@ -241,12 +181,11 @@ def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
     anatomies: list[Anatomy] = []
     for config in configs:
         physical = config.model_dump_json(include={"body", "arena", "clock"}, exclude={"body": {"heading_deg"}})
-        if physical not in models:
-            anatomies.append(models.setdefault(physical, compile_worm(config)))
-            continue
-        known = models[physical]
-        assert isinstance(config.body, WormBody)
-        assert config.arena is not None
-        own = owns_model(config)
-        anatomies.append(Anatomy(copy(known.model), config.body, surface_of(config.arena)) if own else known)
+        known = models.get(physical)
+        if known is None:
+            known = models[physical] = compile_worm(config)
+        elif owns_model(config):
+            body, arena = body_and_arena(config)
+            known = Anatomy(copy(known.model), body, surface_of(arena))
+        anatomies.append(known)
     return anatomies

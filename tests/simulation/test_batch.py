@@ -16,7 +16,7 @@ from mujoco.batch import Batch, SimulationError
 from annelid import RunConfig, load_config, open_run, simulate, simulate_batch, summary
 from annelid.errors import AnnelidError, ConfigError, RunFileError
 from annelid.protocols import Sensation
-from annelid.simulation.batch.structure import ALIKE
+from annelid.simulation.batch.loop import ALIKE
 from annelid.simulation.checkpoint import Checkpoint
 from annelid.simulation.recorder import Recorder
 from annelid.simulation.runfile import read_checkpoint

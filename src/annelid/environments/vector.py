@@ -32,8 +32,7 @@ from annelid.morphology import Array
 from annelid.protocols import Sensation
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.batch.body import BodyBatch, compile_worms
-from annelid.simulation.batch.loop import threads_for
-from annelid.simulation.batch.structure import checked_configs
+from annelid.simulation.batch.loop import checked_configs, threads_for
 
 Flags = NDArray[np.bool_]
 Stepped = tuple[Observation, Array, Flags, Flags, dict[str, Any]]

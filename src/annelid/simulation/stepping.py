@@ -40,6 +40,7 @@ class Simulation:
         sensation: The plant's latest sensation, without noise.
         activation: The latest activation.
         noise: Generator of the sensor noise.
+        is_noisy: Whether it is drawn at every control step.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class Simulation:
         self.activation: Array = np.zeros(plant.n_muscles)
         self.noise = noise
         self._noise_m = config.sensor.noise_m
+        self.is_noisy = self._noise_m > 0
         # A quantity that a body does not have is NaN from the start and means nothing later.
         self._watched = ["stretch_m"]
         self._watched += [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from annelid.config import RunConfig
-from annelid.control import CopySettings
-from annelid.protocols import Array, Sensation, State, StridingController
+from annelid.protocols import Array, Sensation, State, Stateful, StridingController
 from annelid.simulation.stepping import Simulation
 
-Outcome = tuple[dict[int, Array], dict[int, Exception]]
-"""Activation of every worm, and the errors of those that failed, by number of the worm."""
+if TYPE_CHECKING:
+    from annelid.control import CopySettings
 
 
 @runtime_checkable
-class CopiedController(Protocol):
+class CopiedController(Stateful, Protocol):
     """The capability of a controller of advancing many copies of itself at once.
 
     Attributes:
@@ -35,166 +33,114 @@ class CopiedController(Protocol):
         """Returns the copies' states some control steps on, and their activation, ``(n_copies, n_muscles)``."""
         ...
 
-    def get_state(self) -> State:
-        """Returns copies of all that the next step depends on."""
-        ...
 
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        ...
-
-
-class ControllerBatch:
-    """Controllers of many worms between two events of the run."""
-
-    def __init__(self, configs: Sequence[RunConfig], simulations: Sequence[Simulation]) -> None:
-        """Groups controllers that can step together.
-
-        Args:
-            configs: The worms' configurations.
-            simulations: The worms, each with its controller in its initial state.
-        """
-        alike: dict[Hashable, list[int]] = {}
-        for row, config in enumerate(configs):
-            alike.setdefault(_group(simulations[row], config, row), []).append(row)
-        self._groups = [
-            _Networks(rows, [simulations[row] for row in rows], noisy=configs[rows[0]].sensor.noise_m > 0)
-            if isinstance(simulations[rows[0]].controller, CopiedController)
-            else _Single(rows[0], simulations[rows[0]], noisy=configs[rows[0]].sensor.noise_m > 0)
-            for rows in alike.values()
-        ]
-
-    def advance(self, n_steps: int) -> Outcome:
-        """Takes control steps during which no body moves.
-
-        Returns:
-            The activation after the last of them, and the error of every controller that failed.
-        """
-        activation: dict[int, Array] = {}
-        errors: dict[int, Exception] = {}
-        for group in self._groups:
-            of_group, errors_of_group = group.advance(n_steps)
-            activation |= of_group
-            errors |= errors_of_group
-        return activation, errors
-
-    def settle(self) -> None:
-        """Brings every worm's own controller up to the state that the batch has reached."""
-        for group in self._groups:
-            group.settle()
-
-    def drop(self, row: int) -> None:
-        """Leaves out a worm that has ended."""
-        for group in self._groups:
-            group.drop(row)
-        self._groups = [group for group in self._groups if group.rows]
-
-
-def _group(simulation: Simulation, config: RunConfig, row: int) -> Hashable:
-    """Tells which controllers may step together: copies that are alike, noisy or not."""
-    controller = simulation.controller
-    if not isinstance(controller, CopiedController):
-        return row
-    return type(controller), controller.alike, config.sensor.noise_m > 0
-
-
-def _advance_with_time(simulations: Sequence[Simulation], later: int) -> list[Sensation]:
-    """What worms are told at the beginning of a control step, ``later`` steps after their bodies' last event."""
-    if later:
-        for simulation in simulations:
-            simulation.step += 1
+def grouped(simulations: Sequence[Simulation]) -> list[ControllerGroup]:
+    """Groups the controllers of worms, each in its initial state: copies that are alike step together."""
+    alike: dict[Hashable, list[int]] = {}
+    for row, simulation in enumerate(simulations):
+        controller = simulation.controller
+        copied = isinstance(controller, CopiedController)
+        key = (type(controller), controller.alike, simulation.is_noisy) if copied else row
+        alike.setdefault(key, []).append(row)
     return [
-        replace(simulation.observed(), time_s=simulation.step * simulation.schedule.timestep_s)
-        if later
-        else simulation.observed()
-        for simulation in simulations
+        (Networks if isinstance(simulations[rows[0]].controller, CopiedController) else ControllerGroup)(
+            rows, [simulations[row] for row in rows]
+        )
+        for rows in alike.values()
     ]
 
 
-class _Networks:
+class ControllerGroup:
+    """Controllers of some worms between two events of the run; as it is, one controller of any kind.
+
+    Attributes:
+        rows: The worms.
+    """
+
+    def __init__(self, rows: Sequence[int], simulations: Sequence[Simulation]) -> None:
+        """Takes worms that are all noisy or all not."""
+        self.rows, self._simulations = list(rows), list(simulations)
+        self._strides = not simulations[0].is_noisy and isinstance(simulations[0].controller, StridingController)
+
+    def advance(self, n_steps: int) -> tuple[dict[int, Array], dict[int, Exception]]:
+        """Takes control steps with the bodies at rest.
+
+        Returns:
+            The activation of every worm after the last of them, and the errors of those whose controllers failed.
+        """
+        activation: dict[int, Array] = {}
+        errors: dict[int, Exception] = {}
+        try:
+            if self._strides:
+                felt = [simulation.sensation for simulation in self._simulations]
+                return dict(zip(self.rows, self._take(felt, n_steps), strict=True)), errors
+            for later in range(n_steps):
+                felt = [_felt(simulation, later) for simulation in self._simulations]
+                activation = dict(zip(self.rows, self._take(felt, 1), strict=True))
+                for row, simulation in zip(self.rows, self._simulations, strict=True):
+                    try:
+                        simulation.check_activation(activation[row])
+                    except Exception as error:
+                        errors.setdefault(row, error)
+                if len(errors) == len(self.rows):
+                    break
+        except Exception as error:
+            errors = dict.fromkeys(self.rows, error)
+        return activation, errors
+
+    def _take(self, felt: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
+        """Takes control steps under what each worm feels; returns each one's activation."""
+        controller = self._simulations[0].controller
+        if self._strides and isinstance(controller, StridingController):
+            return [np.asarray(controller.stride(felt[0], n_steps), dtype=np.float64)]
+        return [np.asarray(controller.step(felt[0]), dtype=np.float64)]
+
+    def settle(self) -> None:
+        """Brings every worm's own controller up to the state that was reached; here it is the one that steps."""
+
+    def drop(self, row: int) -> None:
+        """Leaves out one worm, whose own controller keeps the state that it has reached."""
+        place = self.rows.index(row)
+        del self.rows[place], self._simulations[place]
+
+
+def _felt(simulation: Simulation, later: int) -> Sensation:
+    """What a worm is told at the beginning of a control step, so many steps after its body's last event."""
+    if not later:
+        return simulation.observed()
+    simulation.step += 1
+    return replace(simulation.observed(), time_s=simulation.step * simulation.schedule.timestep_s)
+
+
+class Networks(ControllerGroup):
     """Synthetic nervous systems, as copies of one that differ in their sensors and currents only."""
 
-    def __init__(self, rows: Sequence[int], simulations: Sequence[Simulation], noisy: bool) -> None:
-        self.rows = list(rows)
-        self._simulations = list(simulations)
+    def __init__(self, rows: Sequence[int], simulations: Sequence[Simulation]) -> None:
+        """Takes worms that are all noisy or all not, and whose controllers are alike."""
+        super().__init__(rows, simulations)
         self._controllers = [c.controller for c in simulations if isinstance(c.controller, CopiedController)]
         self._first = self._controllers[0]
+        self._strides = not simulations[0].is_noisy
         states = [controller.get_state() for controller in self._controllers]
         self._states: State = {name: np.stack([state[name] for state in states]) for name in states[0]}
         self._states["n_steps"] = states[0]["n_steps"]
-        self._each = CopySettings.of(controller.own for controller in self._controllers)
-        self._noisy = noisy
+        self._each = type(self._first.own).of(controller.own for controller in self._controllers)
 
-    def advance(self, n_steps: int) -> Outcome:
-        """Takes control steps with the bodies at rest."""
-        if not self._noisy:
-            return self._take([simulation.sensation for simulation in self._simulations], n_steps), {}
-        activation: dict[int, Array] = {}
-        errors: dict[int, Exception] = {}
-        for later in range(n_steps):
-            activation = self._take(_advance_with_time(self._simulations, later), 1)
-            for row, simulation in zip(self.rows, self._simulations, strict=True):
-                try:
-                    simulation.check_activation(activation[row])
-                except Exception as error:
-                    errors.setdefault(row, error)
-        return activation, errors
-
-    def _take(self, felt: Sequence[Sensation], n_steps: int) -> dict[int, Array]:
+    def _take(self, felt: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
         together = replace(felt[0], stretch_m=np.stack([one.stretch_m for one in felt]))
         self._states, activation = self._first.step_copies(self._states, together, n_steps, self._each)
-        return dict(zip(self.rows, list(activation), strict=True))
+        return list(activation)
 
     def settle(self) -> None:
         """Brings the worms' own controllers up to the state of the copies."""
         for place, controller in enumerate(self._controllers):
-            controller.set_state(self._state_of(place))
-
-    def _state_of(self, place: int) -> State:
-        return {name: values[place] if values.ndim else values for name, values in self._states.items()}
+            controller.set_state({name: own[place] if own.ndim else own for name, own in self._states.items()})
 
     def drop(self, row: int) -> None:
-        """Leaves out one worm, whose own controller keeps the state it has reached."""
-        if row not in self.rows:
-            return
+        """Leaves out one worm, whose own controller keeps the state that it has reached."""
+        self.settle()
         place = self.rows.index(row)
-        self._controllers[place].set_state(self._state_of(place))
-        for members in (self.rows, self._simulations, self._controllers):
-            del members[place]
-        self._each = CopySettings.of(controller.own for controller in self._controllers)
-        self._states = {
-            name: np.delete(values, place, axis=0) if values.ndim else values for name, values in self._states.items()
-        }
-
-
-class _Single:
-    """One controller of any kind."""
-
-    def __init__(self, row: int, simulation: Simulation, noisy: bool) -> None:
-        self.rows = [row]
-        self._simulation = simulation
-        controller = simulation.controller
-        self._strider = controller if isinstance(controller, StridingController) and not noisy else None
-
-    def advance(self, n_steps: int) -> Outcome:
-        """Takes control steps with the body at rest."""
-        simulation, activation = self._simulation, np.empty(0)
-        try:
-            if self._strider is not None:
-                activation = np.asarray(self._strider.stride(simulation.sensation, n_steps), dtype=np.float64)
-                n_steps = 0
-            for later in range(n_steps):
-                (felt,) = _advance_with_time([simulation], later)
-                activation = np.asarray(simulation.controller.step(felt), dtype=np.float64)
-                simulation.check_activation(activation)
-        except Exception as error:
-            return {}, dict.fromkeys(self.rows, error)
-        return dict.fromkeys(self.rows, activation), {}
-
-    def settle(self) -> None:
-        """Does nothing: the worm's own controller is the one that steps."""
-
-    def drop(self, row: int) -> None:
-        """Leaves out the worm, if it is this one."""
-        if row in self.rows:
-            self.rows.remove(row)
+        super().drop(row)
+        del self._controllers[place]
+        self._each = type(self._first.own).of(controller.own for controller in self._controllers)
+        self._states = {name: np.delete(own, place, axis=0) if own.ndim else own for name, own in self._states.items()}

@@ -11,20 +11,35 @@ from time import perf_counter
 
 import numpy as np
 
-from annelid.config import RunConfig
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig, as_config, field_value, fields_of
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Movement
 from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BodyBatch, compile_worms
-from annelid.simulation.batch.controllers import ControllerBatch
-from annelid.simulation.batch.structure import checked_configs
+from annelid.simulation.batch.controllers import grouped
 from annelid.simulation.interruption import Interruption
 from annelid.simulation.lock import locks
 from annelid.simulation.loop import PROGRESS_INTERVAL_S, Loop, RecordedRun
 from annelid.simulation.progress import ProgressCallback, reporting
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
 from annelid.simulation.stepping import start
+
+ALIKE = (
+    "duration_s",
+    "clock",
+    "record",
+    "controller.kind",
+    "body.mesh",
+    "body.formulation",
+    "body.rings.kind",
+    "body.rings.layout",
+    "body.rings.activation_dynamics",
+    "body.springs.tension_only",
+    "body.springs.sensors",
+)
+"""What all worms of a batch must have in common; everything else may differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +154,55 @@ def _run_all(teams: Sequence[Team], report: ProgressCallback | None) -> float:
     return perf_counter() - began
 
 
+def checked_configs(
+    configs: RunConfig | str | Sequence[RunConfig | str], n_worms: int | None, seeds: Sequence[int] | None
+) -> list[RunConfig]:
+    """Returns the configuration of every worm of a batch; the arguments are those of `simulate_batch`.
+
+    Raises:
+        ConfigError: The numbers of worms, configurations and seeds do not fit together, there is none, a body is
+            planar, or two worms differ in a field of `ALIKE`.
+    """
+    if isinstance(configs, RunConfig | str | Mapping):
+        if n_worms is None and seeds is None:
+            raise ConfigError("a batch of one configuration needs n_worms or seeds")
+        shared, n = as_config(configs), n_worms if n_worms is not None else len(seeds or ())
+        own, seeds = [shared] * n, range(shared.seed, shared.seed + n) if seeds is None else seeds
+    else:
+        own = [as_config(one) for one in configs]
+        if n_worms not in (None, len(own)):
+            raise ConfigError(f"n_worms = {n_worms} does not fit {len(own)} configurations: leave it out")
+    if not own:
+        raise ConfigError("a batch needs at least one worm, not 0")
+    if seeds is not None:
+        if len(seeds) != len(own):
+            raise ConfigError(f"seeds has {len(seeds)} numbers for {len(own)} worms: give one for each")
+        negative = [seed for seed in seeds if seed < 0]
+        if negative:
+            raise ConfigError(f"seeds contains {negative[0]}: a seed must be at least 0")
+        own = [one.model_copy(update={"seed": int(seed)}) for one, seed in zip(own, seeds, strict=True)]
+    for one in own:
+        if not isinstance(one.body, WormBody):
+            raise ConfigError(f"body.kind = {one.body.kind!r} cannot be batched; only the 3D worm ('worm') can")
+    _refuse_differences(own)
+    return own
+
+
+def _refuse_differences(configs: Sequence[RunConfig]) -> None:
+    parts = tuple(f"{part}." for part in ALIKE)
+    first, *others = (
+        {path: field_value(config, path) for path in fields_of(config) if f"{path}.".startswith(parts)}
+        for config in configs
+    )
+    for number, other in enumerate(others, start=1):
+        for field in {**first, **other}:
+            if first.get(field) != other.get(field):
+                raise ConfigError(
+                    f"{field} is {other.get(field)!r} for worm {number} and {first.get(field)!r} for worm 0: all "
+                    f"worms of a batch must agree in {', '.join(ALIKE)}; other fields may differ"
+                )
+
+
 def threads_for(n_worms: int, threads: int | None) -> int:
     """Returns the number of threads for a batch: no more than worms, by default one a processor.
 
@@ -174,12 +238,10 @@ class Team(Loop):
             RunFileError: A run file cannot be made.
         """
         self._bodies = BodyBatch(configs, anatomies)
-        self._worms = self._bodies.worms
-        simulations = [
-            start(config, worm, build_controller(config, worm), None)
-            for config, worm in zip(configs, self._worms, strict=True)
-        ]
-        self._controllers = ControllerBatch(configs, simulations)
+        worms = self._worms = self._bodies.worms
+        pairs = zip(configs, worms, strict=True)
+        simulations = [start(config, worm, build_controller(config, worm), None) for config, worm in pairs]
+        self._controllers = grouped(simulations)
         first = len(all_runs)
         for config, simulation, folder in zip(configs, simulations, folders, strict=True):
             all_runs.append(RecordedRun(config, simulation, folder / FILE_NAME))
@@ -187,13 +249,16 @@ class Team(Loop):
 
     def advance(self, step: int) -> None:
         """Takes control steps up to the next one after which a body moves or something is recorded."""
-        one, schedule = next(iter(self.going)), self._schedule
-        n_steps = min(self._worms[one].steps_to_move(), schedule.steps_to_record(step))
-        activation, errors = self._controllers.advance(n_steps)
-        for number, error in errors.items():
-            self.drop(number, error)
+        one, schedule = self._worms[next(iter(self.going))], self._schedule
+        n_steps = min(one.steps_to_move(), schedule.steps_to_record(step))
+        activation: dict[int, Array] = {}
+        for group in tuple(self._controllers):
+            of_group, errors = group.advance(n_steps)
+            activation |= of_group
+            for number, error in errors.items():
+                self.drop(number, error)
         self.each_numbered(lambda number, run: run.simulation.check_activation(activation[number]))
-        moved = self._move(n_steps, activation)
+        moved = self._move(one.moves_due(n_steps), activation)
         step += n_steps
         if moved or step % schedule.sample_every == 0 or step % schedule.frame_every == 0:
             self.settle()
@@ -205,20 +270,23 @@ class Team(Loop):
 
     def settle(self) -> None:
         """Brings every worm's own controller up to the state that the batch has reached."""
-        self._controllers.settle()
+        for group in self._controllers:
+            group.settle()
 
     def drop(self, number: int, error: Exception) -> None:
         """Ends one run because of an error, and leaves its controller out."""
         super().drop(number, error)
-        self._controllers.drop(number)
+        for group in self._controllers:
+            if number in group.rows:
+                group.drop(number)
+        self._controllers = [group for group in self._controllers if group.rows]
 
     def _move(self, n_steps: int, activation: Mapping[int, Array]) -> dict[int, Movement]:
-        """Moves the bodies if they are due to move; returns what each of those that could be moved has come to."""
-        due = self._worms[next(iter(self.going))].moves_due(n_steps) if self.going else 0
-        if not due:
-            return {}
+        """Takes physics steps, if any; returns what each of the bodies that could be moved has come to."""
         rows = list(self.going)
-        for row, reason in self._bodies.move(rows, np.stack([activation[row] for row in rows]), due).items():
+        if not n_steps or not rows:
+            return {}
+        for row, reason in self._bodies.move(rows, np.stack([activation[row] for row in rows]), n_steps).items():
             self.drop(row, SimulationStopped(reason))
         rows = list(self.going)
         return dict(zip(rows, self._bodies.moved(rows), strict=True))

@@ -24,7 +24,7 @@ from annelid.body import build_spec, compile_spec
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.simulation.anatomy import Anatomy
-from annelid.simulation.assemble import build_controller
+from annelid.simulation.stepping import build_controller
 from annelid.simulation.worm import WormPlant
 
 WORM = {

@@ -8,8 +8,7 @@ from annelid.arena.geoms import set_friction
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import State, Stateful
-from annelid.simulation.assemble import build_controller, build_plant
-from annelid.simulation.stepping import Simulation
+from annelid.simulation.stepping import Simulation, build_controller, build_plant
 from annelid.simulation.worm import WormPlant
 
 Part = TypeVar("Part")

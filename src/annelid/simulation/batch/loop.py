@@ -16,7 +16,6 @@ from annelid.config import RunConfig, as_config, field_value, fields_of
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Movement
-from annelid.simulation.assemble import build_controller
 from annelid.simulation.batch.body import BodyBatch, compile_worms
 from annelid.simulation.batch.controllers import grouped
 from annelid.simulation.interruption import Interruption
@@ -24,7 +23,7 @@ from annelid.simulation.lock import locks
 from annelid.simulation.loop import PROGRESS_INTERVAL_S, Loop, RecordedRun
 from annelid.simulation.progress import ProgressCallback, reporting
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
-from annelid.simulation.stepping import start
+from annelid.simulation.stepping import build_controller, start
 
 ALIKE = (
     "duration_s",

@@ -14,7 +14,7 @@ from annelid.arena.surface import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation
-from annelid.simulation.batch.body import BatchWorm, BodyBatch, compile_worms
+from annelid.simulation.batch_body import BatchWorm, BodyBatch, compile_worms
 from annelid.simulation.ground import facing
 from annelid.simulation.loop import simulate
 from annelid.simulation.stepping import build_controller

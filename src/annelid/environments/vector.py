@@ -29,8 +29,8 @@ from annelid.errors import ConfigError, require_at_least, suggest
 from annelid.morphology import Array
 from annelid.protocols import Sensation
 from annelid.simulation.anatomy import Anatomy
-from annelid.simulation.batch.body import BodyBatch, compile_worms
-from annelid.simulation.batch.loop import checked_configs, threads_for
+from annelid.simulation.batch import checked_configs, threads_for
+from annelid.simulation.batch_body import BodyBatch, compile_worms
 
 Flags = NDArray[np.bool_]
 Stepped = tuple[Observation, Array, Flags, Flags, dict[str, Any]]

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
 from annelid.protocols import Controller, Plant, Records, Sensation, Values
-from annelid.simulation.interruption import Interruption
 from annelid.simulation.lock import locks
-from annelid.simulation.progress import ProgressCallback, reporting
+from annelid.simulation.progress import Interruption, ProgressCallback, reporting
 from annelid.simulation.recorder import (
     Recorder,
     global_attributes,

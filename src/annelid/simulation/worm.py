@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
+from operator import attrgetter
 from typing import cast
 
 import mujoco
@@ -17,7 +18,7 @@ from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
 from annelid.config import ArenaKind, RunConfig
 from annelid.errors import SimulationStopped
-from annelid.morphology import Array, MeshGeometry, heading_turn
+from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, at_rest, turned
@@ -42,6 +43,46 @@ ENGINE_WARNINGS = {
 }
 ALARM_EVERY = 10
 """Movements of the body between two looks at what is costly to read: kinetic energy, and the height above a relief."""
+
+
+_FORCE = "contractile force of a ring muscle over the last physics step; with RK4 that of its last stage"
+_SIGNALS = {
+    "stretch_length": ("posture.stretch", ("segment", "sensor"), "m", "length of the springs that span a ring"),
+    "spring_length": ("posture.spring_length", ("spring",), "m", "length of an axial spring"),
+    "ring_length": ("posture.ring_length", ("muscle",), "m", "length of a ring muscle"),
+    "muscle_force": ("_tension_N", ("muscle",), "N", _FORCE),
+    "contact_force": ("_forces.contact", ("segment", "axis"), "N", "force of the arena on a segment"),
+    "touch": ("touch.normal", ("segment", "side"), "N", "normal force of the ground on a side"),
+    "contact_count": ("touch.count", ("segment",), "1", "number of vertices that touch the ground"),
+    "slip_speed": ("touch.slip_speed", ("segment",), "m/s", "forward speed along the ground of what touches it"),
+    "slip_distance": ("touch.slip_distance", ("segment",), "m", "path that what touches the ground has slid so far"),
+    "slip_loss": ("touch.slip_loss", ("segment",), "J", "work of a segment lost to friction so far"),
+    "center_of_mass": ("posture.center_of_mass", ("axis",), "m", "centre of mass in world axes"),
+    "kinetic_energy": ("kinetic_energy_J", (), "J", "kinetic energy"),
+    "elastic_energy": ("elastic_energy_J", (), "J", "energy of strands and springs"),
+    "potential_energy": ("potential_energy_J", (), "J", "energy of the weight"),
+    "muscle_work": ("energies.muscle_work", ("muscle",), "J", "net work done by a ring muscle so far"),
+    "positive_work": (
+        "energies.positive_work",
+        ("muscle",),
+        "J",
+        "positive work of a ring muscle so far, none regained",
+    ),
+    "damping_loss": ("energies.damping_loss", (), "J", "energy lost to dampers so far"),
+    "constraint_loss": (
+        "energies.constraint_loss",
+        (),
+        "J",
+        "energy lost to contacts, friction and inextensible edges so far",
+    ),
+    "edge_strain": ("_forces.edge_strain", (), "1", "largest strain of a rod's edge"),
+    "pin_gap": ("_forces.pin_gap", (), "m", "largest gap between two pinned strands"),
+}
+"""What is recorded: where a worm has it, its dimensions, its unit and what it is."""
+_FRAME_SIGNALS = {
+    "crossing_position": ("posture.crossing", ("crossing", "axis"), "m", "position of a crossing"),
+    "qpos": ("qpos", ("coordinate",), "1", "generalised position"),
+}
 
 
 def engine_stopped(time_s: float, error: object) -> str:
@@ -89,29 +130,28 @@ class Worm(ABC):
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.
+        model: The compiled body in the engine.
+        geometry: The mesh.
+        n_segments: Number of actuated segments.
+        n_muscles: Number of ring muscles.
+        total_mass_kg: Mass of strands and pins.
         start: Where it starts; None for the model's own rest, which leads towards -x.
-        qpos: The engine's generalised positions, ``(nq,)``.
-        plastic: What the engine keeps of the rods' frames, ``(nplastic,)``.
-        act: The engine's actuator states, ``(n_states,)``.
-        engine: The engine's arrays that a step is read from, by name.
-        warned: How often the engine has given each of its warnings.
-        posture: Where the body is.
-        touch: What the skin feels of the ground, and how far it has slid.
-        energies: What the muscles have done so far, and where it went.
     """
 
-    qpos: Array
-    plastic: Array
-    act: Array
-    engine: Engine
-    warned: NDArray[np.int32]
-    posture: Posture
-    touch: Touch
-    energies: EnergyTotals
+    qpos: Array  # the engine's generalised positions, (nq,)
+    plastic: Array  # what the engine keeps of the rods' frames, (nplastic,)
+    act: Array  # the engine's actuator states, (n_states,)
+    engine: Engine  # the engine's arrays that a step is read from
+    warned: NDArray[np.int32]  # how often the engine has given each of its warnings
+    posture: Posture  # where the body is
+    touch: Touch  # what the skin feels of the ground, and how far it has slid
+    energies: EnergyTotals  # what the muscles have done so far, and where it went
 
     def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
         """Makes a worm that has sensed nothing yet."""
-        self.anatomy = anatomy
+        self.anatomy, self.model, self.geometry = anatomy, anatomy.model, anatomy.geometry
+        self.n_segments, self.n_muscles = anatomy.n_segments, anatomy.n_muscles
+        self.total_mass_kg = float(anatomy.model.body_mass.sum())
         self._config = config
         body, arena = body_and_arena(config)
         self._body = body
@@ -130,41 +170,12 @@ class Worm(ABC):
         self.start = turned(anatomy.model, at_rest(anatomy.model), heading_turn(heading)) if heading else None
 
     @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled body."""
-        return self.anatomy.model
-
-    @property
-    def geometry(self) -> MeshGeometry:
-        """The mesh."""
-        return self.anatomy.geometry
-
-    @property
-    def n_segments(self) -> int:
-        """Number of actuated segments."""
-        return self.anatomy.n_segments
-
-    @property
-    def n_muscles(self) -> int:
-        """Number of ring muscles."""
-        return self.anatomy.n_muscles
-
-    @property
-    def total_mass_kg(self) -> float:
-        """Mass of strands and pins."""
-        return float(self.model.body_mass.sum())
-
-    @property
     def _time_s(self) -> float:
         return self._control_step * self._config.clock.control_timestep_s
 
     @abstractmethod
     def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps under an activation, ``(n_muscles,)``.
-
-        Raises:
-            SimulationStopped: The engine gave up.
-        """
+        """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
 
     @abstractmethod
     def kinetic_energy_J(self) -> float:
@@ -225,13 +236,7 @@ class Worm(ABC):
         return self.observe()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step.
-
-        Args:
-            activation: Muscle activation in [0, 1], shape ``(n_muscles,)``.
-
-        Returns:
-            What the body feels at the end of the step.
+        """Advances by one control step under an activation in [0, 1], ``(n_muscles,)``; returns what the body feels.
 
         Raises:
             SimulationStopped: The engine gave up on the step.
@@ -244,18 +249,7 @@ class Worm(ABC):
         return every - self._control_step % every
 
     def stride(self, activation: Array, n_steps: int) -> Sensation:
-        """Advances by several control steps, of which at most the last one moves the body.
-
-        Args:
-            activation: Muscle activation in the last of them, in [0, 1], shape ``(n_muscles,)``.
-            n_steps: How many, from 1 to `steps_to_move`.
-
-        Returns:
-            What the body feels at their end.
-
-        Raises:
-            SimulationStopped: The engine gave up on the step.
-        """
+        """Advances by 1 to `steps_to_move` control steps, of which at most the last one moves the body, as `step`."""
         due = self.moves_due(n_steps)
         return self.strode(n_steps, self.move(activation, due) if due else None)
 
@@ -341,36 +335,22 @@ class Worm(ABC):
 
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
-        return Recordable(
-            signals=_signals(self.anatomy),
-            coords={"muscle": self.anatomy.muscle_names, "axis": ("x", "y", "z"), "side": SIDES},
-            attrs={"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m},
+        signals = (
+            Signal(name, dims, np.shape(self._value(path)), units, words, name in _FRAME_SIGNALS)
+            for name, (path, dims, units, words) in (_SIGNALS | _FRAME_SIGNALS).items()
+            if (name != "edge_strain" or self.anatomy.has_edges) and (name != "pin_gap" or self.anatomy.pins_can_part)
         )
+        coords = {"muscle": self.anatomy.muscle_names, "axis": ("x", "y", "z"), "side": SIDES}
+        attrs = {"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m}
+        return Recordable(tuple(signals), coords, attrs)
 
     def read(self, frame: bool) -> Values:
         """Reads the present values of the frame signals, or of all others."""
-        posture, forces, touch = self.posture, self._forces, self.touch
-        if frame:
-            return {"crossing_position": posture.crossing, "qpos": self.qpos}
-        return {
-            "stretch_length": posture.stretch,
-            "spring_length": posture.spring_length,
-            "ring_length": posture.ring_length,
-            "muscle_force": self._tension_N,
-            "contact_force": forces.contact,
-            "touch": touch.normal,
-            "contact_count": touch.count,
-            "slip_speed": touch.slip_speed,
-            "slip_distance": touch.slip_distance,
-            "slip_loss": touch.slip_loss,
-            "center_of_mass": posture.center_of_mass,
-            "kinetic_energy": self.kinetic_energy_J(),
-            "elastic_energy": self.elastic_energy_J(),
-            "potential_energy": self.potential_energy_J(),
-            "edge_strain": forces.edge_strain,
-            "pin_gap": forces.pin_gap,
-            **self.energies._asdict(),
-        }
+        return {name: self._value(path) for name, (path, *_) in (_FRAME_SIGNALS if frame else _SIGNALS).items()}
+
+    def _value(self, path: str) -> Array | float:
+        value = attrgetter(path)(self)
+        return value() if callable(value) else value
 
     def get_state(self) -> State:
         """Returns the engine's whole state and what was sensed last."""
@@ -420,11 +400,7 @@ class WormPlant(Worm):
         self.reset(0)
 
     def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps under an activation, ``(n_muscles,)``.
-
-        Raises:
-            SimulationStopped: The engine gave up.
-        """
+        """Takes physics steps with this worm's own engine, as `Worm.move`."""
         data = self.data
         data.ctrl[:] = self.control(activation, n_steps)
         try:
@@ -470,38 +446,3 @@ class WormPlant(Worm):
 
     def _locate(self) -> Posture:
         return self.anatomy.posture(*self.anatomy.locate(self.data))
-
-
-def _signals(anatomy: Anatomy) -> tuple[Signal, ...]:
-    """Names what a worm of this anatomy records."""
-    n, m, geometry = anatomy.n_segments, anatomy.n_muscles, anatomy.geometry
-    sensors, springs, crossings = anatomy.rest_stretch_m.shape, len(geometry.springs), geometry.n_crossings
-    force = "contractile force of a ring muscle over the last physics step; with RK4 that of its last stage"
-    constraints = "energy lost to contacts, friction and inextensible edges so far"
-    strain = Signal("edge_strain", (), (), "1", "largest strain of a rod's edge")
-    gap = Signal("pin_gap", (), (), "m", "largest gap between two pinned strands")
-    position, coordinates = "position of a crossing", (anatomy.model.nq,)
-    return (
-        Signal("stretch_length", ("segment", "sensor"), sensors, "m", "length of the springs that span a ring"),
-        Signal("spring_length", ("spring",), (springs,), "m", "length of an axial spring"),
-        Signal("ring_length", ("muscle",), (m,), "m", "length of a ring muscle"),
-        Signal("muscle_force", ("muscle",), (m,), "N", force),
-        Signal("contact_force", ("segment", "axis"), (n, 3), "N", "force of the arena on a segment"),
-        Signal("touch", ("segment", "side"), (n, len(SIDES)), "N", "normal force of the ground on a side"),
-        Signal("contact_count", ("segment",), (n,), "1", "number of vertices that touch the ground"),
-        Signal("slip_speed", ("segment",), (n,), "m/s", "forward speed along the ground of what touches it"),
-        Signal("slip_distance", ("segment",), (n,), "m", "way that what touches the ground has slid so far"),
-        Signal("slip_loss", ("segment",), (n,), "J", "work of a segment lost to friction so far"),
-        Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass in world axes"),
-        Signal("kinetic_energy", (), (), "J", "kinetic energy"),
-        Signal("elastic_energy", (), (), "J", "energy of strands and springs"),
-        Signal("potential_energy", (), (), "J", "energy of the weight"),
-        Signal("muscle_work", ("muscle",), (m,), "J", "net work done by a ring muscle so far"),
-        Signal("positive_work", ("muscle",), (m,), "J", "positive work of a ring muscle so far, none regained"),
-        Signal("damping_loss", (), (), "J", "energy lost to dampers so far"),
-        Signal("constraint_loss", (), (), "J", constraints),
-        *((strain,) if anatomy.has_edges else ()),
-        *((gap,) if anatomy.pins_can_part else ()),
-        Signal("crossing_position", ("crossing", "axis"), (crossings, 3), "m", position, every_frame=True),
-        Signal("qpos", ("coordinate",), coordinates, "1", "generalised position", every_frame=True),
-    )

@@ -53,12 +53,7 @@ Nearest = Surface
 
 @dataclass(frozen=True)
 class Plane(Surface):
-    """An even surface.
-
-    Attributes:
-        facing: Its unit normal, ``(3,)``.
-        offset_m: Its distance from the origin along the normal, m.
-    """
+    """An even surface, with its unit normal, ``(3,)``, and its distance from the origin along that, m."""
 
     facing: Array
     offset_m: float

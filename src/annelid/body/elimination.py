@@ -63,15 +63,10 @@ def _couplings(model: mujoco.MjModel, bodies: Indices) -> Indices:
 
 
 def nested_dissection(pairs: Indices, position: Array, largest_part: int = LARGEST_PART) -> Indices:
-    """Orders the vertices of a graph that extends along one axis for elimination with little fill.
+    """Orders the vertices of a graph that extends along one axis for elimination with little fill, ``(n_vertices,)``.
 
-    Args:
-        pairs: The coupled vertices, both ways, shape ``(n_pairs, 2)``.
-        position: Each vertex's place along the axis, shape ``(n_vertices,)``.
-        largest_part: Vertices of a part that is not cut any further.
-
-    Returns:
-        The vertices in order of elimination, shape ``(n_vertices,)``.
+    Given are the coupled vertices, both ways, ``(n_pairs, 2)``, each one's place along the axis, and the size of a part
+    that is not cut any further.
     """
     neighbours: list[set[int]] = [set() for _ in position]
     for one, other in pairs.tolist():

@@ -57,12 +57,8 @@ class Entry:
     """One kind of number in an observation.
 
     Attributes:
-        name: For example ``"ring_strain"``.
-        shape: Shape of these numbers.
-        unit: Of the number before it is scaled.
         low: What the lower end of the scaled range stands for: ``-high`` or 0.
         high: What 1 stands for; numbers beyond are clipped.
-        meaning: What it is, in words.
     """
 
     name: str
@@ -162,11 +158,6 @@ class Episode:
     """The state of one worm's episode, whoever steps the worm.
 
     Attributes:
-        task: What is asked of the worm.
-        worm: The worm.
-        layout: How observations are laid out.
-        sensation: What the worm feels, without noise.
-        activation: Activation of its muscles, ``(n_muscles,)``.
         stopped: Why the simulation of the worm broke down; empty while it goes on.
     """
 
@@ -213,13 +204,7 @@ class Episode:
         self._work_J = float(self.worm.energies.muscle_work.sum())
 
     def activations(self, action: ArrayLike) -> Array:
-        """Returns the activations of every physics step: a ramp from the last action to this one.
-
-        Args:
-            action: Activation of every ring muscle in [0, 1], ``(n_muscles,)``.
-
-        Returns:
-            Shape ``(moves_per_step, n_muscles)``; the last row is the action.
+        """Returns the activations of every physics step, a ramp from the last action to this, ``(n_moves, n_muscles)``.
 
         Raises:
             ConfigError: The episode has ended, or the action has another shape or a value out of its range.

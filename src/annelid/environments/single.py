@@ -164,12 +164,7 @@ class Pictures:
     """Draws worms as they are now, with one scene for each different model."""
 
     def __init__(self, mode: str | None, camera: str, width: int, height: int) -> None:
-        """Keeps how they are to be drawn.
-
-        Raises:
-            RunFileError: No camera has that name.
-            ConfigError: No render mode has that name, or a picture without pixels.
-        """
+        """Keeps how they are to be drawn; `AnnelidError` for what cannot be."""
         if mode is not None and mode not in RENDER_MODES:
             raise ConfigError(f"unknown render_mode {mode!r}: {suggest(mode, RENDER_MODES)}")
         view_angles(camera)
@@ -180,11 +175,7 @@ class Pictures:
         weakref.finalize(self, _close, self._scenes)
 
     def draw(self, episode: Episode) -> NDArray[np.uint8]:
-        """Draws a worm: pixels, ``(height, width, 3)``.
-
-        Raises:
-            RenderingUnavailable: No OpenGL back-end works.
-        """
+        """Draws a worm: pixels, ``(height, width, 3)``."""
         config = episode.task.config
         drawn = config.model_dump_json(include={"body", "arena"})
         if drawn not in self._scenes:

@@ -21,11 +21,6 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
     the clock the body is built anew and takes over the old one's state; so does the controller. Either way the worm
     moves on as one does that was built with the new values and brought into this state.
 
-    Args:
-        running: Plant, controller and noise, whose plant and controller can be saved.
-        before: The configuration that it was built with, or last adjusted to.
-        after: Another, with as many coordinates, muscles and neurons.
-
     Raises:
         ConfigError: The new body or controller cannot be built, or has other states than the running one.
     """

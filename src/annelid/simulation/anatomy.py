@@ -82,14 +82,8 @@ class Anatomy:
     """The parts of one compiled worm, found once.
 
     Attributes:
-        model: The compiled body.
-        geometry: The mesh.
-        rings: The ring actuators' section.
-        muscle_names: Names of the ring muscles.
-        ring_path: Crossings that each of them runs through, in order, ``(n_muscles, n_corners)``.
+        ring_path: Crossings that each ring muscle runs through, in order, ``(n_muscles, n_corners)``.
         crossing_body: The engine's body at every crossing, ``(n_crossings,)``.
-        n_segments: Number of actuated segments.
-        n_muscles: Number of ring muscles.
         rest_stretch_m: Lengths of the stretch sensors at rest, m, ``(n_segments, n_sensors)``.
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
@@ -97,7 +91,6 @@ class Anatomy:
         elasticity: The energy that strands, joints and springs hold.
         energy_meter: What a physics step does, in work.
         outputs: Names of the engine's arrays that `forces` needs.
-        skin: The geoms that can touch the ground.
     """
 
     def __init__(self, model: mujoco.MjModel, body: WormBody, surface: Surface) -> None:
@@ -150,9 +143,7 @@ class Anatomy:
     def locate(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
         """Brings the engine's positions up to its coordinates, which is not part of a step.
 
-        Returns:
-            Positions of the crossings, ``(n_crossings, 3)``, of the centre of mass, ``(3,)``, and of the geoms that can
-            touch, ``(n_geoms, 3)``, m.
+        Returns those of crossings, ``(n_crossings, 3)``, centre of mass, ``(3,)``, and skin, ``(n_geoms, 3)``, m.
         """
         mujoco.mj_kinematics(self.model, data)
         return (

@@ -205,11 +205,7 @@ def _refuse_differences(configs: Sequence[RunConfig]) -> None:
 
 
 def threads_for(n_worms: int, threads: int | None) -> int:
-    """Returns the number of threads for a batch: no more than worms, by default one a processor.
-
-    Raises:
-        ConfigError: Less than one.
-    """
+    """Returns the number of threads for a batch: no more than worms, by default one a processor."""
     if threads is not None and threads < 1:
         raise ConfigError(f"threads = {threads}: must be at least 1")
     return min(n_worms, threads or os.cpu_count() or 1)
@@ -232,12 +228,7 @@ class Team(Loop):
         folders: Sequence[Path],
         all_runs: list[RecordedRun],
     ) -> None:
-        """Lays out the worms' run files and adds each run to ``all_runs`` once its file is there.
-
-        Raises:
-            ConfigError: Worms that do not fit into one batch.
-            RunFileError: A run file cannot be made.
-        """
+        """Lays out the worms' run files and adds each run to ``all_runs`` once its file is there."""
         self._bodies = BodyBatch(configs, anatomies)
         worms = self._worms = self._bodies.worms
         pairs = zip(configs, worms, strict=True)
@@ -297,9 +288,7 @@ class Team(Loop):
 class CopiedController(Stateful, Protocol):
     """The capability of a controller of advancing many copies of itself at once.
 
-    Attributes:
-        alike: Equal for controllers that are copies of one another.
-        own: What may differ between the copies.
+    Controllers that are copies of one another are ``alike``; what may differ between them is their ``own``.
     """
 
     alike: Hashable
@@ -329,11 +318,7 @@ def grouped(simulations: Sequence[Simulation]) -> list[ControllerGroup]:
 
 
 class ControllerGroup:
-    """Controllers of some worms between two events of the run; as it is, one controller of any kind.
-
-    Attributes:
-        rows: The worms.
-    """
+    """Controllers of some worms, ``rows``, between two events of the run; as it is, one controller of any kind."""
 
     def __init__(self, rows: Sequence[int], simulations: Sequence[Simulation]) -> None:
         """Takes worms that are all noisy or all not."""
@@ -341,11 +326,7 @@ class ControllerGroup:
         self._strides = not simulations[0].is_noisy and isinstance(simulations[0].controller, StridingController)
 
     def advance(self, n_steps: int) -> tuple[dict[int, Array], dict[int, Exception]]:
-        """Takes control steps with the bodies at rest.
-
-        Returns:
-            The activation of every worm after the last of them, and the errors of those whose controllers failed.
-        """
+        """Takes control steps with the bodies at rest; returns the last activations, and errors of those that fail."""
         activation: dict[int, Array] = {}
         errors: dict[int, Exception] = {}
         try:

@@ -36,11 +36,7 @@ class BodyBatch:
     """
 
     def __init__(self, configs: Sequence[RunConfig], anatomies: Sequence[Anatomy]) -> None:
-        """Makes the bodies.
-
-        Args:
-            configs: One configuration for each worm, alike in what `annelid.simulation.batch.ALIKE` names.
-            anatomies: Their compiled bodies, as `compile_worms` returns them.
+        """Makes the bodies of worms, alike in what `annelid.simulation.batch.ALIKE` names, from their compiled bodies.
 
         Raises:
             ConfigError: Two models' arrays differ in size.
@@ -63,15 +59,9 @@ class BodyBatch:
         self.worms = [BatchWorm(config, anatomy, self, row) for row, (config, anatomy) in worms]
 
     def move(self, rows: Sequence[int], activation: Array, n_steps: int) -> dict[int, str]:
-        """Takes physics steps with some of the bodies.
+        """Takes physics steps with some bodies, in ascending order, under an activation, ``(len(rows), n_muscles)``.
 
-        Args:
-            rows: The bodies, in ascending order.
-            activation: Muscle activation of each of them, ``(len(rows), n_muscles)``.
-            n_steps: Number of physics steps.
-
-        Returns:
-            Why the engine gave up, for every body that it could not step.
+        Returns why the engine gave up, for every body that it could not step.
         """
         going, reasons = dict(zip(rows, activation, strict=True)), {}
         for row, own in going.items():
@@ -133,11 +123,7 @@ class BatchWorm(Worm):
         self.warned = bodies.batch.warning[row, :, _TIMES_GIVEN]
 
     def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps with this worm alone.
-
-        Raises:
-            SimulationStopped: The engine gave up.
-        """
+        """Takes physics steps with this worm alone, as `Worm.move`."""
         reasons = self._bodies.move([self._row], activation[np.newaxis], n_steps)
         if reasons:
             raise SimulationStopped(reasons[self._row])
@@ -172,11 +158,7 @@ class BatchWorm(Worm):
 
 
 def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
-    """Compiles one model for each physical configuration; returns the anatomy of every worm.
-
-    Raises:
-        ConfigError: The engine refuses a model.
-    """
+    """Compiles one model for each physical configuration; returns the anatomy of every worm, as `compile_worm`."""
     models: dict[str, Anatomy] = {}
     anatomies: list[Anatomy] = []
     for config in configs:

@@ -156,7 +156,8 @@ def restore_generator(words: NDArray[np.uint64]) -> np.random.Generator:
     if words.shape != (6,) or words.dtype != np.uint64 or not words[3] & 1 or words[4] > 1 or words[5] >> 32:
         raise ValueError("no generator of noise has the state that it holds")
     high, low, inc_high, inc_low, has_uint32, uinteger = words.tolist()
-    bits = np.random.PCG64()
     numbers = {"state": high * _WORD + low, "inc": inc_high * _WORD + inc_low}
-    bits.state = {"bit_generator": "PCG64", "state": numbers, "has_uint32": has_uint32, "uinteger": uinteger}
+    state: Any = {"bit_generator": "PCG64", "state": numbers, "has_uint32": has_uint32, "uinteger": uinteger}
+    bits = np.random.PCG64()
+    bits.state = state
     return np.random.Generator(bits)

@@ -55,14 +55,7 @@ def create(
 ) -> dict[str, Extent]:
     """Lays out the file, making its folder if needed; it appears under its name only when it is complete.
 
-    Args:
-        path: The file; one that exists is replaced.
-        sizes: Size of every dimension.
-        variables: All variables.
-        attrs: Global attributes.
-
-    Returns:
-        Where each variable lies in the file.
+    One that exists is replaced. Returns where each variable lies in the file.
 
     Raises:
         RunFileError: The folder cannot be made or written, or the disk has no room. Nothing is left behind.

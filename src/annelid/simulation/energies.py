@@ -62,12 +62,7 @@ class EnergyTotals(NamedTuple):
 
 
 class EnergyMeter:
-    """Reads from the engine's arrays what one physics step did.
-
-    Attributes:
-        outputs: Names of the engine's arrays that `step` needs.
-        slopes: Slopes of the actuators where the integrator needs them, else None.
-    """
+    """Reads from the engine's arrays, those named in ``outputs``, what one physics step did."""
 
     outputs = (
         "qvel",
@@ -88,16 +83,11 @@ class EnergyMeter:
         self.slopes = rings.slopes(model) if implicit else None
 
     def step(self, engine: Engine, drive: Array) -> tuple[Array, EnergyTotals]:
-        """Returns what the actuators pulled with in one step, and what the step did.
+        """Returns the tension of every ring actuator over one step, N, ``(n_muscles,)``, and what the step did.
 
-        Args:
-            engine: The engine's arrays named in `outputs`, of one worm, after the step.
-            drive: What the actuators' gain was multiplied by during it: the control, or the engine's actuator states
-                before the step where there are any; ``(n_muscles,)``.
-
-        Returns:
-            Tension of every ring actuator that acted over the step, N, ``(n_muscles,)``: its work is this times the
-            shortening. And the step's entries.
+        An actuator's work is its tension times the shortening. Given are the engine's arrays of one worm after the
+        step, and what the actuators' gain was multiplied by during it, ``(n_muscles,)``: the control, or the engine's
+        actuator states before the step where there are any.
         """
         velocity, h = engine["qvel"], self._timestep_s
         # Rates of the actuators' lengths, m/s, with the lever arms of the step.
@@ -132,10 +122,8 @@ class Elasticity:
     def energy_J(self, qpos: Array, plastic: Array, spring_length_m: Array) -> float:
         """Returns the energy at one instant, J, zero where nothing is bent, twisted or stretched.
 
-        Args:
-            qpos: The engine's generalised positions, ``(nq,)``.
-            plastic: Its plastic state, ``(nplastic,)``, all zero before the first step.
-            spring_length_m: Lengths of the axial springs, m, ``(n_springs,)``.
+        Given are the engine's generalised positions, ``(nq,)``, and plastic state, ``(nplastic,)``, all zero before the
+        first step, and the lengths of the axial springs, m, ``(n_springs,)``.
         """
         stretch = spring_length_m - spring_length_m.clip(*self._spring_slack)
         hinge = qpos[self._angle] - self._angle_at_rest
@@ -229,7 +217,7 @@ def _seen(product: Array, scale: Array, angle: Array) -> NDArray[np.complex128]:
     turned = np.exp(-1j * angle)
     front = (1j * product[1, 0] - product[2, 0]) * turned[:, :-1]
     rear = (product[0, 2] - 1j * product[0, 1]) * turned[:, 1:]
-    return 2.0 * scale * np.stack([front, rear])
+    return np.stack([front, rear]) * (2.0 * scale)
 
 
 def _dot(a: Array, b: Array) -> Array:

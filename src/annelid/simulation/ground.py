@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
@@ -30,10 +29,16 @@ class MovingGround:
         geoms = np.stack([model.pair_geom1, model.pair_geom2])
         mocap = model.body_mocapid[model.geom_bodyid[geoms]]
         plane, pair = (mocap[1] >= 0).astype(int), np.arange(model.npair)
-        skin, self._planes = geoms[1 - plane, pair], mocap[plane, pair]
-        self._skin, self._bodies = skin, model.geom_bodyid[skin]
+        self._skin, self._planes = geoms[1 - plane, pair], mocap[plane, pair]
+        self._bodies = model.geom_bodyid[self._skin]
         self._roots = model.body_rootid[self._bodies]
-        self._setae = _Setae(model, geometry, arena, skin) if arena.has_setae else None
+        self._arena = arena
+        n_planes, data = len(geometry.plane_x_m), mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        # What friction by the direction of sliding needs: means over crossing planes, and the one nearest at rest.
+        self._crossing_site = np.array([model.site(f"crossing_{i}").id for i in range(geometry.n_crossings)])
+        self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
+        self._plane = np.abs(data.geom_xpos[self._skin, :1] - geometry.plane_x_m).argmin(axis=1)
 
     def lay(self, data: mujoco.MjData) -> None:
         """Lays every plane where the ground is nearest to its part of the skin, and sets friction.
@@ -52,8 +57,20 @@ class MovingGround:
             ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
             data.mocap_pos[self._planes] = places - (distance - ahead)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
-            if self._setae is not None:
-                model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
+            if self._arena.has_setae:
+                model.pair_friction[:, :2] = self._friction(data, velocity)[:, np.newaxis]
+
+    def _friction(self, data: mujoco.MjData, velocity: Array) -> Array:
+        """The coefficient of every part of the skin by the sign of its velocity along the worm's axis there, as setae.
+
+        A part that sticks creeps towards where it is pushed, since contacts are soft, so the sign holds at rest too.
+        """
+        centres = self._mean @ data.site_xpos[self._crossing_site]
+        along = np.empty_like(centres)
+        along[1:-1] = centres[:-2] - centres[2:]
+        along[0], along[-1] = centres[0] - centres[1], centres[-2] - centres[-1]
+        forwards = (velocity * along[self._plane]).sum(axis=-1)
+        return np.where(forwards < 0.0, self._arena.backward_friction or 0.0, self._arena.friction)
 
 
 def facing(normal: Array) -> Array:
@@ -63,31 +80,3 @@ def facing(normal: Array) -> Array:
     # Straight down any half turn about a level axis will do.
     turn[z < -1.0 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
     return turn / np.sqrt((turn * turn).sum(axis=-1))[:, np.newaxis]
-
-
-class _Setae:
-    """Friction of each part of the skin by the sign of its velocity along the worm's axis there.
-
-    A part that sticks creeps towards where it is pushed, since contacts are soft, so the sign holds at rest too.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, geometry: MeshGeometry, arena: ArenaKind, skin: NDArray[np.int32]
-    ) -> None:
-        assert arena.backward_friction is not None
-        self._forwards, self._backwards = arena.friction, arena.backward_friction
-        n_planes = len(geometry.plane_x_m)
-        self._crossing_site = np.array([model.site(f"crossing_{i}").id for i in range(geometry.n_crossings)])
-        self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        self._plane = np.abs(data.geom_xpos[skin, :1] - geometry.plane_x_m).argmin(axis=1)
-
-    def friction(self, data: mujoco.MjData, velocity: Array) -> Array:
-        """Returns the coefficient, ``(n_skin,)``, of every part of the skin by its velocity, m/s, ``(n_skin, 3)``."""
-        centres = self._mean @ data.site_xpos[self._crossing_site]
-        along = np.empty_like(centres)
-        along[1:-1] = centres[:-2] - centres[2:]
-        along[0], along[-1] = centres[0] - centres[1], centres[-2] - centres[-1]
-        forwards = (velocity * along[self._plane]).sum(axis=-1)
-        return np.where(forwards < 0.0, self._backwards, self._forwards)

@@ -15,14 +15,7 @@ from annelid.errors import ConfigError, RunFileError, SimulationStopped
 from annelid.protocols import Controller, Plant, Records, Sensation, Values
 from annelid.simulation.lock import locks
 from annelid.simulation.progress import Interruption, ProgressCallback, reporting
-from annelid.simulation.recorder import (
-    Recorder,
-    global_attributes,
-    loop_signals,
-    recordable_of,
-    sensation_signals,
-    sensation_values,
-)
+from annelid.simulation.recorder import Recorder, Senses, global_attributes, loop_signals
 from annelid.simulation.runfile import FILE_NAME, Origin, Run, continued_config, open_run, origin_of, refuse_used_folder
 from annelid.simulation.stepping import Simulation, as_controller, build_plant, start
 
@@ -103,18 +96,16 @@ class RecordedRun:
     """
 
     def __init__(self, config: RunConfig, simulation: Simulation, path: Path, origin: Origin | None = None) -> None:
-        """Lays out the run file of a simulation that is about to begin, or to continue another run.
-
-        Raises:
-            RunFileError: The file cannot be made.
-        """
+        """Lays out the run file of a simulation that is about to begin, or to continue another run."""
         self.simulation = simulation
         self.status = "running_or_killed"
         self.message = ""
         self.error: BaseException | None = None
         plant, controller = simulation.plant, simulation.controller
-        of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(simulation.sensation)
-        parts = [of_plant, recordable_of(controller), loop_signals(plant.n_muscles)]
+        sources = [plant if isinstance(plant, Records) else Senses(lambda: simulation.sensation)]
+        sources += [controller] if isinstance(controller, Records) else []
+        self._readers = [source.read for source in sources]
+        parts = [*(source.recordable() for source in sources), loop_signals(plant.n_muscles)]
         first = simulation.checkpoint()
         packed = None if first is None else first.to_bytes()
         # The configured controller overrides this with its own attribute; without it the file would name that one.
@@ -122,8 +113,6 @@ class RecordedRun:
         attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
         rest_stretch_m = simulation.sensation.rest_stretch_m
         self._recorder = Recorder(path, simulation.schedule, parts, rest_stretch_m, packed, attrs)
-        self._readers = [plant.read if isinstance(plant, Records) else self._read_sensation]
-        self._readers += [controller.read] if isinstance(controller, Records) else []
 
     def record(self, wall_time_s: float) -> None:
         """Records a sample and a frame, where one is due."""
@@ -174,17 +163,9 @@ class RecordedRun:
         self.status, self.message = status, message
         (self._recorder.finish if whole else self._recorder.close)(status, message)
 
-    def _read_sensation(self, frame: bool) -> Values:
-        return {} if frame else sensation_values(self.simulation.sensation)
-
 
 class Loop:
-    """The loop of a run, or of runs that go on together in one thread: they advance, and each is recorded.
-
-    Attributes:
-        runs: All of them.
-        going: Those that have not ended, by their number.
-    """
+    """The loop of a run, or of runs that go on together in one thread; those that have not ended are ``going``."""
 
     flush_interval_s = 0.5
     checkpoint_interval_s = 1.0

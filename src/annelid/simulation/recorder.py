@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from annelid.config import RunConfig
-from annelid.protocols import Array, Controller, Plant, Recordable, Records, Sensation, Signal, Values
+from annelid.protocols import Array, Recordable, Sensation, Signal, Values
 from annelid.simulation import container
 from annelid.simulation.checkpoint import slot_capacity, to_slot
 from annelid.simulation.container import RawWriter, Variable
@@ -48,7 +48,8 @@ class Schedule:
         """Returns the schedule of a configuration whose run starts after ``start`` control steps."""
         timestep_s, record = config.clock.control_timestep_s, config.record
         times_s = config.duration_s, record.signals_interval_s, record.frames_interval_s
-        return cls(start, *(round(time_s / timestep_s) for time_s in times_s), timestep_s)
+        end, sample_every, frame_every = (round(time_s / timestep_s) for time_s in times_s)
+        return cls(start, end, sample_every, frame_every, timestep_s)
 
     def times_s(self, every: int) -> Array:
         """Returns the times of what is recorded every so many steps from time zero on, both ends included, s."""
@@ -63,11 +64,6 @@ class Schedule:
         return min(to_sample, to_frame, self.end - step)
 
 
-def recordable_of(part: Plant | Controller) -> Recordable:
-    """Returns what a plant or a controller offers to the recorder; nothing if it does not record."""
-    return part.recordable() if isinstance(part, Records) else Recordable()
-
-
 _SENSED = {
     "stretch_length": ("stretch_m", ("segment", "sensor"), "m", "length of a stretch sensor"),
     "ring_length": ("ring_length_m", ("muscle",), "m", "length of a ring muscle"),
@@ -78,19 +74,22 @@ _SENSED = {
 """The sensation's own signals, recorded for a plant that names none: field, dimensions, unit and what it is."""
 
 
-def sensation_signals(sensation: Sensation) -> Recordable:
-    """Returns the sensation's own signals."""
-    return Recordable(
-        tuple(
-            Signal(name, dims, getattr(sensation, field).shape, units, long_name)
-            for name, (field, dims, units, long_name) in _SENSED.items()
-        )
-    )
+class Senses:
+    """Records the sensation of a plant that names no signals of its own."""
 
+    def __init__(self, sensation: Callable[[], Sensation]) -> None:
+        """Takes what gives the latest."""
+        self._sensation = sensation
 
-def sensation_values(sensation: Sensation) -> Values:
-    """Returns the present values of `sensation_signals`."""
-    return {name: getattr(sensation, field) for name, (field, *_) in _SENSED.items()}
+    def recordable(self) -> Recordable:
+        """Names the signals."""
+        shapes = {name: np.shape(value) for name, value in self.read(False).items()}
+        return Recordable(tuple(Signal(name, d, shapes[name], u, words) for name, (_, d, u, words) in _SENSED.items()))
+
+    def read(self, frame: bool) -> Values:
+        """Reads the present values."""
+        latest = self._sensation()
+        return {} if frame else {name: getattr(latest, field) for name, (field, *_) in _SENSED.items()}
 
 
 def loop_signals(n_muscles: int) -> Recordable:
@@ -130,16 +129,10 @@ def _version(distribution: str) -> str:
 def layout(
     schedule: Schedule, parts: Sequence[Recordable], rest_stretch_m: Array, checkpoint: bytes | None
 ) -> tuple[dict[str, int], list[Variable]]:
-    """Lays out a run file.
+    """Lays out a run file: the size of every dimension, and all variables.
 
-    Args:
-        schedule: When is recorded.
-        parts: What the plant, the controller and the loop record.
-        rest_stretch_m: Lengths of the stretch sensors at rest, m, shape ``(n_segments, n_sensors)``.
-        checkpoint: The first checkpoint, or None if this simulation cannot be continued.
-
-    Returns:
-        The size of every dimension, and all variables.
+    The parts are what the plant, the controller and the loop record, the lengths at rest those of the stretch sensors,
+    m, ``(n_segments, n_sensors)``; without a first checkpoint the simulation cannot be continued.
 
     Raises:
         ValueError: Two signals share a name, or give one dimension different sizes.
@@ -223,11 +216,7 @@ class _Block:
 
 
 class Recorder:
-    """Fills a run file: gathers samples in memory and writes them in place.
-
-    Raises:
-        RunFileError: The file cannot be written (here and from every method).
-    """
+    """Fills a run file: gathers samples in memory and writes them in place; `RunFileError` where it cannot."""
 
     def __init__(
         self,

@@ -36,14 +36,7 @@ SCHEMA_VERSION = 2
 CHECKED_ON_OPENING_BYTES = 64_000_000
 """Files up to this size are compared with their digests whenever they are opened; larger ones by `verify_run` only."""
 SLOTS = ("checkpoint/slot_0", "checkpoint/slot_1")
-STATUSES = (
-    "running_or_killed",
-    "complete",
-    "interrupted",
-    "stopped_by_guard",
-    "disk_failure",
-    "failed",
-)
+STATUSES = ("running_or_killed", "complete", "interrupted", "stopped_by_guard", "disk_failure", "failed")
 """How a run ended, in the order of the file's ``status_code``; ``failed``: its plant or controller raised."""
 
 CPU_TIME = "cpu_time"
@@ -109,7 +102,7 @@ def open_run(path: str | Path) -> Run:
     Raises:
         RunFileError: There is no such file, it is no annelid run, or it is truncated or damaged.
     """
-    file = _checked_file(path)
+    file = _examined_file(path)[0]
     with _dataset(file) as dataset:
         marks = dataset[[*_BOOKKEEPING, WARNINGS, CPU_TIME]].load()
         n_samples = _count(marks, "samples_written", dataset.sizes["time"])
@@ -130,14 +123,11 @@ def open_run(path: str | Path) -> Run:
 
 
 def migrated(data: xarray.Dataset) -> xarray.Dataset:
-    """Returns the content of a run file of any schema up to the present one in the present one.
+    """Returns all variables and attributes of a run file of any schema up to the present one in the present one.
 
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
     Up to schema 1 the name of a configuration decided which published numbers its runs were compared with.
-
-    Args:
-        data: All variables and attributes of a run file.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
@@ -190,25 +180,17 @@ def _dataset(file: Path) -> Iterator[xarray.Dataset]:
 
 
 def read_config(path: str | Path) -> RunConfig:
-    """Reads the configuration of a run.
-
-    Raises:
-        RunFileError: As `open_run`.
-    """
-    file = _checked_file(path)
+    """Reads the configuration of a run, from its folder or its file; raises as `open_run`."""
+    file = _examined_file(path)[0]
     with _dataset(file) as dataset:
         return _config(file, dataset.attrs)
 
 
 def read_checkpoint(path: str | Path) -> Checkpoint:
-    """Reads the last checkpoint of a run.
-
-    Raises:
-        RunFileError: As `open_run`, or the run has no checkpoint.
-    """
+    """Reads the last checkpoint of a run; raises as `open_run`, or where the run has no checkpoint."""
     import h5py
 
-    file = _checked_file(path)
+    file = _examined_file(path)[0]
     with _reading(file):
         with h5py.File(file, "r") as content:
             slots = [content[name][()].tobytes() for name in SLOTS if name in content]  # type: ignore[index]
@@ -222,14 +204,8 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
 def verify_run(path: str | Path) -> str:
     """Compares a whole run file, of any size, with the digest that was written when the run ended.
 
-    Args:
-        path: The run's folder or its file.
-
-    Returns:
-        A sentence: that it is intact, or that and why it carries no digest.
-
-    Raises:
-        RunFileError: As `open_run`; for a damaged file it names the variables that differ.
+    Returns a sentence: that it is intact, or that and why it carries no digest. Raises as `open_run`; for a damaged
+    file the error names the variables that differ.
     """
     file, finding = _examined_file(path, whole=True)
     if finding.state == "intact":
@@ -241,12 +217,7 @@ def verify_run(path: str | Path) -> str:
 
 
 def refuse_used_folder(out: Path, overwrite: bool) -> None:
-    """Checks that a run may go into a folder, which is to be locked first.
-
-    Raises:
-        ConfigError: It holds something and ``overwrite`` is false.
-        RunFileError: It cannot be read.
-    """
+    """Raises `ConfigError` where a folder, which is to be locked first, is not empty and must not be overwritten."""
     try:
         # A draft is left where a process was killed while it laid out its file.
         ours = LOCK_NAME, ".run.*.part.nc"
@@ -254,11 +225,6 @@ def refuse_used_folder(out: Path, overwrite: bool) -> None:
             raise ConfigError(f"the output folder {out} is not empty: name another, or allow overwriting")
     except OSError as error:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
-
-
-def _checked_file(path: str | Path) -> Path:
-    """Returns the run file behind a path, once it is clear that it is one, whole, and safe to read."""
-    return _examined_file(path)[0]
 
 
 def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Finding]:
@@ -353,14 +319,8 @@ class Origin:
 
 
 def origin_of(run: Run | str | Path) -> Origin:
-    """Reads what is needed to continue a run.
-
-    Raises:
-        RunFileError: It is no readable run, or has no checkpoint.
-    """
-    path = Path(run.path if isinstance(run, Run) else run)
-    if path.is_dir():
-        path /= FILE_NAME
+    """Reads what is needed to continue a run; raises as `read_checkpoint`."""
+    path = _examined_file(run.path if isinstance(run, Run) else run)[0]
     return Origin(path, read_config(path), read_checkpoint(path))
 
 

@@ -47,12 +47,7 @@ class Touch:
 
 
 class Skin:
-    """The geoms of one worm that can touch, and the surface that they touch.
-
-    Attributes:
-        segment: Segment of each geom, counted from 0, ``(n_geoms,)``.
-        side: Side of each geom, an index of `SIDES`, ``(n_geoms,)``.
-    """
+    """The geoms of one worm that can touch, each with its segment and its side, ``(n_geoms,)``, and what they touch."""
 
     def __init__(
         self, rest_m: Array, segment: NDArray[np.int64], n_segments: int, radius_m: float, surface: Surface

@@ -126,7 +126,7 @@ class Simulation:
         """Takes one control step, or all up to the next movement, sample or frame where plant and controller can.
 
         Raises:
-            SimulationStopped: A value is not finite, the activation is out of range, or plant or controller is alarmed.
+            SimulationStopped: As `advanced`, or the activation is out of range.
         """
         if self._striders is None:
             n_steps = 1
@@ -143,16 +143,10 @@ class Simulation:
         self.advanced(self.sensation, activation, step, step % self._watch_every < n_steps)
 
     def advanced(self, sensation: Sensation, activation: Array, step: int, moved: bool) -> None:
-        """Takes note of control steps, whoever has taken them, and stops a run whose numbers have run away.
-
-        Args:
-            sensation: What the body feels after them.
-            activation: What the controller gave at last.
-            step: How many have been taken since time zero.
-            moved: The body has moved, so that its numbers may have run away.
+        """Takes note of control steps up to a number since time zero, whoever has taken them.
 
         Raises:
-            SimulationStopped: A value is not finite, or plant or controller is alarmed.
+            SimulationStopped: The body has moved and its numbers have run away, or plant or controller is alarmed.
         """
         self.sensation, self.activation, self.step = sensation, activation, step
         if not moved:

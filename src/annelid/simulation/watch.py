@@ -90,7 +90,7 @@ class Watch:
         activation: Array,
         force_N: Array,
     ) -> str | None:
-        """Takes note of one movement.
+        """Takes note of one movement; returns why the run cannot go on, in a sentence, or None.
 
         Args:
             time_s: Simulated time, s.
@@ -100,9 +100,6 @@ class Watch:
             gap_m: Largest gap between two pinned strands, m.
             activation: Of the movement, ``(n_muscles,)``.
             force_N: Of the actuators in its last physics step, N, ``(n_muscles,)``.
-
-        Returns:
-            Why the run cannot go on, in a sentence, or None.
         """
         active = activation > ACTIVATED
         if active.tobytes() != self._active_bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from abc import ABC, abstractmethod
 from operator import attrgetter
-from typing import cast
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -348,7 +348,7 @@ class Worm(ABC):
         """Reads the present values of the frame signals, or of all others."""
         return {name: self._value(path) for name, (path, *_) in (_FRAME_SIGNALS if frame else _SIGNALS).items()}
 
-    def _value(self, path: str) -> Array | float:
+    def _value(self, path: str) -> Any:
         value = attrgetter(path)(self)
         return value() if callable(value) else value
 
@@ -383,15 +383,7 @@ class WormPlant(Worm):
     """The 3D worm in its arena, with an engine of its own."""
 
     def __init__(self, config: RunConfig, anatomy: Anatomy | None = None) -> None:
-        """Builds and compiles the body.
-
-        Args:
-            config: The run's configuration.
-            anatomy: The body where it is compiled already.
-
-        Raises:
-            ConfigError: The body is planar, its numbers can mean nothing, or the engine refuses the model.
-        """
+        """Builds and compiles the body, unless it is compiled already; raises as `compile_worm`."""
         super().__init__(config, anatomy or compile_worm(config))
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.plastic, self.act, self.warned = data.qpos, data.plastic, data.act, data.warning.number
@@ -419,10 +411,9 @@ class WormPlant(Worm):
         return Movement(self._locate(), forces, ground)
 
     def push(self, force_N: Array) -> None:
-        """Lets outside forces act on the crossings from the next step on; the energy totals know nothing of their work.
+        """Lets outside forces, N, ``(n_crossings, 3)``, act on the crossings from the next step on; zeros end it.
 
-        Args:
-            force_N: In the model's axes, N, ``(n_crossings, 3)``; zeros end it.
+        They are in the model's axes, and the energy totals know nothing of their work.
         """
         self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
 

@@ -146,13 +146,8 @@ def spring_row(
     """Returns the engine's ``solref`` and ``solimp`` of a constraint row that acts as spring, dashpot and inerter.
 
     A row's force is ``(-b v - k r - a) / R`` for a violation r, its rate v and its acceleration a, where
-    ``R = inverse_mass (1 - d) / d`` at impedance d, and the engine divides the coefficients given by d and d^2.
-
-    Args:
-        inverse_mass: The row's inverse inertia at rest as the engine computes it, 1/kg (or 1/(kg m^2)).
-        stiffness: Force per violation, N/m (or N m/rad).
-        damping: Force per rate, N s/m (or N m s/rad).
-        inertance: Force per acceleration, kg (or kg m^2).
+    ``R = inverse_mass (1 - d) / d`` at impedance d, and the engine divides the coefficients given by d and d^2. The
+    row's inverse inertia at rest is as the engine computes it, 1/kg, or of a hinge 1/(kg m^2).
     """
     impedance = inertance * inverse_mass / (1.0 + inertance * inverse_mass)
     compliance = inverse_mass * (1.0 - impedance) / impedance

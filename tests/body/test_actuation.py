@@ -86,7 +86,7 @@ def test_without_load_a_cable_moves_at_the_speed_limit(layout: str) -> None:
     for _ in range(100):
         felt = plant.step(np.ones(plant.n_muscles))
         assert np.array_equal(felt.muscle_force_N, np.zeros(plant.n_muscles))
-    assert plant.actuator_state() == pytest.approx(longest - 0.5 * SPEED_M_PER_S, rel=1e-9)
+    assert plant.act == pytest.approx(longest - 0.5 * SPEED_M_PER_S, rel=1e-9)
 
 
 def test_a_slack_cable_changes_nothing() -> None:

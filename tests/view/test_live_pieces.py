@@ -50,7 +50,7 @@ def test_strands_at_rest_lie_where_the_mesh_is(preset: str) -> None:
 def test_strands_follow_the_worm() -> None:
     worm = LivingWorm(load_config("riddle2023-rods"))
     worm.advance(0.3, math.inf)
-    vertices, crossing = Skeleton(worm.plant.anatomy).locate(worm.plant.qpos())
+    vertices, crossing = Skeleton(worm.plant.anatomy).locate(worm.plant.qpos)
     np.testing.assert_array_equal(crossing, worm.plant.read(True)["crossing_position"])
     edges = np.linalg.norm(np.diff(vertices, axis=1), axis=-1)
     rest = np.linalg.norm(np.diff(worm.plant.geometry.vertices_m, axis=1), axis=-1)

@@ -7,12 +7,10 @@ import warnings
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import add_moving_planes
-from annelid.arena.gravity import gravity_of
-from annelid.arena.scenery import add_scenery, add_walls
-from annelid.body.actuation import add_ring_actuators, add_springs
+from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
+from annelid.arena.surface import gravity_of
+from annelid.body.actuation import add_joint_friction, add_ring_actuators, add_springs
 from annelid.body.elimination import order_elimination
-from annelid.body.friction import add_joint_friction
 from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
@@ -20,8 +18,6 @@ from annelid.morphology import MeshGeometry, helical_mesh
 
 MOST_ORDERED_BODIES = 8192
 """Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
-
-
 _SHORT = "lengthen body.mesh.rear_overhang_m and body.mesh.radius_m, or lessen body.mesh.elements_per_side"
 _REMEDIES = {
     "mass and inertia of moving bodies": "a part is too light, so raise body.strands.linear_density_kg_per_m, "
@@ -34,17 +30,7 @@ _REMEDIES = {
 
 def mesh_of(mesh: Mesh) -> MeshGeometry:
     """Generates the geometry that a configuration asks for."""
-    return helical_mesh(
-        mesh.n_segments,
-        n_helices=mesh.n_helices,
-        radius_m=mesh.radius_m,
-        angular_rate_rad_per_m=mesh.angular_rate_rad_per_m,
-        elements_per_side=mesh.elements_per_side,
-        elements_per_end=mesh.elements_per_end,
-        planes_between_rings=mesh.planes_between_rings,
-        free_planes_at_ends=mesh.free_planes_at_ends,
-        rear_overhang_m=mesh.rear_overhang_m,
-    )
+    return helical_mesh(**mesh.model_dump())
 
 
 def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
@@ -56,9 +42,9 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
         for_plant: For a plant of annelid, which prepares every step: dampers whose coefficients follow the posture
-            (`annelid.simulation.damping`), and where the engine has no one plane for the ground planes that are laid
-            under the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: no
-            dampers, all that is seen, and panels that hold the worm in plain MuJoCo.
+            (`annelid.body.damping`), and where the engine has no one plane for the ground planes that are laid under
+            the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: no dampers,
+            all that is seen, and panels that support the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.
@@ -69,7 +55,6 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
-    laid = for_plant and arena.has_moving_planes
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
@@ -84,7 +69,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:
         add_joint_friction(spec, geometry, body.joints)
-    if laid:
+    if for_plant and arena.has_moving_planes:
         add_moving_planes(spec, arena)
         add_walls(spec, arena)
     else:
@@ -98,6 +83,9 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     Args:
         spec: What `build_spec` returned, with anything added to it.
 
+    Returns:
+        The engine's model.
+
     Raises:
         ConfigError: The engine refuses the model.
     """
@@ -105,10 +93,10 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         model = spec.compile()
     except ValueError as error:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
-        for words, remedy in _REMEDIES.items():
-            if words in reason:
-                raise ConfigError(f"the engine refuses this body ({reason}): {remedy}") from None
-        raise ConfigError(f"the engine refuses this body: {reason}") from None
+        remedy = next(
+            (f" ({reason}): {remedy}" for words, remedy in _REMEDIES.items() if words in reason), f": {reason}"
+        )
+        raise ConfigError(f"the engine refuses this body{remedy}") from None
     order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:

@@ -17,7 +17,7 @@ from typing import Self
 from annelid.errors import ClusterError, RunKilled
 from annelid.experiment.attempt import Task, attempt
 from annelid.experiment.lifeline import end_with_parent
-from annelid.simulation.interruption import Interruption
+from annelid.simulation.progress import Interruption
 
 Result = Future[bytes | None]
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.body.mjcf import Keyframe, mjcf_text
+from annelid.body.mjcf import mjcf_text
 from annelid.errors import RunFileError
 from annelid.output import whole_file
 
@@ -37,7 +37,7 @@ def write_mjcf(run: Run, path: Path) -> Path:
     return path
 
 
-def _keyframes(run: Run) -> list[Keyframe]:
+def _keyframes(run: Run) -> list[dict[str, Any]]:
     from annelid.simulation.runfile import read_checkpoint
     from annelid.simulation.worm import WormPlant
 
@@ -47,8 +47,8 @@ def _keyframes(run: Run) -> list[Keyframe]:
     except RunFileError:
         if not run.data.sizes.get("frame"):
             return []
-        posture = run.data["qpos"].values[-1]
-        return [Keyframe(POSTURE, float(run.data["frame_time"].values[-1]), posture, act=plant.anatomy.first_act)]
+        time_s, posture = float(run.data["frame_time"].values[-1]), run.data["qpos"].values[-1]
+        return [{"name": POSTURE, "time": time_s, "qpos": posture, "act": plant.anatomy.first_act}]
     plant.set_state(state)
     parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
-    return [Keyframe(FINAL, float(plant.data.time), **parts)]
+    return [{"name": FINAL, "time": float(plant.data.time), **parts}]

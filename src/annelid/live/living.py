@@ -15,8 +15,7 @@ from annelid.live.moments import Moment, Reel, signal_names
 from annelid.morphology import Array
 from annelid.protocols import Records
 from annelid.simulation.adjust import adjusted
-from annelid.simulation.assemble import build_controller
-from annelid.simulation.stepping import Simulation, start
+from annelid.simulation.stepping import Simulation, build_controller, start
 from annelid.simulation.worm import WormPlant
 
 ENDLESS_S = 1e7
@@ -124,7 +123,7 @@ class LivingWorm:
         self.reel.add(
             Moment(
                 self.time_s,
-                self.plant.qpos().astype(np.float32),
+                self.plant.qpos.astype(np.float32),
                 self.simulation.activation.astype(np.float32),
                 self.simulation.sensation.contact_force_N.astype(np.float32),
             )

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.kinds.floor import Floor
-from annelid.arena.scenery import (
+from annelid.arena.geoms import (
     FLOOR_HALF_SIZE_M,
     PIPE_RGBA,
     POST_HALF_HEIGHT_M,
@@ -17,6 +16,7 @@ from annelid.arena.scenery import (
     RAIL_HALF_HEIGHT_M,
     RAIL_RGBA,
 )
+from annelid.arena.kinds.floor import Floor
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.config.arena import ArenaKind

@@ -12,24 +12,12 @@ from numpy.typing import ArrayLike
 
 from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
-from annelid.protocols import Controller, Plant, Records, Sensation
-from annelid.simulation.assemble import as_controller, build_plant
-from annelid.simulation.interruption import Interruption
+from annelid.protocols import Controller, Plant, Records, Sensation, Values
 from annelid.simulation.lock import locks
-from annelid.simulation.progress import ProgressCallback, reporting
-from annelid.simulation.recorder import (
-    Recorder,
-    Values,
-    global_attributes,
-    layout,
-    loop_signals,
-    recordable_of,
-    sensation_signals,
-    sensation_values,
-)
-from annelid.simulation.resume import Origin, continued_config, origin_of
-from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
-from annelid.simulation.stepping import Simulation, start
+from annelid.simulation.progress import Interruption, ProgressCallback, reporting
+from annelid.simulation.recorder import Recorder, Senses, global_attributes, loop_signals
+from annelid.simulation.runfile import FILE_NAME, Origin, Run, continued_config, open_run, origin_of, refuse_used_folder
+from annelid.simulation.stepping import Simulation, as_controller, build_plant, start
 
 PROGRESS_INTERVAL_S = 0.2
 
@@ -108,44 +96,32 @@ class RecordedRun:
     """
 
     def __init__(self, config: RunConfig, simulation: Simulation, path: Path, origin: Origin | None = None) -> None:
-        """Lays out the run file of a simulation that is about to begin.
-
-        Args:
-            config: The configuration, which the file carries whole.
-            simulation: Plant and controller at their start.
-            path: The run file.
-            origin: The run that it continues, or None.
-
-        Raises:
-            RunFileError: The file cannot be made.
-        """
+        """Lays out the run file of a simulation that is about to begin, or to continue another run."""
         self.simulation = simulation
         self.status = "running_or_killed"
         self.message = ""
         self.error: BaseException | None = None
         plant, controller = simulation.plant, simulation.controller
-        of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(simulation.sensation)
-        parts = [of_plant, recordable_of(controller), loop_signals(plant.n_muscles)]
+        sources = [plant if isinstance(plant, Records) else Senses(lambda: simulation.sensation)]
+        sources += [controller] if isinstance(controller, Records) else []
+        self._readers = [source.read for source in sources]
+        parts = [*(source.recordable() for source in sources), loop_signals(plant.n_muscles)]
         first = simulation.checkpoint()
         packed = None if first is None else first.to_bytes()
-        plan = layout(simulation.schedule, parts, simulation.sensation.rest_stretch_m, packed)
         # The configured controller overrides this with its own attribute; without it the file would name that one.
         attrs: dict[str, Any] = {"controller": getattr(controller, "name", type(controller).__name__)}
         attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
-        self._recorder = Recorder(path, plan, attrs)
-        if packed is not None:
-            self._recorder.checkpoint(packed)
-        self._read_plant = plant.read if isinstance(plant, Records) else self._read_sensation
-        self._read_controller = controller.read if isinstance(controller, Records) else _nothing
+        rest_stretch_m = simulation.sensation.rest_stretch_m
+        self._recorder = Recorder(path, simulation.schedule, parts, rest_stretch_m, packed, attrs)
 
     def record(self, wall_time_s: float) -> None:
         """Records a sample and a frame, where one is due."""
         simulation, schedule = self.simulation, self.simulation.schedule
         if simulation.step % schedule.sample_every == 0:
             own: Values = {"activation": simulation.activation, "wall_time": wall_time_s}
-            self._recorder.sample(self._read_plant(False), self._read_controller(False), own)
+            self._recorder.sample(*(read(False) for read in self._readers), own)
         if simulation.step % schedule.frame_every == 0:
-            self._recorder.frame(self._read_plant(True), self._read_controller(True))
+            self._recorder.frame(*(read(True) for read in self._readers))
 
     def flush(self) -> None:
         """Writes what was recorded so far."""
@@ -187,21 +163,9 @@ class RecordedRun:
         self.status, self.message = status, message
         (self._recorder.finish if whole else self._recorder.close)(status, message)
 
-    def _read_sensation(self, frame: bool) -> Values:
-        return {} if frame else sensation_values(self.simulation.sensation)
-
-
-def _nothing(frame: bool) -> Values:
-    return {}
-
 
 class Loop:
-    """The loop of a run, or of runs that go on together in one thread: they advance, and each is recorded.
-
-    Attributes:
-        runs: All of them.
-        going: Those that have not ended, by their number.
-    """
+    """The loop of a run, or of runs that go on together in one thread; those that have not ended are ``going``."""
 
     flush_interval_s = 0.5
     checkpoint_interval_s = 1.0
@@ -218,12 +182,7 @@ class Loop:
         return self._step() * self._schedule.timestep_s
 
     def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
-        """Runs to the end; a run that fails ends with that error, and the others go on.
-
-        Args:
-            interruption: Asks to end all of them early.
-            report: Called at most 5 times a second.
-        """
+        """Runs to the end, unless interrupted; a run that fails ends with that error, and the others go on."""
         began = now = perf_counter()
         due = {"flush": began + self.flush_interval_s, "checkpoint": began + self.checkpoint_interval_s}
         due["report"] = began

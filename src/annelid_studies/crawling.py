@@ -11,10 +11,8 @@ import numpy as np
 
 from annelid.body.worm import WormBody
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
+from annelid.draw.canvas import canvas, draw_lines, panel_title, save_both
 from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
-from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S
 from annelid.draw.markdown import plain_table
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.experiment.case import SHEAR_OVER_YOUNG, Case

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from annelid.analysis.detector import Detection, detect, precision_recall, score
-from annelid.analysis.slip import slip_cost
+from annelid.analysis.gait import slip_cost
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 

@@ -8,8 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.analysis.elongation import elongation, end_difference, interior_deficit, middle_deficit
-from annelid.analysis.forces import contraction_forces
-from annelid.analysis.travel import net_travel, path_travel
 
 
 def test_both_readings_of_a_written_down_stretch() -> None:
@@ -44,19 +42,6 @@ def test_deficits_do_not_depend_on_the_unit(lengths: list[float], factor: float)
 def test_deficits_of_a_worm_that_does_not_elongate_cannot_be_told() -> None:
     assert math.isnan(middle_deficit([0.0, 0.01, 0.0]))
     assert math.isnan(end_difference([0.0, 0.01, 0.0]))
-
-
-def test_forces_while_contracted_keep_every_sample_of_the_contracted_muscle() -> None:
-    force = np.array([[9.0, 1.0], [2.0, 1.0], [2.0, 7.0]])
-    activation = np.array([[0.9, 0.0], [0.9, 0.5], [0.2, 0.6]])
-    assert sorted(contraction_forces(force, activation)) == [2.0, 7.0, 9.0]
-
-
-def test_net_travel_and_the_way_forth_and_back() -> None:
-    position = [0.1, 0.3, 0.2, 0.0]
-    assert net_travel(position) == pytest.approx(-0.1)
-    assert path_travel(position) == pytest.approx(0.5)
-    assert math.isnan(net_travel([]))
 
 
 @given(st.lists(st.floats(0.001, 0.1), min_size=3, max_size=8), st.floats(0.1, 10.0))

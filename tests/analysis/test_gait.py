@@ -137,7 +137,7 @@ def test_a_circle_is_found_wherever_its_arc_lies(
     along = start + turn * np.linspace(0.0, angle, 50)
     circle = fitted_circle(np.stack([x + radius * np.cos(along), y + radius * np.sin(along)], axis=-1))
     assert circle is not None
-    assert circle.is_told
+    assert circle.is_clear
     assert circle.radius_m == pytest.approx(radius, rel=1e-5)
     assert circle.centre_m == pytest.approx((x, y), abs=1e-4 * radius)
     assert circle.angle_rad == pytest.approx(turn * angle, rel=1e-4)

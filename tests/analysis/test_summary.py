@@ -166,6 +166,24 @@ def test_loads_are_told_segment_by_segment() -> None:
     assert numbers.contraction_force_peak_N == pytest.approx(8.0)
 
 
+def test_forces_are_those_of_every_sample_in_which_the_muscle_itself_is_contracted() -> None:
+    data = wave_data().isel(time=slice(3))
+    shape = ("time", "muscle")
+    data["muscle_force"] = (shape, [[9.0, 1.0, 0.0], [2.0, 1.0, 0.0], [2.0, 7.0, 0.0]])
+    data["activation"] = (shape, [[0.9, 0.0, 0.0], [0.9, 0.5, 0.0], [0.2, 0.6, 0.0]])
+    numbers = summary(run_of(data))
+    assert numbers.segment_force_median_N == [5.5, 7.0, None]
+    assert (numbers.contraction_force_median_N, numbers.contraction_force_peak_N) == (7.0, 9.0)
+
+
+def test_travel_is_net_and_its_path_goes_forwards_and_backwards() -> None:
+    data = wave_data().isel(time=slice(4))
+    data["center_of_mass"][:, 0] = [-0.1, -0.3, -0.2, 0.0]
+    numbers = summary(run_of(data))
+    assert numbers.travel_m == pytest.approx(-0.1)
+    assert numbers.travel_path_m == pytest.approx(0.5)
+
+
 def test_the_robot_stands_beside_its_preset_only() -> None:
     assert published(load_config("wang"))["elongation_mean_max_m"].value == (0.0615, 0.0382, 0.0478, 0.0598)
     assert published(load_config("wang", {"body.mesh.n_segments": 5})) == {}

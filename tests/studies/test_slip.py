@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from annelid.analysis.detector import Score
-from annelid.analysis.slip import SlipCost
+from annelid.analysis.gait import SlipCost
 from annelid.config import load_config
 from annelid.control.pressure import PressureSns
 from annelid.control.sns import Sns

@@ -11,14 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
-from annelid.draw.scene import upright
-from annelid.draw.skeleton import Skeleton
+from annelid.draw.scene import Skeleton, upright
 from annelid.errors import ConfigError, RunFileError
-from annelid.live.living import LivingWorm, knobs_of
-from annelid.live.moments import Moment, Reel, reel_of
+from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
+from annelid.live.panel import plots_of
 from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
-from annelid.live.traces import plots_of
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 
@@ -106,7 +104,7 @@ def test_a_window_of_signals_is_thinned_evenly(first: float, length: float, most
 
 
 def test_the_oldest_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.live.moments.KEEP_S", 1.0)
+    monkeypatch.setattr("annelid.live.living.KEEP_S", 1.0)
     grown = reel(0)
     for i in range(500):
         grown.add(Moment(i * FRAME_S, np.zeros(3), np.zeros(1), np.zeros((1, 3))))

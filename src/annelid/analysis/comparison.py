@@ -23,25 +23,15 @@ _WORDS = ("name", "summary", "published")
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What several runs have come to.
+    """What several runs have come to."""
 
-    Attributes:
-        labels: A short distinct name for each run.
-        paths: Their files.
-        statuses: How they ended.
-        orders: Segments (from 1) in the order of their contractions.
-        numbers: Fields of `Summary` and of `Gait` (``gait.speed_m_per_s``), one value a run, in SI units.
-        fields: Fields of the configuration in which they differ, one value a run; None where its kind has none.
-        lacking: Of these fields, those that some run does not have.
-    """
-
-    labels: tuple[str, ...]
+    labels: tuple[str, ...]  # a short distinct name for each run
     paths: tuple[str, ...]
     statuses: tuple[str, ...]
-    orders: tuple[tuple[int, ...], ...]
-    numbers: Mapping[str, tuple[Number, ...]]
-    fields: Mapping[str, tuple[Any, ...]]
-    lacking: Mapping[str, tuple[bool, ...]]
+    orders: tuple[tuple[int, ...], ...]  # segments (from 1) in the order of their contractions
+    numbers: Mapping[str, tuple[Number, ...]]  # fields of Summary and of Gait (gait.speed_m_per_s), SI units
+    fields: Mapping[str, tuple[Any, ...]]  # of the configuration in which they differ; None where its kind has none
+    lacking: Mapping[str, tuple[bool, ...]]  # which runs do not have such a field at all
 
     def differences(self, field: str) -> list[Number]:
         """Returns the `relative_difference` of each run's number to the first run's; None for the first."""
@@ -95,10 +85,7 @@ def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
 
 
 def relative_difference(first: Number, other: Number) -> Number:
-    """Returns ``(other - first) / |first|``, segment by segment where there is one number a segment.
-
-    None where either is None, the first is 0, or their numbers of segments differ.
-    """
+    """Returns ``(other - first) / |first|``, by segment; None where either is None, the first 0, or lengths differ."""
     if first is None or other is None:
         return None
     if isinstance(first, Sequence) or isinstance(other, Sequence):
@@ -112,11 +99,7 @@ def relative_difference(first: Number, other: Number) -> Number:
 def differing_fields(
     configs: Sequence[RunConfig],
 ) -> tuple[dict[str, tuple[Any, ...]], dict[str, tuple[bool, ...]]]:
-    """Finds the fields in which configurations differ, by dotted path.
-
-    Returns:
-        The values of each such field, None for a configuration without it; and which lack it.
-    """
+    """Finds the fields in which configurations differ: values by dotted path, None where lacking; and which lack it."""
     own = [fields_of(config) for config in configs]
     paths = [path for path in dict.fromkeys(path for each in own for path in each) if path not in _WORDS]
     fields, lacking = {}, {}

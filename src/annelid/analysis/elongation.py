@@ -1,4 +1,4 @@
-"""How much each segment lengthens, in several readings, and how much the middle lags behind."""
+"""How much each segment lengthens, in several readings, and how far the middle stays below the ends."""
 
 from __future__ import annotations
 
@@ -17,18 +17,12 @@ class Elongation:
     The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak of the spring on
     the first helix, so that reading stands beside the plainer one, the mean of a segment's sensors, and the range
     over all of them.
-
-    Attributes:
-        first_helix_pp_m: Largest minus smallest length of the first helix's spring, m.
-        least_pp_m: The same of the sensor with which it is least, m.
-        most_pp_m: The same of the sensor with which it is most, m.
-        mean_max_m: Largest mean length of the segment's sensors above their rest length, m.
     """
 
-    first_helix_pp_m: Array
-    least_pp_m: Array
-    most_pp_m: Array
-    mean_max_m: Array
+    first_helix_pp_m: Array  # largest minus smallest length of the first helix's spring
+    least_pp_m: Array  # the same of the sensor with which it is least
+    most_pp_m: Array  # the same of the sensor with which it is most
+    mean_max_m: Array  # largest mean length of the segment's sensors above their rest length
 
 
 def elongation(stretch_m: ArrayLike, rest_m: ArrayLike) -> Elongation:
@@ -72,3 +66,9 @@ def end_difference(elongation_m: ArrayLike) -> float:
 
 def _deficit(less: float, full: float) -> float:
     return float(1.0 - less / full) if full > 0 else float("nan")
+
+
+def relative_to_first(elongation_m: ArrayLike) -> Array:
+    """Divides the elongations of segments, m, ``(n_segments,)``, by that of segment 1."""
+    values = np.asarray(elongation_m, dtype=float)
+    return values / values[0]

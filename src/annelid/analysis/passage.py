@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Passage:
-    """A worm's way through a pipe, at the times of the recorded postures.
+    """A worm's passage through a pipe, at the times of the recorded postures.
 
     Attributes:
         time_s: Shape ``(n,)``.
@@ -52,8 +52,8 @@ class Passage:
     def speed_m_per_s(self) -> float:
         """Mean speed of the foremost ring along the centre line through all that bends or narrows, m/s.
 
-        It counts from the first posture in which the ring has come there to the first in which it is past it, so that
-        worms are compared over the same way; or to the end for one that does not get so far. NaN if it never came.
+        From the first posture in which the ring has come there to the first in which it is past it, so that worms are
+        compared over the same distance; or to the end for one that does not get so far. NaN if it never came.
         """
         inside = np.flatnonzero(self.front_m >= self.reach_m[0])
         past = np.flatnonzero(self.front_m >= self.reach_m[1])
@@ -78,7 +78,7 @@ class Passage:
 
 
 def passage_of(run: Run) -> Passage:
-    """Reads a worm's way through a pipe from its run.
+    """Reads a worm's passage through a pipe from its run.
 
     Raises:
         RunFileError: The worm was not in a pipe, or `annelid.analysis.track.track_of` refuses the run.
@@ -91,7 +91,7 @@ def passage_of(run: Run) -> Passage:
 
 
 def passage_through(pipe: ArenaKind, track: Track) -> Passage:
-    """Reads a worm's way through a pipe from its track."""
+    """Reads a worm's passage through a pipe from its track."""
     centre_line, bore, reach_m = pipe.centre_line(), pipe.bore(), pipe.reach_m()
     assert centre_line is not None
     assert bore is not None

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.analysis.elongation import elongation, end_difference, middle_deficit
-from annelid.analysis.forces import contraction_forces, net_work, positive_work
-from annelid.analysis.rhythm import Rhythm, run_rhythm
-from annelid.analysis.travel import net_travel, path_travel, way_ahead
+from annelid.analysis.gait import net_work, positive_work
+from annelid.analysis.rhythm import CONTRACTED, Rhythm, run_rhythm
+from annelid.analysis.track import forward_position_m
 from annelid.protocols import Array
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a run amounts to. A number that cannot be told is None (null in JSON), never NaN.
+    """What a run amounts to. A number that is not known is None (null in JSON), never NaN.
 
     Attributes:
         name: Name of the configuration.
@@ -52,8 +52,8 @@ class Summary:
         segment_force_peak_N: Per segment: largest force of its muscles while contracted, N.
         positive_work_J: Per segment: work of its muscles while it was positive, J; none of it is regained.
         muscle_work_J: Per segment: net work of its muscles, J; where no work is summed, force over shortening.
-        travel_m: Displacement of the centre of mass towards where the worm leads at first, negative backwards, m.
-        travel_path_m: Its way forth and back along that direction, m.
+        travel_m: Displacement of the centre of mass along the initial heading, negative backwards, m.
+        travel_path_m: Length of its path forwards and backwards along that direction, m.
         ring_length_min_m: Shortest ring during the run, m (planar worm: height of a rhombus).
         edge_strain_max: Largest strain of any edge of a rod.
         pin_gap_max_m: Largest distance between two pinned strands, m.
@@ -111,20 +111,25 @@ def summary(run: Run) -> Summary:
     """
     data = run.data
     n_segments = run.config.body.n_segments
+    sampled = bool(data.sizes.get("time"))
     beat = run_rhythm(run) or Rhythm((), (), None, None, None, 0)
     read = None
-    if "stretch_length" in data and data.sizes.get("time"):
+    if "stretch_length" in data and sampled:
         read = elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
     first_helix, mean = (read.first_helix_pp_m, read.mean_max_m) if read else (None, None)
     spread = read if read and data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
     pulling = np.concatenate([np.empty(0), *forces])
-    ahead = way_ahead(run) if "center_of_mass" in data else np.empty(0)
+    ahead = forward_position_m(run) if "center_of_mass" in data and sampled else None
+    shortest = None
+    if "ring_length" in data and sampled:
+        # A ring of two halves is as long as both.
+        shortest = data["ring_length"].values.reshape(data.sizes["time"], n_segments, -1).sum(axis=2).min()
     return Summary(
         name=run.config.name,
         status=run.status,
         n_segments=n_segments,
-        duration_s=_number(np.ptp(data["time"].values)) if data.sizes.get("time") else None,
+        duration_s=_number(np.ptp(data["time"].values)) if sampled else None,
         real_time_factor=_number(run.real_time_factor),
         order=list(beat.order),
         onsets_s=list(beat.onsets_s),
@@ -143,9 +148,9 @@ def summary(run: Run) -> Summary:
         segment_force_peak_N=_numbers([one.max() if one.size else None for one in forces] or None),
         positive_work_J=_by_segment(positive_work(data), n_segments),
         muscle_work_J=_by_segment(net_work(data), n_segments),
-        travel_m=_number(net_travel(ahead)),
-        travel_path_m=_number(path_travel(ahead)),
-        ring_length_min_m=_shortest_ring(data, n_segments),
+        travel_m=None if ahead is None else _number(ahead[-1] - ahead[0]),
+        travel_path_m=None if ahead is None else _number(np.abs(np.diff(ahead)).sum()),
+        ring_length_min_m=_number(shortest),
         edge_strain_max=_largest(data, "edge_strain"),
         pin_gap_max_m=_largest(data, "pin_gap"),
         elongation_least_pp_m=_numbers(spread.least_pp_m) if spread else None,
@@ -155,24 +160,20 @@ def summary(run: Run) -> Summary:
 
 
 def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[Array]:
-    """Forces while contracted, an array a segment; empty without muscles that have forces."""
+    """Forces of all samples in which the muscle itself is contracted, an array a segment; empty without forces.
+
+    The short transient at each onset, above the force that the muscle settles at, is in there. It sets the peak and
+    hardly moves the median. What is shorter than a physics step, or between two samples, is not in the peak.
+    """
     if "muscle_force" not in data or "activation" not in data:
         return []
     muscles = np.split(np.arange(data.sizes["muscle"]), n_segments)
-    force, activation = data["muscle_force"].values, data["activation"].values
-    return [contraction_forces(force[:, own], activation[:, own]) for own in muscles]
+    force, contracted = data["muscle_force"].values, data["activation"].values > CONTRACTED
+    return [force[:, own][contracted[:, own]] for own in muscles]
 
 
 def _by_segment(of_muscles: Array | None, n_segments: int) -> list[float | None] | None:
     return None if of_muscles is None else _numbers(of_muscles.reshape(n_segments, -1).sum(axis=1))
-
-
-def _shortest_ring(data: xr.Dataset, n_segments: int) -> float | None:
-    """A ring of two halves is as long as both."""
-    if "ring_length" not in data or not data.sizes.get("time"):
-        return None
-    lengths = data["ring_length"].values
-    return _number(lengths.reshape(len(lengths), n_segments, -1).sum(axis=2).min())
 
 
 def _largest(data: xr.Dataset, name: str) -> float | None:

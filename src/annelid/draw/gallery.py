@@ -23,17 +23,9 @@ VIDEO_TASK = "drawing the video"
 
 
 def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
-    """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``.
+    """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``, and yields the path of each once it is written.
 
-    Args:
-        run: The run.
-        folder: Where the pictures go; those of an earlier run there are replaced.
-        video: Whether to draw the video.
-        quiet: Whether to do without a progress bar.
-        complain: Called at the end with one sentence for each reason for which pictures could not be drawn.
-
-    Yields:
-        The path of each picture once it is written.
+    At the end ``complain`` is called with one sentence for each reason for which pictures could not be drawn.
     """
     times = run.data["time"].values
     frame_time = FRAME_TIME_S

@@ -13,8 +13,9 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from functools import cache
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 INSTALL_LINE = "apt install libosmesa6"
 """What installs a back-end that needs neither a graphics card nor a screen (Debian, Ubuntu)."""
-
 UNSET = "unset MUJOCO_GL"
 _OFF = {"disable", "disabled", "off", "false", "0"}
 _DEFAULT = {"", "enable", "enabled", "on", "true", "1"}
@@ -63,17 +63,11 @@ def candidates(environment: Mapping[str, str], system: str) -> list[str]:
 
 @cache
 def works(backend: str) -> bool:
-    """Tells whether a back-end draws a picture, tried in a process of its own."""
+    """Whether a back-end draws a picture, tried in a process of its own."""
+    command = [sys.executable, "-m", "annelid.draw.gl", backend]
     environment = {**os.environ, "MUJOCO_GL": backend}
     try:
-        probe = subprocess.run(
-            [sys.executable, "-m", "annelid.draw.gl", backend],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            timeout=_PROBE_LIMIT_S,
-            check=False,
-        )
+        probe = subprocess.run(command, env=environment, capture_output=True, timeout=_PROBE_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return False
     return probe.returncode == 0
@@ -99,15 +93,15 @@ def find_backend() -> str:
     raise RenderingUnavailable(f"no OpenGL back-end works here (tried {', '.join(tried)}): {remedy}")
 
 
-class Canvas:
-    """An off-screen picture of a MuJoCo model, used as a context manager.
+class Canvas(AbstractContextManager):
+    """An off-screen picture of a MuJoCo model.
 
     Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
     the back-end that `find_backend` chose.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int, backend: str, *, fine: bool = True) -> None:
-        """Keeps what `__enter__` opens.
+        """Opens the back-end.
 
         Args:
             model: The model; its off-screen size and sampling are set here.
@@ -115,46 +109,41 @@ class Canvas:
             height: Pixels.
             backend: What `find_backend` returned.
             fine: Shadows and smooth edges, which cost ten times the time where software draws.
+
+        Raises:
+            RenderingUnavailable: The back-end fails.
         """
+        import mujoco
+
         model.vis.global_.offwidth = width
         model.vis.global_.offheight = height
         model.vis.quality.offsamples = 4 if fine else 0
-        self._model = model
-        self._fine = fine
-        self._size = (width, height)
-        self._backend = backend
+        self._model, self._size = model, (width, height)
         self._context: Any = None
         self._buffers: Any = None
-
-    def __enter__(self) -> Self:
-        import mujoco
-
         try:
-            module = importlib.import_module(f"mujoco.{_MODULES[self._backend]}")
-            self._context = module.GLContext(*self._size)
+            module = importlib.import_module(f"mujoco.{_MODULES[backend]}")
+            self._context = module.GLContext(width, height)
             self._context.make_current()
-            self._buffers = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+            self._buffers = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
         except (ImportError, AttributeError, RuntimeError, OSError, mujoco.FatalError) as error:
             self.close()
-            raise RenderingUnavailable(f"the OpenGL back-end {self._backend} failed: {error}") from error
+            raise RenderingUnavailable(f"the OpenGL back-end {backend} failed: {error}") from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._buffers)
-        self._scene = mujoco.MjvScene(self._model, maxgeom=50_000)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._fine
+        self._scene = mujoco.MjvScene(model, maxgeom=50_000)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = fine
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Frees the back-end."""
-        if self._buffers is not None:
-            self._buffers.free()
-            self._buffers = None
-        if self._context is not None:
-            self._context.free()
-            self._context = None
+        for part in (self._buffers, self._context):
+            if part is not None:
+                part.free()
+        self._buffers = self._context = None
 
     def draw(
         self,
@@ -165,7 +154,7 @@ class Canvas:
         *,
         upright: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:
-        """Draws the model in its present posture.
+        """Draws the model in a posture.
 
         Args:
             data: The posture; kinematics up to the tendons must be up to date.
@@ -199,7 +188,7 @@ class Canvas:
 
 
 def _probe(backend: str) -> bool:
-    """Draws a lit ball and tells whether anything showed up."""
+    """Draws a lit ball and sees whether anything shows up."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(

@@ -46,13 +46,11 @@ Progress = Callable[[int, int], object]
 
 
 class Scene(Protocol):
-    """What draws a run: recorded times, and one picture for each."""
+    """What draws a run: recorded times, and one picture ``(height, width, 3)`` for each."""
 
     times_s: NDArray[np.float64]
 
-    def picture(self, frame: int) -> NDArray[np.uint8]:
-        """Draws one of the recorded times, as pixels of shape ``(height, width, 3)``."""
-        ...
+    def picture(self, frame: int) -> NDArray[np.uint8]: ...
 
 
 def render_frame(
@@ -85,7 +83,7 @@ def render_frame(
     path = with_suffix(path, FRAME_SUFFIXES, "a picture")
     size = size or FRAME_SIZE[run.config.body.kind]
     with _scene(run, size, camera, fine=True) as scene:
-        pixels = scene.picture(_nearest(run, scene.times_s, time_s))
+        pixels = scene.picture(nearest_frame(run, scene.times_s, time_s))
     with whole_file(path) as draft:
         imageio.v3.imwrite(draft, pixels)
     return path
@@ -108,8 +106,8 @@ def render_video(
     Args:
         run: The run.
         path: Video to write (``.mp4``, ``.mov``, ``.mkv``, ``.gif``).
-        fps: Frames a second of the video, 1 to 240; the recorded posture nearest to each is shown.
-        speed: Simulated seconds a second of video: 1 is real time, 0.25 a quarter of it.
+        fps: Frames per second of the video, 1 to 240; the recorded posture nearest to each is shown.
+        speed: Simulated seconds per second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
         size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
         progress: Called after every frame.
@@ -119,8 +117,7 @@ def render_video(
 
     Raises:
         RunFileError: The run has no such camera, the path another suffix, ``fps`` or ``speed`` is out of range or makes
-            too many pictures,
-            or the file cannot be written whole, as on a full disk.
+            too many pictures, or the file cannot be written whole, as on a full disk.
         RenderingUnavailable: No OpenGL back-end works.
         MissingDependency: There is no ffmpeg to write videos with.
     """
@@ -145,7 +142,7 @@ def render_video(
         total = math.floor(pictures + 1e-6)
         with _video(draft, fps, size, path, total) as write:
             for done in range(total):
-                frame = _nearest(run, scene.times_s, first + done * speed / fps)
+                frame = nearest_frame(run, scene.times_s, first + done * speed / fps)
                 write(np.ascontiguousarray(scene.picture(frame)))
                 if progress is not None:
                     progress(done + 1, total)
@@ -164,8 +161,12 @@ def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -
     return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine)
 
 
-def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
-    """Index of the recorded time nearest to a wanted one, which must lie within the run."""
+def nearest_frame(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
+    """Returns the index of the recorded time nearest to a wanted one.
+
+    Raises:
+        RunFileError: It lies more than an interval outside of the run.
+    """
     margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
     if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
         raise RunFileError(
@@ -188,13 +189,7 @@ def _video(
     if shutil.which(ffmpeg) is None:
         raise MissingDependency(f"no ffmpeg to write {name} with, there is no program {ffmpeg}: {_FFMPEG_REMEDY}")
     settings = _GIF if path.suffix.lower() == ".gif" else _H264
-    frames = imageio_ffmpeg.write_frames(
-        str(path),
-        size,
-        fps=fps,  # type: ignore[arg-type]
-        ffmpeg_log_level="quiet",
-        **settings,
-    )
+    frames = imageio_ffmpeg.write_frames(str(path), size, fps=fps, ffmpeg_log_level="quiet", **settings)  # type: ignore[arg-type]
     frames.send(None)
     broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"
     try:

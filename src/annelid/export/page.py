@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from annelid.analysis import gait, summary
 from annelid.config import RunConfig, field_value, fields_of, toml_value
 from annelid.draw.figures.track import track_figure
-from annelid.draw.markdown import anchors, code, emphasis, table, words
-from annelid.draw.page import page
+from annelid.draw.markdown import anchors, code, emphasis, page, table, words
 from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame
 from annelid.draw.table import COMPARED, closing_sentence, gait_rows, legend, summary_rows

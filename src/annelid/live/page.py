@@ -11,13 +11,12 @@ import numpy as np
 
 from annelid.config import RunConfig
 from annelid.draw.render import Progress
-from annelid.draw.skeleton import Skeleton
+from annelid.draw.scene import Skeleton
 from annelid.errors import RunFileError
-from annelid.live.guard import content_policy
 from annelid.live.panel import legend_html
 from annelid.live.picture import Painter, Picture
 from annelid.live.player import Player, config_of, player_of
-from annelid.live.server import Server
+from annelid.live.server import Server, content_policy
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.anatomy import Anatomy
@@ -40,7 +39,7 @@ def export_page(
     Args:
         source: A run, or a configuration, which is run for its duration.
         path: The page to write (``.html``).
-        speed: Simulated seconds a second: 1 is real time.
+        speed: Simulated seconds per second: 1 is real time.
         progress: Called after every frame.
 
     Returns:
@@ -56,8 +55,10 @@ def export_page(
         raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
     config = config_of(source)
     player, anatomy = player_of(source)
-    span = (0.0, config.duration_s) if player.worm is not None else player.reel.span_s
-    page = _page(config, anatomy, player, _times(*span), speed, progress)
+    first_s, last_s = (0.0, config.duration_s) if player.worm is not None else player.reel.span_s
+    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
+    times_s = [first_s + frame / FRAMES_A_SECOND for frame in range(n_frames)]
+    page = _page(config, anatomy, player, times_s, speed, progress)
     with whole_file(path) as draft:
         draft.write_text(page, encoding="utf-8")
     return path
@@ -70,11 +71,6 @@ def page_path(path: str | Path) -> Path:
         RunFileError: Another suffix, or a folder.
     """
     return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
-
-
-def _times(first_s: float, last_s: float) -> list[float]:
-    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
-    return [first_s + frame / FRAMES_A_SECOND for frame in range(n_frames)]
 
 
 def _page(

@@ -1,20 +1,21 @@
-"""The panel beside the scene: what is played, what can be turned, the neurons, and what the colours mean."""
+"""The panel beside the scene: what is played, what can be turned, plots of signals, and what the colours mean."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.config import Knob
-from annelid.draw.style import CONTRACTED, RELAXED, segment_colors
+from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
-from annelid.live.traces import Curve, Plot
+from annelid.nervous.layout import by_segment, role_of
 
 if TYPE_CHECKING:
     import viser
@@ -26,14 +27,71 @@ STRONGEST_POKE = 3.0
 """In weights of the worm; more would tear the thinnest."""
 PLOT_HEIGHT = 190
 """Of the plots, pixels."""
+MOST_SEGMENTS = 4
+"""With more than these the expansion neurons are left out of the first plot."""
+SECONDS = 5.0
+"""How far back the plots go, in simulated time."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One signal of a plot."""
+
+    signal: str  # its name in the reel
+    label: str
+    number: int  # its place among the plot's colours
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves that are drawn together."""
+
+    title: str  # what they are, with the unit
+    curves: tuple[Curve, ...]
+    n_colors: int
+    limits: tuple[float, float] | None = None  # ends of the axis, or None for those of the curves
+
+
+def plots_of(names: Sequence[str]) -> dict[str, Plot]:
+    """Returns the plots that a worm's signals make, by the names that a user chooses from; the first is the default.
+
+    Args:
+        names: Signals of a reel: neurons as ``role_segment`` or plain names, then ``activation_1`` and so on.
+    """
+    muscles = [name for name in names if name.startswith("activation_")]
+    segments, others = by_segment(name for name in names if name not in muscles)
+    plots: dict[str, Plot] = {}
+    if segments:
+        plots["half-centres"] = _half_centres(segments)
+        for segment, neurons in segments.items():
+            labels = [role_of(neuron) for neuron in neurons]
+            plots[f"neurons of segment {segment}"] = _plot(f"segment {segment}: potentials (mV)", neurons, labels)
+    if others:
+        plots["other neurons"] = _plot("potentials (mV)", others, others)
+    numbers = [name.removeprefix("activation_") for name in muscles]
+    plots["activation"] = _plot("activation of the muscles", muscles, numbers, (-0.05, 1.05))
+    return plots
+
+
+def _plot(title: str, signals: Sequence[str], labels: Sequence[str], limits: tuple[float, float] | None = None) -> Plot:
+    curves = tuple(Curve(*names, i) for i, names in enumerate(zip(signals, labels, strict=True)))
+    return Plot(title, curves, len(curves), limits)
+
+
+def _half_centres(segments: dict[int, list[str]]) -> Plot:
+    curves: list[Curve] = []
+    for number, (segment, neurons) in enumerate(segments.items()):
+        if f"contraction_{segment}" in neurons:
+            curves.append(Curve(f"contraction_{segment}", str(segment), number))
+        if f"expansion_{segment}" in neurons and len(segments) <= MOST_SEGMENTS:
+            curves.append(Curve(f"expansion_{segment}", f"{segment} exp.", number, dashed=True))
+    words = ", expansion dashed" if any(curve.dashed for curve in curves) else ""
+    return Plot(f"contraction{words} (mV)", tuple(curves), len(segments))
 
 
 class Panel:
-    """The panel's elements.
-
-    Attributes:
-        poke_N: Force of a poke as set, N; 0 where nothing can be poked.
-    """
+    """The panel's elements."""
 
     def __init__(
         self,
@@ -50,8 +108,8 @@ class Panel:
 
         Args:
             server: Where they are seen.
-            show: Whom they ask.
-            speed: Simulated seconds a second at the start.
+            show: What they ask.
+            speed: Simulated seconds per second at the start.
             weight_N: Of the worm on Earth, which pokes are measured by.
             knobs: What can be turned, with the values that are shown first; none of a recorded run.
             plots: What can be plotted, by name; the first is.
@@ -82,7 +140,7 @@ class Panel:
 
     @property
     def poke_N(self) -> float:
-        """Force of a poke, N."""
+        """Force of a poke as set, N; 0 where nothing can be poked."""
         return float(self._poke.value) if self._poke is not None else 0.0
 
     def _transport(self, show: Show, speed: float) -> None:
@@ -100,7 +158,7 @@ class Panel:
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
         self._time.on_update(_asking(show, player.seek))
         pace = gui.add_slider(
-            "speed", SLOWEST, FASTEST, 0.05, speed, hint="Simulated seconds a second; the worm may not keep up."
+            "speed", SLOWEST, FASTEST, 0.05, speed, hint="Simulated seconds per second; the worm may not keep up."
         )
         pace.on_update(_asking(show, setattr, player, "speed"))
 
@@ -123,7 +181,7 @@ class Panel:
                 lambda _: show.ask(show.reset_knobs)
             )
 
-    def tell(self, status: str) -> None:
+    def show_status(self, status: str) -> None:
         """Shows the state of things first, as HTML."""
         self._status.content = status
 
@@ -162,9 +220,8 @@ class Panel:
 
 
 def _series(curve: Curve, colors: Sequence[str]) -> Any:
-    series: dict[str, Any] = {"label": curve.label, "stroke": colors[curve.number], "width": 1.6}
-    series["points"] = {"show": False}
-    return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {})
+    series: dict[str, Any] = {"label": curve.label, "stroke": colors[curve.number], "points": {"show": False}}
+    return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {"width": 1.6})
 
 
 def _asking(show: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
@@ -178,12 +235,7 @@ def _asking(show: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any]
 
 
 def legend_html(arrow_N: float, radius_m: float) -> str:
-    """Returns the legend.
-
-    Args:
-        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, N.
-        radius_m: That radius, m.
-    """
+    """Returns the legend; the arrow of this contact force is as long as the worm's radius at rest."""
     percent = f"{100 * SPRING_RANGE:.0f}&thinsp;%"
     rows = (
         (_bar(STRAND_COLORS, smooth=False), "strands, one colour for either handedness"),
@@ -202,13 +254,7 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
 
 
 def status_html(name: str, parts: Sequence[str], below: str) -> str:
-    """Returns the state of things, every word as it was written.
-
-    Args:
-        name: Of the worm.
-        parts: What stands beside it.
-        below: A sentence under it, or none.
-    """
+    """Returns the worm's name, what stands beside it and a sentence below, or none, every word as it was written."""
     line = "&emsp;".join([f"<b>{html.escape(name)}</b>", *map(html.escape, parts)])
     rest = f'<div style="margin-top:0.5em">{html.escape(below)}</div>' if below else ""
     return f'<div style="font-size:0.9em;margin:0 0.6em;overflow-wrap:anywhere">{line}{rest}</div>'

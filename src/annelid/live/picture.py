@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.config import RunConfig
-from annelid.draw.skeleton import Skeleton
-from annelid.draw.style import CONTRACTED, RELAXED
-from annelid.live.moments import Moment
+from annelid.draw.canvas import CONTRACTED, RELAXED
+from annelid.draw.scene import Skeleton
+from annelid.live.living import Moment
 from annelid.morphology import Array
 
 Lines = NDArray[np.float32]
@@ -34,41 +34,25 @@ LONGEST_ARROW = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One instant, ready to draw, in the model's axes.
+    """One instant, ready to draw, in the model's axes."""
 
-    Attributes:
-        strands: Elements of all strands; their colours never change.
-        rings: Ring muscles from crossing to crossing.
-        ring_colors: Grey at rest, red where activated.
-        springs: Axial springs.
-        spring_colors: By their strain.
-        contacts: Arrows of the ground's force on every segment, from where it pushes most.
-        middle: The middle of the worm, m, ``(3,)``.
-    """
-
-    strands: Lines
-    rings: Lines
-    ring_colors: Colors
+    strands: Lines  # elements of all strands; their colours never change
+    rings: Lines  # ring muscles from crossing to crossing
+    ring_colors: Colors  # grey at rest, red where activated
     springs: Lines
-    spring_colors: Colors
-    contacts: Lines
-    middle: Array
+    spring_colors: Colors  # by their strain
+    contacts: Lines  # arrows of the ground's force on every segment, from where it pushes most
+    middle: Array  # of the worm, (3,)
 
 
 class Painter:
     """Turns the moments of one worm into pictures.
 
     Attributes:
-        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, N.
+        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, about two segments' weight, N.
     """
 
     def __init__(self, skeleton: Skeleton, config: RunConfig) -> None:
-        """Takes what stays the same: which points belong together, and the scale of forces.
-
-        Args:
-            skeleton: The worm.
-            config: Its configuration; gravity sets the scale of forces, about two segments' weight.
-        """
         self._skeleton = skeleton
         anatomy = skeleton.anatomy
         self._geometry = anatomy.geometry
@@ -92,7 +76,7 @@ class Painter:
         springs = crossing[self._geometry.springs]
         length = np.linalg.norm(springs[:, 1] - springs[:, 0], axis=-1)
         return Picture(
-            strands=_segments(vertices),
+            strands=np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3).astype(np.float32),
             rings=crossing[self._ring_pairs].astype(np.float32),
             ring_colors=ring_colors(moment.activation, self._corners),
             springs=springs.astype(np.float32),
@@ -115,12 +99,7 @@ class Painter:
 
 
 def ring_colors(activation: NDArray[np.floating], n_corners: int) -> Colors:
-    """Colours of every line of the rings, grey at activation 0 and red at 1.
-
-    Args:
-        activation: Of every ring muscle, ``(n_muscles,)``.
-        n_corners: Lines of each.
-    """
+    """Colours of every line of the rings, ``n_corners`` each, grey at activation 0 and red at 1, ``(n_muscles,)``."""
     share = np.clip(activation, 0.0, 1.0)[:, np.newaxis]
     relaxed, contracted = np.asarray(RELAXED), np.asarray(CONTRACTED)
     return _bytes(np.repeat(relaxed + share * (contracted - relaxed), 2 * n_corners, axis=0)).reshape(-1, 2, 3)
@@ -134,25 +113,15 @@ def spring_colors(strain: NDArray[np.floating]) -> Colors:
 
 
 def struck(points_m: Array, origin_m: Array, direction: Array) -> Array | None:
-    """Returns the point that a ray hits first.
+    """Returns the point ``(3,)`` that a ray hits first, or None: of those within `REACH_M` the nearest to the origin.
 
-    Args:
-        points_m: Points of the worm, m, ``(n, 3)``.
-        origin_m: Where the ray begins, m, ``(3,)``.
-        direction: Its unit direction, ``(3,)``.
-
-    Returns:
-        The nearest to the origin of all points within `REACH_M` of the ray, ``(3,)``, or None.
+    Points of the worm, m, ``(n, 3)``; origin, m, and unit direction of the ray, ``(3,)``.
     """
     offsets = points_m - origin_m
     depth = offsets @ direction
     beside = np.linalg.norm(offsets - depth[:, np.newaxis] * direction, axis=-1)
     hit = np.flatnonzero((beside < REACH_M) & (depth > 0))
     return points_m[hit[depth[hit].argmin()]] if hit.size else None
-
-
-def _segments(vertices: Array) -> Lines:
-    return np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3).astype(np.float32)
 
 
 def _bytes(colors: NDArray[np.floating]) -> Colors:

@@ -11,16 +11,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from annelid.config import Knob, RunConfig
-from annelid.draw.skeleton import Skeleton
+from annelid.draw.scene import Skeleton
 from annelid.errors import AnnelidError
-from annelid.live.living import knobs_of
-from annelid.live.moments import Moment
-from annelid.live.panel import Panel, legend_html, status_html
+from annelid.live.living import Moment, knobs_of
+from annelid.live.panel import SECONDS, Panel, legend_html, plots_of, status_html
 from annelid.live.picture import Painter, struck
 from annelid.live.player import config_of, player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
-from annelid.live.traces import SECONDS, plots_of
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -60,7 +58,7 @@ class Show:
             source: A configuration to run, or a run to play.
             host: Address to listen on.
             port: Port, 0 for any that is free.
-            speed: Simulated seconds a second.
+            speed: Simulated seconds per second.
 
         Raises:
             ConfigError: The body is planar, or cannot be built.
@@ -133,7 +131,7 @@ class Show:
             self._wishes[call.__name__, *arguments[:-1]] = call, arguments
 
     def restart(self) -> None:
-        """Begins anew, under what the knobs say."""
+        """Begins anew, with the sliders as they are."""
         self._notice = ""
         self.player.restart()
 
@@ -144,7 +142,7 @@ class Show:
         self.player.worm.adjust({knob.field: knob.value(shown)})
 
     def reset_knobs(self) -> None:
-        """Gives all knobs their first values."""
+        """Gives all sliders their first values."""
         assert self.player.worm is not None
         self._notice = ""
         self.player.worm.as_at_first()
@@ -196,7 +194,7 @@ class Show:
         times, values = player.reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
         if len(times):
             self._panel.show_curves(times, list(values[:, self._columns].T))
-        self._panel.tell(self._status(now, time_s))
+        self._panel.show_status(self._status(now, time_s))
 
     def _status(self, now: float, time_s: float) -> str:
         player = self.player

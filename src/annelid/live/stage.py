@@ -1,4 +1,4 @@
-"""The 3D scene of a view: a few nodes that are made once and then only told where their points are."""
+"""The 3D scene of a view: a few nodes that are made once and whose points are then moved."""
 
 from __future__ import annotations
 
@@ -54,14 +54,7 @@ class Stage:
     """
 
     def __init__(self, server: viser.ViserServer, config: RunConfig, strand_colors: Colors, first: Picture) -> None:
-        """Makes all nodes and places the camera so that the whole worm is seen.
-
-        Args:
-            server: Where they are seen.
-            config: The worm's arena.
-            strand_colors: Of all elements of the strands.
-            first: What is shown first.
-        """
+        """Makes all nodes and places the camera so that the whole worm is seen."""
         from viser.transforms import SO3
 
         self._scene = scene = server.scene
@@ -88,21 +81,24 @@ class Stage:
             head_radius=0.009,
             head_length=0.022,
         )
-        length = float(np.ptp(first.strands[..., 0]))
         assert isinstance(config.body, WormBody)
         heading = config.body.heading_deg
-        _add_ground(server, config, length, heading)
+        assert config.arena is not None
+        _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
         self._first_middle = first.middle
         self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
-        self._place_camera(server, first, heading)
+        points = first.strands.reshape(-1, 3) @ self.turn.T
+        target = (points.min(axis=0) + points.max(axis=0)) / 2
+        angles = view_angles("isometric", heading)
+        _, _, sight = picture_axes(*angles)
+        distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
+        camera = server.initial_camera
+        camera.fov = math.radians(FIELD_OF_VIEW_DEG)
+        camera.look_at = target
+        camera.position = target - distance * sight
 
     def show(self, picture: Picture, *, follow: bool) -> None:
-        """Shows another instant.
-
-        Args:
-            picture: What is to be seen.
-            follow: Moves worm and ground so that the worm's middle stays where it is on the screen.
-        """
+        """Shows another instant; ``follow`` moves worm and ground so that the worm's middle stays on the screen."""
         self._strands.points = picture.strands
         self._rings.points = picture.rings
         self._rings.colors = picture.ring_colors
@@ -127,22 +123,9 @@ class Stage:
         """Turns a ray of the page into the model's axes."""
         return (origin - self.shift_m) @ self.turn, direction @ self.turn
 
-    def _place_camera(self, server: viser.ViserServer, first: Picture, heading_deg: float) -> None:
-        points = first.strands.reshape(-1, 3) @ self.turn.T
-        target = (points.min(axis=0) + points.max(axis=0)) / 2
-        angles = view_angles("isometric", heading_deg)
-        _, _, sight = picture_axes(*angles)
-        distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
-        camera = server.initial_camera
-        camera.fov = math.radians(FIELD_OF_VIEW_DEG)
-        camera.look_at = target
-        camera.position = target - distance * sight
 
-
-def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, heading_deg: float) -> None:
+def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float, heading_deg: float) -> None:
     """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
-    scene, arena = server.scene, config.arena
-    assert arena is not None
     scene.add_frame(f"{_ROOT}/ground", show_axes=False)
     shape, pipe = arena.shape(length_m), arena.is_closed
     if shape is not None and pipe:

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from annelid.draw.markdown import anchors, code, emphasis, plain_table, strong, table, words
-from annelid.draw.page import page
+from annelid.draw.markdown import anchors, code, emphasis, page, plain_table, strong, table, words
 from annelid.output import whole_file
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, tally
 

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.analysis.detector import Detection, Score, detect, precision_recall, score
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
+from annelid.draw.canvas import canvas, draw_lines, save_both
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from annelid.analysis.slip import SlipCost, slip_cost
+from annelid.analysis.gait import SlipCost, slip_cost
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
+from annelid.draw.canvas import canvas, draw_lines, panel_title, save_both
 from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage

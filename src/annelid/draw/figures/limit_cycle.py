@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.limit_cycle import LimitCycle
-from annelid.draw.canvas import canvas, save
+from annelid.draw.canvas import canvas, panel_title, plain, save, segment_colors
 from annelid.draw.plots import plot_path
-from annelid.draw.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,12 +30,6 @@ def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path, *, se
             the multipliers of all are compared.
         path: File to write: ``.png``, ``.pdf`` or ``.svg``; a name without a suffix becomes a ``.png``.
         segment: Segment whose neurons are drawn, from 1; states of other names are left out.
-
-    Returns:
-        The path written.
-
-    Raises:
-        RunFileError: Another suffix, or the file cannot be written.
     """
     path = plot_path(path)
     main = next(iter(cycles.values()))
@@ -68,22 +61,13 @@ def _neurons(axes: Axes, cycle: LimitCycle, values: np.ndarray, segment: int) ->
 
 
 def _magnitudes(axes: Axes, cycles: Mapping[str, LimitCycle]) -> None:
-    for i, (color, (name, cycle)) in enumerate(zip(segment_colors(3), cycles.items(), strict=False)):
+    for marker, color, (name, cycle) in zip(_MARKERS, segment_colors(3), cycles.items(), strict=False):
         sizes = np.maximum(np.abs(cycle.multipliers), _LEAST)
-        axes.plot(
-            np.arange(1, len(sizes) + 1),
-            sizes,
-            _MARKERS[i],
-            color=color,
-            markersize=4.0,
-            markerfacecolor="none" if i else color,
-            label=plain(name),
-        )
+        fill = color if marker == _MARKERS[0] else "none"
+        look = {"color": color, "markersize": 4.0, "markerfacecolor": fill, "label": plain(name)}
+        axes.plot(np.arange(1, len(sizes) + 1), sizes, marker, **look)
     axes.axhline(1.0, color="0.35", linestyle=":", linewidth=1.0)
-    axes.set_yscale("log")
-    axes.set_ylim(_LEAST / 3.0, 30.0)
+    axes.set(yscale="log", ylim=(_LEAST / 3.0, 30.0), ylabel="magnitude", xlabel="Floquet multiplier, by magnitude")
     axes.locator_params(axis="x", integer=True)
-    axes.set_xlabel("Floquet multiplier, by magnitude")
-    axes.set_ylabel("magnitude")
     panel_title(axes, "Floquet multipliers")
     axes.legend(loc="center right")

@@ -8,9 +8,8 @@ from math import nan
 import numpy as np
 
 from annelid.analysis.detector import detect, score
-from annelid.analysis.elongation import middle_deficit
-from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
-from annelid.analysis.travel import way_ahead
+from annelid.analysis.elongation import ROBOT_ELONGATION_M, middle_deficit, relative_to_first
+from annelid.analysis.track import forward_position_m
 from annelid.control.program import Program
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
@@ -127,7 +126,7 @@ def _speed_claim(evidence: Evidence, main: Run) -> Claim:
 
 def _travel_in_a_cycle(run: Run, period_s: float) -> float:
     """Displacement of the centre of mass over the last period of a run, m; forwards positive."""
-    time, ahead = run.data["time"].values, way_ahead(run)
+    time, ahead = run.data["time"].values, forward_position_m(run)
     return float(ahead[-1] - np.interp(time[-1] - period_s, time, ahead))
 
 

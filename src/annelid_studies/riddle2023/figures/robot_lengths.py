@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from annelid.analysis.elongation import ROBOT_ELONGATION_M, relative_to_first
 from annelid.analysis.paper import published
-from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

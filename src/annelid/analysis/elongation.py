@@ -12,11 +12,10 @@ from annelid.protocols import Array
 
 @dataclass(frozen=True, slots=True)
 class Elongation:
-    """Elongation of every segment during a run, in several readings; arrays have the shape ``(n_segments,)``.
+    """Elongation of every segment during a run, in several readings, ``(n_segments,)`` each.
 
-    The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak of the spring on
-    the first helix, so that reading stands beside the plainer one, the mean of a segment's sensors, and the range
-    over all of them.
+    The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak of the spring on the first
+    helix. Beside it stand the plainer mean of a segment's sensors, and the range over all of them.
     """
 
     first_helix_pp_m: Array  # largest minus smallest length of the first helix's spring
@@ -26,12 +25,7 @@ class Elongation:
 
 
 def elongation(stretch_m: ArrayLike, rest_m: ArrayLike) -> Elongation:
-    """Reads the elongation of every segment.
-
-    Args:
-        stretch_m: Sensor lengths, m, shape ``(n_times, n_segments, n_sensors)``; sensor 0 on the first helix.
-        rest_m: Their lengths at rest, m, shape ``(n_segments, n_sensors)``.
-    """
+    """Reads elongations from sensor lengths, m, ``(n_times, n_segments, n_sensors)``, and their lengths at rest."""
     stretch, rest = np.asarray(stretch_m, dtype=float), np.asarray(rest_m, dtype=float)
     peak_to_peak = np.ptp(stretch, axis=0)
     return Elongation(
@@ -45,8 +39,7 @@ def elongation(stretch_m: ArrayLike, rest_m: ArrayLike) -> Elongation:
 def middle_deficit(elongation_m: ArrayLike) -> float:
     """How far the interior segments stay below the first: ``1 - mean(interior) / first``, NaN if that is unmoved.
 
-    With three segments this is the paper's "segment 2 below segment 1" (39.4 %). Elongations of at least three
-    segments, m, ``(n_segments,)``; so for the two below.
+    With three segments this is the paper's "segment 2 below segment 1" (39.4 %).
     """
     values = np.asarray(elongation_m, dtype=float)
     return _deficit(values[1:-1].mean(), values[0])

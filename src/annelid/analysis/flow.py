@@ -2,9 +2,8 @@
 
 A step of a `Flow` is smooth as long as its switches, such as stretch sensors that are on or off, keep still. When one
 moves within a step, the step is shortened to the instant of the switch, which bisection finds, and a new one begins
-there. So a perturbed copy switches earlier or later by what its perturbation says, and the finite differences carry the
-jump of the vector field at the switch (the saltation matrix; Leine & Nijmeijer 2004, ch. 7). With ``refine=False``
-switches move at whole steps only, as in a plain run, and the derivative misses the saltations.
+there, so that finite differences carry the jump of the vector field at the switch (the saltation matrix; Leine &
+Nijmeijer 2004, ch. 7). With ``refine=False`` switches move at whole steps only, as in a plain run.
 """
 
 from __future__ import annotations
@@ -39,25 +38,16 @@ class Flow(Protocol):
     switch_labels: tuple[str, ...]
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
-        """Advances copies by one step.
+        """Advances copies, ``(n_copies, n_states)``, by one step, given the switches of the step before, ``(n_copies, n_switches)``.
 
-        Args:
-            state: Shape ``(n_copies, n_states)``.
-            switches: What they were during the step before, ``(n_copies, n_switches)``.
-
-        Returns:
-            The states one step on, and the switches in force during this step; new arrays.
+        Returns new arrays: the states one step on, and the switches in force during this step.
         """
         ...
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
-        """Returns the states after shares of steps, up to the move of a switch or to the section.
+        """Returns the states after shares of steps in [0, 1], ``(n_copies,)``, up to the move of a switch or to the section.
 
-        Args:
-            state: Where the steps begin, ``(n_copies, n_states)``.
-            switches: The switches in force, ``(n_copies, n_switches)``.
-            ahead: What `step` returned for these.
-            share: In [0, 1], ``(n_copies,)``.
+        ``switches`` are those in force, and ``ahead`` is what `step` returned for them.
         """
         ...
 
@@ -110,9 +100,8 @@ class ClosedLoop:
     """Plant and controller, in their present state, as a `Flow`.
 
     The state is every array of floats in `get_state` of both, plant first; the switches are every array of booleans.
-    Integers, such as the number of steps taken, stay at their values when this is made: what depends on them, a
-    kick at the first step or a hold at the start, must be over by then. A state's label is a neuron's name for a
-    potential, else such as ``height[2]``.
+    Integers, such as the number of steps taken, stay as they are now: what depends on them, a kick at the first step or a
+    hold at the start, must be over by then. Potentials are labelled by their neurons, other states such as ``height[2]``.
 
     All copies advance in one call where plant and controller are batched (`BatchedPlant`, `BatchedController`).
     Otherwise each copy is restored, stepped and saved by itself: a period then costs one run per copy.
@@ -131,8 +120,7 @@ class ClosedLoop:
             kinks: Count kinks of the controller's equations among the switches, where it is `Piecewise`.
 
         Raises:
-            ConfigError: Plant or controller cannot be saved and restored, the plant cannot sense without moving, or
-                there are more than `MOST_STATES` states.
+            ConfigError: One of them cannot be saved and restored, the plant cannot sense, or there are too many states.
         """
         for part, what in ((plant, "plant"), (controller, "controller")):
             if not isinstance(part, Stateful):
@@ -329,14 +317,9 @@ def first_share(flow: Flow, here: Copies, share: Array, past: Callable[[Array], 
 
 
 def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, refine: bool = True) -> Copies:
-    """Lets copies run, each for a duration of its own, and returns them at their ends.
+    """Lets copies, ``(n_copies, n_states)``, run for durations of their own, s, ``(n_copies,)``, and returns them at their ends.
 
-    Args:
-        flow: The system.
-        state: Shape ``(n_copies, n_states)``.
-        before: Switches as they were before, ``(n_copies, n_switches)``.
-        duration_s: Shape ``(n_copies,)``, s.
-        refine: Whether steps end where a switch moves.
+    ``before`` are the switches as they were before, ``(n_copies, n_switches)``; with ``refine`` steps end where one moves.
     """
     left = np.asarray(duration_s, dtype=float) / flow.timestep_s
     done = Copies.at(flow, state, before)

@@ -172,8 +172,7 @@ def _summed_gain(data: xr.Dataset, name: str) -> float:
 def net_work(data: xr.Dataset) -> Array | None:
     """Returns the work of every muscle on the body from a run's first sample to its last, J, ``(n_muscles,)``.
 
-    What a muscle takes up while it is lengthened is subtracted. A worm that sums no work has force over shortening,
-    by the trapezoidal rule; None without forces or lengths.
+    What a muscle takes up while it is lengthened is subtracted; without a recorded sum it is force over shortening.
     """
     return _work(data, "muscle_work", -np.inf)
 
@@ -181,8 +180,7 @@ def net_work(data: xr.Dataset) -> Array | None:
 def positive_work(data: xr.Dataset) -> Array | None:
     """Returns the work of every muscle while it was positive, J, ``(n_muscles,)``: nothing is regained.
 
-    Where the sum over physics steps was not recorded, positive changes of the recorded work from sample to sample are
-    added, which is less by what changes sign between two samples.
+    Without a recorded sum, positive changes of the work from sample to sample are added, which is less.
     """
     return _work(data, "positive_work", 0.0)
 

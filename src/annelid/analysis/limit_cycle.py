@@ -2,9 +2,8 @@
 
 The return map of a section is iterated, or solved by Newton's method, until the orbit closes; state-transition
 matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
-ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks, at which the equations
-change piece within a step, take it further away. `Continuous` and `Piecewise` of `annelid.analysis.flow` take care of
-both.
+ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks within a step take it
+further away; `Continuous` and `Piecewise` of `annelid.analysis.flow` take care of both.
 """
 
 from __future__ import annotations
@@ -194,14 +193,9 @@ def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0)
 def settled(
     plant: Plant, controller: Controller, control_timestep_s: float, settle_s: float, *, stride: int = 1
 ) -> tuple[ClosedLoop, Array, Switches]:
-    """Lets any plant and controller run from their reset, and makes the closed loop of them.
+    """Lets any plant and controller run from their reset for ``settle_s``, and makes the closed loop of them.
 
-    Args:
-        plant: The body.
-        controller: The controller.
-        control_timestep_s: Duration of a control step, s.
-        settle_s: Simulated time, s.
-        stride: Control steps from one movement of the body to the next.
+    The body moves every ``stride`` control steps.
 
     Returns:
         The loop, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
@@ -356,22 +350,13 @@ def crossing_times(
     count: int = 1,
     refine: bool = True,
 ) -> tuple[Array, Array, Switches]:
-    """Lets copies run, as `travel` does, until they have met the section.
-
-    Args:
-        flow: The system.
-        state: Shape ``(n_copies, n_states)``.
-        before: Switches as they were before, ``(n_copies, n_switches)``.
-        section: The event.
-        longest_s: Simulated time after which to give up, s.
-        count: Which of the events to stop at, from 1.
-        refine: Whether steps end where a switch moves.
+    """Lets copies run, from where `travel` would, until they have met the section ``count`` times.
 
     Returns:
         Times, s, ``(n_copies,)``; states and switches there.
 
     Raises:
-        NoLimitCycle: A copy has not met the section so often in that time.
+        NoLimitCycle: A copy has not met it so often in ``longest_s``.
     """
     here = Copies.at(flow, state, before)
     end, times = here[np.arange(len(state))], np.zeros(len(state))
@@ -495,15 +480,11 @@ def kicked_phase_response(
         cycle: Its limit cycle.
         kicks: What is added to the states at once, ``(n_kicks, n_states)``; any size.
         phases: Indices into the cycle's instants, ``(n_kicked,)``.
-        n_cycles: Which meeting with the section to compare, from 1; by then the kick should have died away but for
-            its phase.
+        n_cycles: Which meeting with the section to compare, from 1; by then only the kick's phase should be left.
         longest_s: Longest cycle to wait for, s.
 
     Returns:
         Advance of each phase by each kick, s, ``(n_kicked, n_kicks)``, within half a period of 0.
-
-    Raises:
-        NoLimitCycle: A kick has thrown the system off the cycle.
     """
     plain = np.zeros((1, kicks.shape[1]))
     state = (cycle.state[phases, np.newaxis] + np.concatenate([plain, kicks])).reshape(-1, kicks.shape[1])

@@ -52,8 +52,8 @@ class Passage:
     def speed_m_per_s(self) -> float:
         """Mean speed of the foremost ring along the centre line through all that bends or narrows, m/s.
 
-        From the first posture in which the ring has come there to the first in which it is past it, so that worms are
-        compared over the same distance; or to the end for one that does not get so far. NaN if it never came.
+        From the first posture there to the first past it, or to the end for a worm that does not get so far, so that worms are
+        compared over the same distance; NaN if it never came.
         """
         inside = np.flatnonzero(self.front_m >= self.reach_m[0])
         past = np.flatnonzero(self.front_m >= self.reach_m[1])
@@ -64,10 +64,9 @@ class Passage:
         return float((self.front_m[last] - self.front_m[first]) / (self.time_s[last] - self.time_s[first]))
 
     def speed_over_m_per_s(self, window_s: float) -> Array:
-        """Speed of the middle at every posture, m/s, ``(n,)``: the slope of a line through the postures of a window.
+        """Speed of the middle at every posture, m/s, ``(n,)``: the slope of a line through the postures of a window, s.
 
-        Args:
-            window_s: Width of the window, s; a cycle or more, so that the swings within one do not count.
+        A window of a cycle or more leaves the swings within one out.
         """
         slope = np.empty(len(self.time_s))
         for k, now in enumerate(self.time_s):

@@ -20,12 +20,7 @@ class Deformation:
 
 
 def rhombus_diagonals(crossings_m: ArrayLike, rhombi: Indices) -> tuple[Array, Array]:
-    """Measures the axial and the lateral diagonals, m, ``(..., n_rhombi)`` each.
-
-    Args:
-        crossings_m: Positions of the crossings, m, shape ``(..., n_crossings, 3)``.
-        rhombi: Front, left, rear and right crossing of each rhombus, shape ``(n_rhombi, 4)``.
-    """
+    """Measures axial and lateral diagonals, m, ``(..., n_rhombi)``, from crossings, m, ``(..., n_crossings, 3)``."""
     front, left, rear, right = np.moveaxis(np.asarray(crossings_m, dtype=float)[..., rhombi, :], -2, 0)
     return np.linalg.norm(rear - front, axis=-1), np.linalg.norm(right - left, axis=-1)
 
@@ -48,10 +43,7 @@ def actuated(geometry: MeshGeometry) -> NDArray[np.bool_]:
 
 
 def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
-    """Distance along the resting body from the ring of a segment (from 0) to the middle of each rhombus.
-
-    In m, negative towards the front, shape ``(n_rhombi,)``.
-    """
+    """Distance along the resting body, m, from a segment's ring (from 0) to each rhombus' middle, negative towards the front."""
     return geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[segment]]
 
 

@@ -130,12 +130,11 @@ def stretches(on: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
-    """Describes the rhythm of a run.
+    """Describes the rhythm of a run from times, s, ``(n_times,)``, and segments' activation, ``(n_times, n_segments)``.
 
-    An onset in the first sampling interval of a run belongs to the initial state, not to the rhythm: no interval
-    that begins with one counts towards the period. A continued run, whose first sample is later than time zero,
-    has no initial state: what is contracted there has begun before, and the wave may begin at any segment. Times in s,
-    ``(n_times,)``, and activation of each segment in [0, 1], ``(n_times, n_segments)``.
+    An onset in the first sampling interval belongs to the initial state: no interval that begins with one counts towards
+    the period. A continued run, whose first sample is later than time zero, has no initial state: what is contracted
+    there has begun before, and the wave may begin at any segment.
     """
     times = np.asarray(time_s, dtype=float)
     signals = np.asarray(activation, dtype=float)
@@ -226,10 +225,10 @@ def _judged(run: Run, signal: str, after_s: float) -> tuple[Array, NDArray[np.bo
 def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_INTERVAL_S) -> RhythmScore:
     """Decides whether segments contract in order, and how regularly.
 
-    **Onsets.** A segment is contracted while its activation is at least 0.5. Interruptions below 20 ms are bridged,
-    then contractions below 20 ms left out. An onset in the first sampling interval from time zero belongs to the
-    initial state: it stands in the order and counts as a contraction, but no cycle begins with it. In a run whose
-    first sample is later, what is contracted there has no onset.
+    **Onsets.** A segment is contracted while its activation is at least 0.5; interruptions, then contractions below 20 ms
+    do not count. An onset in the first sampling interval from time zero belongs to the initial state: it stands in the
+    order and counts as a contraction, but no cycle begins with it. In a run whose first sample is later, what is
+    contracted there has no onset.
 
     **Cycles and lags.** A cycle is the time from one onset of a segment to its next. The segments stand in a closed
     ring, 1-2-..-N-1. The lag of a segment behind the one before it is its onset's phase in that one's cycle, or one
@@ -247,9 +246,9 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     5. ordered.
 
     **Fronts.** W fronts that travel to the rear and N - W that travel forwards have the same onsets. The smaller number
-    is taken, unless ``mean_contracted`` is within 0.25 of the larger: where each contraction hands over to the next,
-    as many segments are contracted as there are fronts. So a wave 1-2-3 whose contractions last two thirds of the
-    period is called two fronts forwards. With W = N/2 the direction is 0.
+    is taken, unless ``mean_contracted`` is within 0.25 of the larger, as where each contraction hands over to the next.
+    So a wave 1-2-3 whose contractions last two thirds of the period is called two fronts forwards. With W = N/2 the
+    direction is 0.
 
     Args:
         time_s: Sample times, s, rising, shape ``(n_times,)``.
@@ -318,8 +317,7 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
 def _onsets(times: Array, signals: Array, shortest_s: float = 0.0) -> tuple[list[Array], list[Array], float]:
     """Contractions and onsets of every segment, and until when onsets belong to the initial state.
 
-    A run that continues another has no initial state (minus infinity), and what is contracted at its first sample no
-    onset.
+    A continued run has no initial state (minus infinity); what is contracted at its first sample has no onset.
     """
     found = [contractions(times, one, shortest_s=shortest_s) for one in signals.T]
     if times.size and times[0] > 0:

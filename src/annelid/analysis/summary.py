@@ -162,8 +162,7 @@ def summary(run: Run) -> Summary:
 def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[Array]:
     """Forces of all samples in which the muscle itself is contracted, an array a segment; empty without forces.
 
-    The short transient at each onset, above the force that the muscle settles at, is in there. It sets the peak and
-    hardly moves the median. What is shorter than a physics step, or between two samples, is not in the peak.
+    The short transient at each onset is in there: it sets the peak and hardly moves the median.
     """
     if "muscle_force" not in data or "activation" not in data:
         return []

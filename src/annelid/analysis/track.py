@@ -79,10 +79,7 @@ class Track:
         return self.crossing_m[..., :2].reshape(len(self.time_s), -1, self.n_per_plane, 2)
 
     def outline_m(self, sample: int) -> Array:
-        """Returns the body's outline seen from above at a sample: a closed polygon, m, ``(n_corners, 2)``.
-
-        On either side it runs along the outermost crossing of every plane.
-        """
+        """Returns the outline seen from above, m, ``(n_corners, 2)``: along the outermost crossings on either side, closed."""
         planes = self._planes[sample]
         centre = planes.mean(axis=1)
         along = np.gradient(centre, axis=0)
@@ -182,10 +179,10 @@ class Circle:
 
 
 def fitted_circle(points_m: ArrayLike) -> Circle | None:
-    """Fits a circle to points of a track in the order of time, seen from above, m, ``(n, 2)``.
+    """Fits a circle to points of a track in order, m, ``(n, 2)``; None for fewer than three, or for a line.
 
     The sum of ``(|p|^2 + b . p + c)^2`` over its mean squared slope is smallest (Taubin 1991), which unlike plain
-    least squares does not draw the radius of a short noisy arc in. None for fewer than three points, or for a line.
+    least squares does not draw the radius of a short noisy arc in.
     """
     points = np.asarray(points_m, dtype=float)
     if len(points) < 3:

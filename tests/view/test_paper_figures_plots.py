@@ -10,7 +10,8 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.analysis.elongation import ROBOT_ELONGATION_M, relative_to_first
+from annelid.analysis.elongation import relative_to_first
+from annelid.analysis.paper import ROBOT_ELONGATION_M
 from annelid.body.actuators.muscle import Rings
 from annelid.body.worm import WormBody
 from annelid.config import load_config
@@ -219,7 +220,7 @@ def network(request: pytest.FixtureRequest) -> Network:
 
 
 def drawn_ids(network: Network, folder: Path) -> Counter[str]:
-    png = network_diagram.figure_6_network_diagram(network, folder / "network")
+    png = network_diagram.network_figure(network, folder / "network")
     ids = (node.get("id", "") for node in ElementTree.parse(png.with_suffix(".svg")).iter())
     return Counter(found for found in ids if found.startswith(("neuron-", "synapse-", "gap-", "input-", "output-")))
 
@@ -285,7 +286,7 @@ def test_abbreviations_tell_names_apart() -> None:
 
 @pytest.mark.parametrize("conductances", [False, True])
 def test_figure_6(network: Network, tmp_path: Path, conductances: bool) -> None:
-    png = network_diagram.figure_6_network_diagram(network, tmp_path / "figure_6", conductances=conductances)
+    png = network_diagram.network_figure(network, tmp_path / "figure_6", conductances=conductances)
     assert_two_good_files(png)
     ids = Counter(node.get("id") for node in ElementTree.parse(png.with_suffix(".svg")).iter() if node.get("id"))
     for name in network.neurons:

@@ -12,7 +12,7 @@ import pytest
 from annelid.config import load_config
 from annelid.draw.camera import VIEWS_DEG
 from annelid.draw.planar_scene import rhombi
-from annelid.draw.render import nearest_frame, render_frame, render_video
+from annelid.draw.render import render_frame, render_video
 from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
@@ -248,10 +248,3 @@ def test_a_failing_video_leaves_nothing_and_keeps_what_was_there(planar_run: Run
         render_video(planar_run, target, size=(160, 96), progress=fail)
     assert target.read_bytes() == b"precious"
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
-
-
-def test_a_time_takes_its_nearest_posture_and_none_far_outside_of_the_run(rods_run: Run) -> None:
-    times = np.array([0.0, 0.1, 0.2])
-    assert [nearest_frame(rods_run, times, time) for time in (-0.05, 0.14, 0.29)] == [0, 1, 2]
-    with pytest.raises(RunFileError, match=r"no picture at 1\.5 s: it was recorded from 0 to 0\.2 s"):
-        nearest_frame(rods_run, times, 1.5)

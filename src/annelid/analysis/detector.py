@@ -40,7 +40,7 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
+class DetectionScore:
     """How good a detector is; samples of all segments count alike, NaN where there is nothing to divide by."""
 
     precision: float  # share of its alarms that is slip
@@ -53,7 +53,7 @@ class Score:
     correlation: float  # of true and estimated speed where the segment bears load, truly or by the detector
 
 
-def detect(run: Run, detector: SlipDetector | None = None) -> Detection:
+def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
     """Lets a detector (by default `SlipDetector` as it is) read a run with touch sample by sample, the true slip beside it."""
     data = run.data
     if "touch" not in data or data.sizes.get("time", 0) < 2:
@@ -81,7 +81,7 @@ def _windowed(signal: Array, width: int) -> Array:
     return np.stack([np.convolve(column, kernel, mode="same") for column in signal.T], axis=1)
 
 
-def score(detections: list[Detection], limit_m_per_s: float) -> Score:
+def score_detections(detections: list[Detection], limit_m_per_s: float) -> DetectionScore:
     """Scores a detector, which reports slip above an estimated speed, over the runs of some detections together."""
     n_false = episodes = 0
     delays = list[float]()
@@ -100,7 +100,7 @@ def score(detections: list[Detection], limit_m_per_s: float) -> Score:
     estimated = np.concatenate([one.estimated_m_per_s.ravel() for one in detections])[counts]
     varies = true.size > 1 and np.ptp(true) > 0.0 and np.ptp(estimated) > 0.0
     hits = int((alarm & slips).sum())
-    return Score(
+    return DetectionScore(
         precision=_share(hits, int(alarm.sum())),
         recall=_share(hits, int(slips.sum())),
         base_rate=_share(int(slips.sum()), slips.size),
@@ -118,5 +118,5 @@ def _share(part: float, whole: float) -> float:
 
 def precision_recall(detections: list[Detection], limits_m_per_s: Array) -> tuple[Array, Array]:
     """Returns recall and precision over some runs together for every limit, ``(n_limits,)`` each."""
-    scores = [score(detections, float(limit)) for limit in limits_m_per_s]
+    scores = [score_detections(detections, float(limit)) for limit in limits_m_per_s]
     return np.array([one.recall for one in scores]), np.array([one.precision for one in scores])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.analysis.rhythm import run_rhythm
-from annelid.analysis.track import first_heading, fitted_circle, forward_position_m, track_of
+from annelid.analysis.track import first_heading, fitted_circle, forward_position, track_of
 from annelid.body.worm import WormBody
 from annelid.protocols import Array
 
@@ -265,7 +265,7 @@ def slip_cost(run: Run) -> SlipCost | None:
         return None
     time, loss = run.data["time"].values, run.data["slip_loss"].values.sum(axis=1)
     ends = np.searchsorted(time, marks[[0, -1]])
-    duration, travel, lost = (float(np.diff(each[ends])[0]) for each in (time, forward_position_m(run), loss))
+    duration, travel, lost = (float(np.diff(each[ends])[0]) for each in (time, forward_position(run), loss))
     cycles = len(marks) - 1
     cost = lost / travel if travel > 0.0 else np.inf
     return SlipCost(cycles, duration / cycles, travel / duration, lost / duration, cost)

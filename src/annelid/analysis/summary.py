@@ -13,7 +13,7 @@ import numpy as np
 from annelid.analysis.elongation import elongation, end_difference, middle_deficit
 from annelid.analysis.gait import net_work, positive_work
 from annelid.analysis.rhythm import CONTRACTED, Rhythm, run_rhythm
-from annelid.analysis.track import forward_position_m
+from annelid.analysis.track import forward_position
 from annelid.protocols import Array
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def summary(run: Run) -> Summary:
     spread = read if read and data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
     pulling = np.concatenate([np.empty(0), *forces])
-    ahead = forward_position_m(run) if "center_of_mass" in data and sampled else None
+    ahead = forward_position(run) if "center_of_mass" in data and sampled else None
     shortest = None
     if "ring_length" in data and sampled:
         # A ring of two halves is as long as both.

@@ -30,7 +30,7 @@ def first_heading(run: Run) -> Array:
     return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
 
 
-def forward_position_m(run: Run) -> Array:
+def forward_position(run: Run) -> Array:
     """Returns the position of the centre of mass along the initial heading, m from the origin, ``(n_times,)``."""
     ahead, centre = first_heading(run), run.data["center_of_mass"]
     along: Array = ahead[0] * centre.sel(axis="x").values

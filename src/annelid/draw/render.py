@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.analysis.rhombi import nearest_time
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 
@@ -83,7 +84,7 @@ def render_frame(
     path = with_suffix(path, FRAME_SUFFIXES, "a picture")
     size = size or FRAME_SIZE[run.config.body.kind]
     with _scene(run, size, camera, fine=True) as scene:
-        pixels = scene.picture(nearest_frame(run, scene.times_s, time_s))
+        pixels = scene.picture(nearest_time(run, scene.times_s, time_s))
     with whole_file(path) as draft:
         imageio.v3.imwrite(draft, pixels)
     return path
@@ -142,7 +143,7 @@ def render_video(
         total = math.floor(pictures + 1e-6)
         with _video(draft, fps, size, path, total) as write:
             for done in range(total):
-                frame = nearest_frame(run, scene.times_s, first + done * speed / fps)
+                frame = nearest_time(run, scene.times_s, first + done * speed / fps)
                 write(np.ascontiguousarray(scene.picture(frame)))
                 if progress is not None:
                     progress(done + 1, total)
@@ -159,20 +160,6 @@ def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -
     from annelid.draw.scene import WormScene
 
     return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine)
-
-
-def nearest_frame(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
-    """Returns the index of the recorded time nearest to a wanted one.
-
-    Raises:
-        RunFileError: It lies more than an interval outside of the run.
-    """
-    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
-    if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
-        raise RunFileError(
-            f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
-        )
-    return int(np.abs(times_s - time_s).argmin())
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
-from annelid.draw.markdown import Table
+from annelid.markdown import Table
 from annelid_studies.tables import terminal_table
 
 if TYPE_CHECKING:

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 from annelid.analysis.gait import SlipCost, slip_cost
 from annelid.config import load_config
 from annelid.draw.canvas import canvas, draw_lines, panel_title, save_both
-from annelid.draw.markdown import Table
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
+from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import terminal_table
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.analysis.track import forward_position_m
+from annelid.analysis.track import forward_position
 from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, line_entries, panel_title, save, segment_colors
 from annelid.draw.plots import neuron_potentials
@@ -76,7 +76,7 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
         for run, track, above, color in zip(runs, tracks, seen, segment_colors(len(runs)), strict=True):
             if track is None:
                 continue
-            ahead = forward_position_m(run)
+            ahead = forward_position(run)
             panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), color=color)
             if above:
                 panels[1].plot(track[:, 0], track[:, 1], color=color)

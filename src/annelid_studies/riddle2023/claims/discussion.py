@@ -7,9 +7,10 @@ from math import nan
 
 import numpy as np
 
-from annelid.analysis.detector import detect, score
-from annelid.analysis.elongation import ROBOT_ELONGATION_M, middle_deficit, relative_to_first
-from annelid.analysis.track import forward_position_m
+from annelid.analysis.detector import detect_slip, score_detections
+from annelid.analysis.elongation import middle_deficit, relative_to_first
+from annelid.analysis.paper import ROBOT_ELONGATION_M
+from annelid.analysis.track import forward_position
 from annelid.control.program import Program
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
@@ -126,7 +127,7 @@ def _speed_claim(evidence: Evidence, main: Run) -> Claim:
 
 def _travel_in_a_cycle(run: Run, period_s: float) -> float:
     """Displacement of the centre of mass over the last period of a run, m; forwards positive."""
-    time, ahead = run.data["time"].values, forward_position_m(run)
+    time, ahead = run.data["time"].values, forward_position(run)
     return float(ahead[-1] - np.interp(time[-1] - period_s, time, ahead))
 
 
@@ -339,7 +340,7 @@ def friction_claim(evidence: Evidence) -> Claim:
 
 def _slip_claim(evidence: Evidence) -> Claim:
     cases = {name: detection.CASES[name] for name in slip_runs(evidence.effort)}
-    found = [score([detect(evidence.store.run(case))], detection.LIMIT_M_PER_S) for case in cases.values()]
+    found = [score_detections([detect_slip(evidence.store.run(case))], detection.LIMIT_M_PER_S) for case in cases.values()]
     return _of_outlook(
         "Pressure and stretch sensors together detect slip reliably.",
         "section 5",

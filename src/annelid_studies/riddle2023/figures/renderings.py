@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from annelid.analysis.rhombi import nearest_frame
 from annelid.body import mesh_of
 from annelid.body.formulations.rods.net import PIN_RGBA, STRAND_RGBA
 from annelid.body.worm import WormBody
@@ -17,7 +18,6 @@ from annelid.config import RunConfig
 from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
 from annelid.draw.canvas import CONTRACTED, activation_color, canvas, panel_title, save_both
 from annelid.draw.gl import find_backend
-from annelid.draw.render import nearest_frame
 from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, postures_of, render_still
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import Array, MeshGeometry
@@ -84,10 +84,10 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
     geometry = mesh_of(_worm(run.config).mesh)
+    frame = nearest_frame(run, time_s)
+    recorded_s = float(run.data["frame_time"].values[frame])
     anatomy = compile_worm(run.config)
-    postures, times = postures_of(run, anatomy.model.nq), run.data["frame_time"].values
-    frame = nearest_frame(run, times, time_s)
-    recorded_s, qpos = float(times[frame]), postures[frame]
+    qpos = postures_of(run, anatomy.model.nq)[frame]
     return Posture(
         config=run.config,
         geometry=geometry,

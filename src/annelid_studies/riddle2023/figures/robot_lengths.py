@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.analysis.elongation import ROBOT_ELONGATION_M, relative_to_first
-from annelid.analysis.paper import published
+from annelid.analysis.elongation import relative_to_first
+from annelid.analysis.paper import ROBOT_ELONGATION_M, published
 from annelid.config import load_config
 from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
 

@@ -13,8 +13,7 @@ from annelid.config import RunConfig, field_value, fields_of
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-Number = float | Sequence[float | None] | None
-"""One number, one a segment, or None for what a run does not have."""
+Number = float | Sequence[float | None] | None  # one number, one a segment, or None for what a run does not have
 
 _NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
 # Fields of the configuration that change nothing in a run.

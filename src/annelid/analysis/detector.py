@@ -54,7 +54,7 @@ class DetectionScore:
 
 
 def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
-    """Lets a detector (by default `SlipDetector` as it is) read a run with touch sample by sample, the true slip beside it."""
+    """Has a detector (default: `SlipDetector` as it is) read a run with touch sample by sample, the true slip beside it."""
     data = run.data
     if "touch" not in data or data.sizes.get("time", 0) < 2:
         raise RunFileError(f"{run.path} holds no touch of a skin: only runs of the 3D worm do")

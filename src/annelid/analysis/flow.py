@@ -20,8 +20,7 @@ from annelid.protocols import Array, Controller, Plant, Records, Sensation, Stat
 
 Switches = NDArray[np.bool_]
 
-MOST_STATES = 400
-"""Continuous states beyond which a monodromy by finite differences is refused."""
+MOST_STATES = 400  # continuous states beyond which a monodromy by finite differences is refused
 # Halvings of a step that locate an event: to 1e-9 of the step.
 _HALVINGS = 30
 
@@ -38,14 +37,15 @@ class Flow(Protocol):
     switch_labels: tuple[str, ...]
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
-        """Advances copies, ``(n_copies, n_states)``, by one step, given the switches of the step before, ``(n_copies, n_switches)``.
+        """Advances copies, ``(n_copies, n_states)``, by one step.
 
-        Returns new arrays: the states one step on, and the switches in force during this step.
+        Takes the switches of the step before, ``(n_copies, n_switches)``; returns new arrays: the states one step on, and the
+        switches in force during this step.
         """
         ...
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
-        """Returns the states after shares of steps in [0, 1], ``(n_copies,)``, up to the move of a switch or to the section.
+        """Returns the states after shares of steps in [0, 1], ``(n_copies,)``, up to the section or the move of a switch.
 
         ``switches`` are those in force, and ``ahead`` is what `step` returned for them.
         """
@@ -100,8 +100,9 @@ class ClosedLoop:
     """Plant and controller, in their present state, as a `Flow`.
 
     The state is every array of floats in `get_state` of both, plant first; the switches are every array of booleans.
-    Integers, such as the number of steps taken, stay as they are now: what depends on them, a kick at the first step or a
-    hold at the start, must be over by then. Potentials are labelled by their neurons, other states such as ``height[2]``.
+    Integers, such as the number of steps taken, stay as they are now: what depends on them, a kick at the first step or
+    a hold at the start, must be over by then. Potentials are labelled by their neurons, other states such as
+    ``height[2]``.
 
     All copies advance in one call where plant and controller are batched (`BatchedPlant`, `BatchedController`).
     Otherwise each copy is restored, stepped and saved by itself: a period then costs one run per copy.
@@ -317,9 +318,10 @@ def first_share(flow: Flow, here: Copies, share: Array, past: Callable[[Array], 
 
 
 def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, refine: bool = True) -> Copies:
-    """Lets copies, ``(n_copies, n_states)``, run for durations of their own, s, ``(n_copies,)``, and returns them at their ends.
+    """Lets copies, ``(n_copies, n_states)``, run for their own durations, s, ``(n_copies,)``; returns them at their ends.
 
-    ``before`` are the switches as they were before, ``(n_copies, n_switches)``; with ``refine`` steps end where one moves.
+    ``before`` are the switches as they were before, ``(n_copies, n_switches)``; with ``refine`` steps end where one
+    moves.
     """
     left = np.asarray(duration_s, dtype=float) / flow.timestep_s
     done = Copies.at(flow, state, before)

@@ -40,8 +40,7 @@ __all__ = [
     "travel",
 ]
 
-Time = Literal["continuous", "located", "stepped"]
-"""How a worm's time is taken; see `limit_cycle`."""
+Time = Literal["continuous", "located", "stepped"]  # how a worm's time is taken; see `limit_cycle`
 
 # Step whose change is the vector field, and the step that the field is integrated with, s.
 _FIELD_STEP_S = 1e-5

@@ -52,8 +52,8 @@ class Passage:
     def speed_m_per_s(self) -> float:
         """Mean speed of the foremost ring along the centre line through all that bends or narrows, m/s.
 
-        From the first posture there to the first past it, or to the end for a worm that does not get so far, so that worms are
-        compared over the same distance; NaN if it never came.
+        From the first posture there to the first past it, or to the end for a worm that does not get so far, so that
+        worms are compared over the same distance; NaN if it never came.
         """
         inside = np.flatnonzero(self.front_m >= self.reach_m[0])
         past = np.flatnonzero(self.front_m >= self.reach_m[1])

@@ -66,7 +66,7 @@ def actuated(geometry: MeshGeometry) -> NDArray[np.bool_]:
 
 
 def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
-    """Distance along the resting body, m, from a segment's ring (from 0) to each rhombus' middle, negative towards the front."""
+    """Distance along the resting body from a segment's ring (from 0) to each rhombus' middle, m, negative forwards."""
     return geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[segment]]
 
 

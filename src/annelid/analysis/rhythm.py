@@ -16,26 +16,18 @@ from annelid.protocols import Array
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-CONTRACTED = 0.5
-"""Activation above which a muscle counts as contracted (half of its range)."""
-SHORTEST_S = 0.02
-"""Contractions, and interruptions of one, that are shorter do not count in a score, s."""
-LEAST_LENGTHENING_M = 0.0025
-"""Segments that lengthen by less than twice this are not moved, m."""
+CONTRACTED = 0.5  # activation above which a muscle counts as contracted (half of its range)
+SHORTEST_S = 0.02  # contractions, and interruptions of one, that are shorter do not count in a score, s
+LEAST_LENGTHENING_M = 0.0025  # segments that lengthen by less than twice this are not moved, m
 DESIGN_INTERVAL_S = 0.875
 """Interval of successive onsets by design at a gate time constant of 300 ms, whatever N (Riddle et al. 2022), s."""
-SILENCE = 2.0
-"""A run is silent if nothing has begun for longer than this many expected intervals."""
-MOST_PERIOD_CV = 0.2
-"""Largest coefficient of variation of an ordered rhythm's periods."""
-LEAST_CONCENTRATION = 0.5
-"""Least mean resultant length of the lags of one pair of neighbours in an ordered rhythm."""
-WAVE_TOLERANCE = 0.375
-"""Largest distance of a segment from its place in a wave, in steps of 1/N of the period."""
+SILENCE = 2.0  # a run is silent if nothing has begun for longer than this many expected intervals
+MOST_PERIOD_CV = 0.2  # largest coefficient of variation of an ordered rhythm's periods
+LEAST_CONCENTRATION = 0.5  # least mean resultant length of the lags of one pair of neighbours in an ordered rhythm
+WAVE_TOLERANCE = 0.375  # largest distance of a segment from its place in a wave, in steps of 1/N of the period
 COUNT_TOLERANCE = 0.25
 """Largest difference of the number of contracted segments from the larger of two numbers of fronts that selects it."""
-UNEVEN = "regular but not a wave"
-"""Reason of the verdict on a rhythm that fails to be ordered by its spacing only."""
+UNEVEN = "regular but not a wave"  # reason of the verdict on a rhythm that fails to be ordered by its spacing only
 _DESIGN_GATE_MS = 300.0
 
 Verdict = Literal["ordered", "disordered", "silent"]
@@ -132,9 +124,9 @@ def stretches(on: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     """Describes the rhythm of a run from times, s, ``(n_times,)``, and segments' activation, ``(n_times, n_segments)``.
 
-    An onset in the first sampling interval belongs to the initial state: no interval that begins with one counts towards
-    the period. A continued run, whose first sample is later than time zero, has no initial state: what is contracted
-    there has begun before, and the wave may begin at any segment.
+    An onset in the first sampling interval belongs to the initial state: no interval that begins with one counts
+    towards the period. A continued run, whose first sample is later than time zero, has no initial state: what is
+    contracted there has begun before, and the wave may begin at any segment.
     """
     times = np.asarray(time_s, dtype=float)
     signals = np.asarray(activation, dtype=float)
@@ -225,9 +217,9 @@ def _judged(run: Run, signal: str, after_s: float) -> tuple[Array, NDArray[np.bo
 def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_INTERVAL_S) -> RhythmScore:
     """Decides whether segments contract in order, and how regularly.
 
-    **Onsets.** A segment is contracted while its activation is at least 0.5; interruptions, then contractions below 20 ms
-    do not count. An onset in the first sampling interval from time zero belongs to the initial state: it stands in the
-    order and counts as a contraction, but no cycle begins with it. In a run whose first sample is later, what is
+    **Onsets.** A segment is contracted while its activation is at least 0.5; interruptions, then contractions below 20
+    ms do not count. An onset in the first sampling interval from time zero belongs to the initial state: it stands in
+    the order and counts as a contraction, but no cycle begins with it. In a run whose first sample is later, what is
     contracted there has no onset.
 
     **Cycles and lags.** A cycle is the time from one onset of a segment to its next. The segments stand in a closed

@@ -79,7 +79,7 @@ class Track:
         return self.crossing_m[..., :2].reshape(len(self.time_s), -1, self.n_per_plane, 2)
 
     def outline_m(self, sample: int) -> Array:
-        """Returns the outline seen from above, m, ``(n_corners, 2)``: along the outermost crossings on either side, closed."""
+        """Returns the outline seen from above, m, ``(n_corners, 2)``: closed, along the outermost crossings on either side."""
         planes = self._planes[sample]
         centre = planes.mean(axis=1)
         along = np.gradient(centre, axis=0)

@@ -17,12 +17,10 @@ VIEWS_DEG = {
     "course": (90.0, -89.0),
 }
 """Azimuth and elevation of the line of sight; the first segment starts on the left, or nearest."""
-FIXED = frozenset({"course"})
-"""Views that stand still and show the whole course; the others follow the worm."""
+FIXED = frozenset({"course"})  # views that stand still and show the whole course; the others follow the worm
 
 FIELD_OF_VIEW_DEG = 30.0
-MARGIN = 0.84
-"""Share of the picture that the worm may fill: 8 % stay free on each side."""
+MARGIN = 0.84  # share of the picture that the worm may fill: 8 % stay free on each side
 
 
 def view_angles(name: str, heading_deg: float = 0.0) -> tuple[float, float]:

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-WIDTH_IN = 7.2
-"""Width of a figure across a page, inches."""
+WIDTH_IN = 7.2  # width of a figure across a page, inches
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],

@@ -25,8 +25,7 @@ from annelid.errors import RenderingUnavailable
 MINIMUM_MUJOCO = (4, 0, 1)
 _PACKAGES = ("numpy", "pydantic", "xarray", "h5netcdf", "h5py", "matplotlib", "imageio", "typer", "rich")
 _DEVELOPERS_EXTRAS = ("test", "dev")
-BACK_ENDS = ("egl", "osmesa", "glfw", "wgl", "cgl")
-"""Values of MUJOCO_GL that a bug report may name."""
+BACK_ENDS = ("egl", "osmesa", "glfw", "wgl", "cgl")  # values of MUJOCO_GL that a bug report may name
 _PATH = re.compile(r"(?:(?<!\w)[A-Za-z]:|(?<!\w))(?:[/\\]+[^\s/\\'\":;,()]+)+[/\\]*")
 
 

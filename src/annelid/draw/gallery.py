@@ -16,8 +16,7 @@ from annelid.errors import AnnelidError
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
-FRAME_TIME_S = 1.5
-"""Time of the frame, as in the paper's Fig. 8; half of the run where it is shorter."""
+FRAME_TIME_S = 1.5  # time of the frame, as in the paper's Fig. 8; half of the run where it is shorter
 BAR_AFTER_S = 2.0
 VIDEO_TASK = "drawing the video"
 

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 _CM = 100.0
 PLOT_SUFFIXES = (".png", ".pdf", ".svg")
-PUBLISHED = (0, (7.0, 3.0))
-"""Dashes of a published level."""
+PUBLISHED = (0, (7.0, 3.0))  # dashes of a published level
 
 
 def figure7(run: Run, path: str | Path) -> Path:

@@ -28,8 +28,7 @@ VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
 DEFAULT_CAMERA = "isometric"
-MOST_PICTURES = 200_000
-"""Of a video, which are drawn some 30 a second."""
+MOST_PICTURES = 200_000  # of a video, which are drawn some 30 a second
 FPS_RANGE = (1.0, 240.0)
 _H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
 # 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
@@ -42,8 +41,7 @@ _GIF: dict[str, Any] = {
 }
 _FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip install imageio-ffmpeg"
 
-Progress = Callable[[int, int], object]
-"""Called with the number of frames done and their total."""
+Progress = Callable[[int, int], object]  # called with the number of frames done and their total
 
 
 class Scene(Protocol):
@@ -51,7 +49,9 @@ class Scene(Protocol):
 
     times_s: NDArray[np.float64]
 
-    def picture(self, frame: int) -> NDArray[np.uint8]: ...
+    def picture(self, frame: int) -> NDArray[np.uint8]:
+        """Draws one of the recorded times."""
+        ...
 
 
 def render_frame(

@@ -23,16 +23,11 @@ from annelid.simulation.runfile import Run
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
 AMBIENT, AMBIENT_ON_WHITE = 0.5, 0.7
-HEADLIGHT = 0.25
-"""Light from all sides, and from the camera; the lamp adds 0.4."""
-CONTRACTED_WIDTH = 1.8
-"""A contracted ring muscle is drawn this much thicker than a relaxed one."""
-HAZE = (0.94, 0.955, 0.97)
-"""What the floor fades into with distance."""
-PALE = 3.0
-"""On white, what lies this many half worms behind its middle would vanish."""
-SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
-"""Axial springs, apart from the red of a contracted ring."""
+HEADLIGHT = 0.25  # light from all sides, and from the camera; the lamp adds 0.4
+CONTRACTED_WIDTH = 1.8  # a contracted ring muscle is drawn this much thicker than a relaxed one
+HAZE = (0.94, 0.955, 0.97)  # what the floor fades into with distance
+PALE = 3.0  # on white, what lies this many half worms behind its middle would vanish
+SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)  # axial springs, apart from the red of a contracted ring
 WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
 WAYPOINT_HALF_HEIGHT_M = 1e-3
 

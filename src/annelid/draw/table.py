@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
 UNKNOWN = "-"
 _ONSETS_SHOWN = 12
-COMPARED = ("reference", "deviation")
-"""Headings of what stands beside our numbers."""
+COMPARED = ("reference", "deviation")  # headings of what stands beside our numbers
 NEXT = (
     f"annelid run {FORMULATION} (that formulation itself, a minute), "
     "riddle2023-rods (rigid crossings), wang (the robot)"

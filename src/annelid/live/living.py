@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter, itemgetter
 from time import perf_counter
 from typing import Any
 
@@ -22,19 +23,15 @@ from annelid.simulation.runfile import Run
 from annelid.simulation.stepping import Simulation, start
 from annelid.simulation.worm import WormPlant
 
-KEEP_BYTES = 200_000_000
-"""A live view forgets the oldest postures beyond this."""
-KEEP_S = 600.0
-"""And the oldest of anything, in simulated time."""
-ENDLESS_S = 1e7
-"""A live worm runs until the view ends; its configuration keeps the duration that it has."""
-SAMPLE_S = 0.01
-"""Signals for the plots are kept at most this often, in simulated time."""
-POKE_S = 0.15
-"""How long a poke lasts, in simulated time."""
+KEEP_BYTES = 200_000_000  # a live view forgets the oldest postures beyond this
+KEEP_S = 600.0  # and the oldest of anything, in simulated time
+ENDLESS_S = 1e7  # a live worm runs until the view ends; its configuration keeps the duration that it has
+SAMPLE_S = 0.01  # signals for the plots are kept at most this often, in simulated time
+POKE_S = 0.15  # how long a poke lasts, in simulated time
 POKE_RADIUS_M = 0.06
 """Distance from the middle of a poke at which its force has fallen to 0.6, as under the flat of a hand."""
 _TRIM_EVERY = 64
+_time_of = attrgetter("time_s")
 _LEAST_FRICTION = 0.01
 
 
@@ -57,49 +54,46 @@ class Reel:
     def __init__(self, names: Sequence[str]) -> None:
         self.names = tuple(names)
         self._moments: list[Moment] = []
-        self._times: list[float] = []
-        self._samples: list[NDArray[np.floating]] = []
-        self._sample_times: list[float] = []
+        self._samples: list[tuple[float, NDArray[np.floating]]] = []
 
     @property
     def span_s(self) -> tuple[float, float]:
         """Times of the first and the last moment kept, s."""
-        return self._times[0], self._times[-1]
+        return self._moments[0].time_s, self._moments[-1].time_s
 
     def add(self, moment: Moment) -> None:
         """Adds a moment later than all others."""
         self._moments.append(moment)
-        self._times.append(moment.time_s)
 
     def add_sample(self, time_s: float, values: NDArray[np.floating]) -> None:
         """Adds the signals of an instant later than all others, ``(n_signals,)``."""
-        self._samples.append(values)
-        self._sample_times.append(time_s)
+        self._samples.append((time_s, values))
 
     def forget(self) -> None:
         """Drops the oldest moments and samples that there is no room for."""
         most = max(2, KEEP_BYTES // max(1, self._moments[-1].qpos.nbytes))
-        excess = max(len(self._times) - most, bisect_left(self._times, self._times[-1] - KEEP_S))
+        too_old = bisect_left(self._moments, self._moments[-1].time_s - KEEP_S, key=_time_of)
+        excess = max(len(self._moments) - most, too_old)
         if excess >= _TRIM_EVERY:
-            del self._moments[:excess], self._times[:excess]
-            old = bisect_left(self._sample_times, self._times[0])
-            del self._samples[:old], self._sample_times[:old]
+            del self._moments[:excess]
+            del self._samples[: bisect_left(self._samples, self._moments[0].time_s, key=itemgetter(0))]
 
     def at(self, time_s: float) -> Moment:
         """Returns the last moment that is not after a time, or the first one."""
-        return self._moments[max(0, bisect_right(self._times, time_s + 1e-9) - 1)]
+        return self._moments[max(0, bisect_right(self._moments, time_s + 1e-9, key=_time_of) - 1)]
 
     def window(self, first_s: float, last_s: float, most: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Returns times, s, ``(n,)``, and signals, ``(n, n_signals)``, of a stretch of time.
 
         Of more samples than ``most`` only every second, third .. is taken.
         """
-        start, stop = bisect_left(self._sample_times, first_s), bisect_right(self._sample_times, last_s + 1e-9)
+        start = bisect_left(self._samples, first_s, key=itemgetter(0))
+        stop = bisect_right(self._samples, last_s + 1e-9, key=itemgetter(0))
         every = max(1, -(-(stop - start) // most))
         # On the same samples from one call to the next, or the curves would shimmer.
-        start += -start % every
-        values = np.array(self._samples[start:stop:every], dtype=np.float64).reshape(-1, len(self.names))
-        return np.array(self._sample_times[start:stop:every]), values
+        taken = self._samples[start + -start % every : stop : every]
+        values = np.array([sample for _, sample in taken], dtype=np.float64).reshape(-1, len(self.names))
+        return np.array([time for time, _ in taken]), values
 
 
 class LivingWorm:

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import html
 import math
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from annelid.config import RunConfig
 from annelid.draw.render import Progress
-from annelid.draw.scene import Skeleton
 from annelid.errors import RunFileError
 from annelid.live.panel import legend_html
-from annelid.live.picture import Painter, Picture
+from annelid.live.picture import Painter
 from annelid.live.player import Player, config_of, player_of
 from annelid.live.server import Server, content_policy
 from annelid.live.stage import Stage
@@ -22,10 +18,8 @@ from annelid.output import whole_file, with_suffix
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
 
-FRAMES_A_SECOND = 25.0
-"""Of a page, in simulated time; a run has as many as it has recorded, if those are fewer."""
-GRAIN_M = 2.0**-13
-"""Places are rounded to an eighth of a millimetre, which halves the page."""
+FRAMES_A_SECOND = 25.0  # of a page, in simulated time; a run has as many as it has recorded, if those are fewer
+GRAIN_M = 2.0**-13  # places are rounded to an eighth of a millimetre, which halves the page
 PAGE_SUFFIXES = (".html", ".htm")
 
 
@@ -82,19 +76,19 @@ def _page(
     progress: Progress | None,
 ) -> str:
     """Lets a server that nobody visits record what it would send."""
-    painter = Painter(Skeleton(anatomy), config)
+    painter = Painter(anatomy, config, GRAIN_M)
     reel, worm = player.reel, player.worm
+    shown = reel.at(times_s[0])
     server = Server()
     try:
-        stage = Stage(server, config, painter.strand_colors(), _rounded(painter.paint(reel.at(times_s[0]))))
+        stage = Stage(server, config, painter, shown)
         recording = server.get_scene_serializer()
-        shown = reel.at(times_s[0])
         for frame, time_s in enumerate(times_s):
             if worm is not None:
                 worm.advance(time_s, math.inf)
             moment = reel.at(time_s + 0.5 / FRAMES_A_SECOND)
             if moment is not shown:
-                stage.show(_rounded(painter.paint(moment)), follow=True)
+                stage.show(moment, follow=True)
                 shown = moment
             recording.insert_sleep(1.0 / FRAMES_A_SECOND / speed)
             if progress is not None:
@@ -103,12 +97,6 @@ def _page(
     finally:
         server.stop()
     return _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
-
-
-def _rounded(picture: Picture) -> Picture:
-    """Places with fewer digits, which compress."""
-    lines = {name: getattr(picture, name) for name in ("strands", "rings", "springs", "contacts")}
-    return replace(picture, **{n: (np.round(v / GRAIN_M) * GRAIN_M).astype(np.float32) for n, v in lines.items()})
 
 
 def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> str:

@@ -23,14 +23,10 @@ if TYPE_CHECKING:
     from annelid.live.show import Show
 
 PLAY, NOW, AGAIN = "play / pause", "now", "restart"
-STRONGEST_POKE = 3.0
-"""In weights of the worm; more would tear the thinnest."""
-PLOT_HEIGHT = 190
-"""Of the plots, pixels."""
-MOST_SEGMENTS = 4
-"""With more than these the expansion neurons are left out of the first plot."""
-SECONDS = 5.0
-"""How far back the plots go, in simulated time."""
+STRONGEST_POKE = 3.0  # in weights of the worm; more would tear the thinnest
+PLOT_HEIGHT = 190  # of the plots, pixels
+MOST_SEGMENTS = 4  # with more than these the expansion neurons are left out of the first plot
+SECONDS = 5.0  # how far back the plots go, in simulated time
 
 
 @dataclass(frozen=True)

@@ -12,24 +12,20 @@ from annelid.draw.canvas import CONTRACTED, RELAXED
 from annelid.draw.scene import Skeleton
 from annelid.live.living import Moment
 from annelid.morphology import Array
+from annelid.simulation.anatomy import Anatomy
 
-Lines = NDArray[np.float32]
-"""Ends of line segments, m, ``(n, 2, 3)``."""
-Colors = NDArray[np.uint8]
-"""Red, green and blue at these ends, ``(n, 2, 3)``."""
+Lines = NDArray[np.float32]  # ends of line segments, m, ``(n, 2, 3)``
+Colors = NDArray[np.uint8]  # red, green and blue at these ends, ``(n, 2, 3)``
 
-STRAND_COLORS = ((0.16, 0.38, 0.72), (0.42, 0.62, 0.86))
-"""Of the two handednesses."""
+STRAND_COLORS = ((0.16, 0.38, 0.72), (0.42, 0.62, 0.86))  # of the two handednesses
 SPRING_COLORS = ((0.45, 0.20, 0.70), (0.80, 0.74, 0.60), (0.95, 0.50, 0.05))
 """Of an axial spring at most shortened, at rest, and at most stretched."""
-SPRING_RANGE = 0.3
-"""Strain at which these colours are full."""
+SPRING_RANGE = 0.3  # strain at which these colours are full
 CONTACT_COLOR = (0.04, 0.45, 0.14)
 SCREEN_GAMMA = 2.2
 REACH_M = 0.04
 """Distance from the line of sight within which a point of the mesh is hit; its meshes are wider than a mouse."""
-LONGEST_ARROW = 4.0
-"""Of the arrows of contact forces, in radii of the worm at rest."""
+LONGEST_ARROW = 4.0  # of the arrows of contact forces, in radii of the worm at rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +48,9 @@ class Painter:
         arrow_N: Contact force whose arrow is as long as the worm's radius at rest, about two segments' weight, N.
     """
 
-    def __init__(self, skeleton: Skeleton, config: RunConfig) -> None:
-        self._skeleton = skeleton
-        anatomy = skeleton.anatomy
+    def __init__(self, anatomy: Anatomy, config: RunConfig, grain_m: float = 0.0) -> None:
+        """Takes the worm, and what places are rounded to, so that they compress."""
+        self._skeleton, self._grain_m = Skeleton(anatomy), grain_m
         self._geometry = anatomy.geometry
         path = anatomy.ring_path
         self._ring_pairs = np.stack([path[:, :-1], path[:, 1:]], axis=-1).reshape(-1, 2)
@@ -76,10 +72,10 @@ class Painter:
         springs = crossing[self._geometry.springs]
         length = np.linalg.norm(springs[:, 1] - springs[:, 0], axis=-1)
         return Picture(
-            strands=np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3).astype(np.float32),
-            rings=crossing[self._ring_pairs].astype(np.float32),
+            strands=self._lines(np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)),
+            rings=self._lines(crossing[self._ring_pairs]),
             ring_colors=ring_colors(moment.activation, self._corners),
-            springs=springs.astype(np.float32),
+            springs=self._lines(springs),
             spring_colors=spring_colors(length / self._geometry.spring_length_m - 1.0),
             contacts=self._arrows(moment.contact_force_N, crossing),
             middle=crossing.mean(axis=0),
@@ -95,7 +91,11 @@ class Painter:
         length = np.linalg.norm(reach, axis=-1, keepdims=True)
         longest = LONGEST_ARROW * self._geometry.radius_m
         reach = reach * np.minimum(1.0, longest / np.maximum(length, longest * 1e-9))
-        return np.stack([foot, foot + reach], axis=1).astype(np.float32)
+        return self._lines(np.stack([foot, foot + reach], axis=1))
+
+    def _lines(self, points_m: Array) -> Lines:
+        lines = points_m.astype(np.float32)
+        return (np.round(lines / self._grain_m) * self._grain_m).astype(np.float32) if self._grain_m else lines
 
 
 def ring_colors(activation: NDArray[np.floating], n_corners: int) -> Colors:

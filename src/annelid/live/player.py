@@ -12,8 +12,7 @@ from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 
-SLOWEST, FASTEST = 0.05, 10.0
-"""Simulated seconds per second."""
+SLOWEST, FASTEST = 0.05, 10.0  # simulated seconds per second
 
 
 class Player:

@@ -34,8 +34,7 @@ LOOPBACK = "127.0.0.1"
 ANY_ADDRESS = ("", "0.0.0.0", "::")
 USUAL_PORT = 8080
 _TRIED_PORTS = 100
-MOST_BYTES = 64 * 1024
-"""Of one message from the page; those of camera, sliders and clicks have some hundred."""
+MOST_BYTES = 64 * 1024  # of one message from the page; those of camera, sliders and clicks have some hundred
 MESSAGES = frozenset({"ViewerCameraMessage", "GuiUpdateMessage", "ScenePointerMessage"})
 """What the page may say: where its camera is, what was turned, where the scene was clicked. No uploads, no sharing."""
 WRONG_HOST = "This view is not served under that name: open the address that annelid view printed.\n"

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from annelid.config import Knob, RunConfig
-from annelid.draw.scene import Skeleton
 from annelid.errors import AnnelidError
 from annelid.live.living import Moment, knobs_of
 from annelid.live.panel import SECONDS, Panel, legend_html, plots_of, status_html
@@ -24,17 +23,12 @@ from annelid.simulation.runfile import Run
 if TYPE_CHECKING:
     import viser
 
-FRAMES_A_SECOND = 30.0
-"""At most; fewer where a step of the body takes longer."""
-LONGEST_TICK_S = 0.25
-"""A computer that was asleep does not make the view leap."""
-PANEL_INTERVAL_S = 0.33
-"""Between two updates of plots, time and status."""
-PACE_OVER_S = 2.0
-"""Over which the speed that is reached is measured."""
+FRAMES_A_SECOND = 30.0  # at most; fewer where a step of the body takes longer
+LONGEST_TICK_S = 0.25  # a computer that was asleep does not make the view leap
+PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
+PACE_OVER_S = 2.0  # over which the speed that is reached is measured
 EARTH_M_PER_S2 = 9.81
-MOST_SAMPLES = 250
-"""Of one curve of a plot."""
+MOST_SAMPLES = 250  # of one curve of a plot
 
 
 class Show:
@@ -44,7 +38,6 @@ class Show:
 
     Attributes:
         player: What is shown when.
-        picture: What is seen, in the model's axes.
         stage: Where it is seen.
         follow: Whether the worm is kept in the middle, or may crawl away.
         address: Of the page, with the token that it opens with.
@@ -66,8 +59,7 @@ class Show:
         """
         self._config = config_of(source)
         self.player, anatomy = player_of(source, speed)
-        self._painter = Painter(Skeleton(anatomy), self._config)
-        self.picture = self._painter.paint(self.player.moment)
+        painter = Painter(anatomy, self._config)
         self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
         self._wishing = threading.Lock()
         self._ending = threading.Event()
@@ -80,7 +72,7 @@ class Show:
         self._plots = plots_of(self.player.reel.names)
         self._server = Server(host, port)
         self.address = self._server.address
-        self.stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
+        self.stage = Stage(self._server, self._config, painter, self.player.moment)
         self._panel = Panel(
             self._server,
             self,
@@ -88,7 +80,7 @@ class Show:
             weight_N=round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1),
             knobs={knob: knob.shown(self._config) for knob in self._knobs},
             plots=self._plots,
-            legend=legend_html(self._painter.arrow_N, anatomy.geometry.radius_m),
+            legend=legend_html(painter.arrow_N, anatomy.geometry.radius_m),
         )
         self.choose_plot(next(iter(self._plots)))
         if self.player.worm is not None:
@@ -157,7 +149,7 @@ class Show:
             self._notice = "This is the past: press now and poke the worm again."
             return
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
-        place = struck(self.picture.strands.reshape(-1, 3).astype(float), origin, sight)
+        place = struck(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
             worm.poke(place, self._panel.poke_N * sight)
 
@@ -181,9 +173,8 @@ class Show:
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        self.picture = self._painter.paint(self.player.moment)
         with self._server.atomic():
-            self.stage.show(self.picture, follow=self.follow)
+            self.stage.show(self.player.moment, follow=self.follow)
         self._server.flush()
         self.frames_drawn += 1
 

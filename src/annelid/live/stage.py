@@ -22,18 +22,17 @@ from annelid.config import RunConfig
 from annelid.config.arena import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.draw.scene import ROOM, upright
-from annelid.live.picture import CONTACT_COLOR, Colors, Picture
+from annelid.live.living import Moment
+from annelid.live.picture import CONTACT_COLOR, Painter
 from annelid.morphology import Array, heading_turn
 
 if TYPE_CHECKING:
     import viser
 
-ASPECT = 1.0
-"""Of the canvas beside the panel, for which the camera is placed."""
+ASPECT = 1.0  # of the canvas beside the panel, for which the camera is placed
 STRAND_PIXELS, RING_PIXELS, SPRING_PIXELS = 3.0, 6.0, 3.5
 """Widths of lines; lines that grow thinner with distance take twice as long to draw without a graphics card."""
-LAYERS = ("strands", "rings", "springs", "contacts", "ground")
-"""What can be shown or hidden, by the names of the nodes."""
+LAYERS = ("strands", "rings", "springs", "contacts", "ground")  # what can be shown or hidden, by the names of the nodes
 FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
 """What is drawn of the floor, for a worm that leads towards -x; it turns with the heading at the start."""
 SQUARE_M = 0.2
@@ -49,14 +48,17 @@ class Stage:
     """Worm and arena in a viewer.
 
     Attributes:
+        picture: What is seen, in the model's axes.
         turn: Rotation from the model's axes to the page's, ``(3, 3)``.
         shift_m: Where the model's origin is in the page, m, ``(3,)``.
     """
 
-    def __init__(self, server: viser.ViserServer, config: RunConfig, strand_colors: Colors, first: Picture) -> None:
+    def __init__(self, server: viser.ViserServer, config: RunConfig, painter: Painter, moment: Moment) -> None:
         """Makes all nodes and places the camera so that the whole worm is seen."""
         from viser.transforms import SO3
 
+        self._painter = painter
+        self.picture = first = painter.paint(moment)
         self._scene = scene = server.scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(hdri=None)
@@ -68,7 +70,7 @@ class Stage:
         self._strands, self._rings, self._springs = (
             scene.add_line_segments(f"{_ROOT}/{name}", points, colors, thickness=width, thickness_units="screen")
             for name, points, colors, width in (
-                ("strands", first.strands, strand_colors, STRAND_PIXELS),
+                ("strands", first.strands, painter.strand_colors(), STRAND_PIXELS),
                 ("rings", first.rings, first.ring_colors, RING_PIXELS),
                 ("springs", first.springs, first.spring_colors, SPRING_PIXELS),
             )
@@ -97,8 +99,9 @@ class Stage:
         camera.look_at = target
         camera.position = target - distance * sight
 
-    def show(self, picture: Picture, *, follow: bool) -> None:
-        """Shows another instant; ``follow`` moves worm and ground so that the worm's middle stays on the screen."""
+    def show(self, moment: Moment, *, follow: bool) -> None:
+        """Shows another moment; ``follow`` moves worm and ground so that the worm's middle stays on the screen."""
+        self.picture = picture = self._painter.paint(moment)
         self._strands.points = picture.strands
         self._rings.points = picture.rings
         self._rings.colors = picture.ring_colors

@@ -20,12 +20,10 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
-MOST_ROWS = 6
-"""Segments that get a panel: of more, as many from the first to the last, evenly spaced."""
+MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to the last, evenly spaced
 _CM = 100.0
 
-Values = Array | None
-"""One column per segment, ``(n_times, n_segments)``; None if they were not recorded."""
+Values = Array | None  # one column per segment, ``(n_times, n_segments)``; None if they were not recorded
 Curves = Callable[["Run"], Sequence[tuple[Values, float | None]]]
 """What is drawn of a run, each with the width of its lines."""
 

@@ -33,8 +33,7 @@ PAPER_SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay
 _PAPER = {"facecolor": "w", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
 _SMALLEST_UNIT_IN, _SMALLEST_UNIT_WITH_NUMBERS_IN, _LARGEST_UNIT_IN = 0.5, 0.9, 1.0
 _MEANINGS_A_ROW = 5
-_ROW, _KEY_COLUMNS, _KEY_UNIT_IN = 0.62, (0.56, 6.22, 11.33), 0.45
-"""The key's rows and columns, in its own unit."""
+_ROW, _KEY_COLUMNS, _KEY_UNIT_IN = 0.62, (0.56, 6.22, 11.33), 0.45  # the key's rows and columns, in its own unit
 
 
 def abbreviations(names: Iterable[str]) -> dict[str, str]:

@@ -19,13 +19,11 @@ if TYPE_CHECKING:
 
     from annelid.simulation.runfile import Run
 
-N_OUTLINES = 6
-"""Outlines drawn, the first and the last posture among them."""
+N_OUTLINES = 6  # outlines drawn, the first and the last posture among them
 FIRST, LAST = "#9bb0c9", "#1b2a6b"
 FRONT = "#c2410c"
 WALL = "#bf784d"
-_EDGE_IN = 1.3
-"""Room that labels take beside the plot, inches."""
+_EDGE_IN = 1.3  # room that labels take beside the plot, inches
 
 
 def track_figure(run: Run, path: str | Path) -> Path:

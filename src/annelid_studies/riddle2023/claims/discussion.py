@@ -340,7 +340,8 @@ def friction_claim(evidence: Evidence) -> Claim:
 
 def _slip_claim(evidence: Evidence) -> Claim:
     cases = {name: detection.CASES[name] for name in slip_runs(evidence.effort)}
-    found = [score_detections([detect_slip(evidence.store.run(case))], detection.LIMIT_M_PER_S) for case in cases.values()]
+    runs = map(evidence.store.run, cases.values())
+    found = [score_detections([detect_slip(run)], detection.LIMIT_M_PER_S) for run in runs]
     return _of_outlook(
         "Pressure and stretch sensors together detect slip reliably.",
         "section 5",

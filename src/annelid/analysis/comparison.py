@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from annelid.analysis.gait import gait
 from annelid.analysis.summary import summary
 from annelid.config import RunConfig, field_value, fields_of
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 Number = float | Sequence[float | None] | None  # one number, one a segment, or None for what a run does not have
 

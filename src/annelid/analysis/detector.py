@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,7 @@ from annelid.analysis.rhythm import stretches
 from annelid.control.slip_detector import SlipDetector
 from annelid.errors import RunFileError
 from annelid.protocols import Array, Sensation
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 SLIPPING_M_PER_S = 0.05
 """A segment truly slips while what touches of it moves faster than this along the body, on average over the window."""
@@ -54,7 +51,11 @@ class DetectionScore:
 
 
 def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
-    """Has a detector (default: `SlipDetector` as it is) read a run with touch sample by sample, the true slip beside it."""
+    """Has a detector (default: `SlipDetector` as it is) read a run sample by sample, with the true slip beside it.
+
+    Raises:
+        RunFileError: The run has no touch.
+    """
     data = run.data
     if "touch" not in data or data.sizes.get("time", 0) < 2:
         raise RunFileError(f"{run.path} holds no touch of a skin: only runs of the 3D worm do")

@@ -39,13 +39,13 @@ class Flow(Protocol):
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Advances copies, ``(n_copies, n_states)``, by one step.
 
-        Takes the switches of the step before, ``(n_copies, n_switches)``; returns new arrays: the states one step on, and the
-        switches in force during this step.
+        Takes the switches of the step before, ``(n_copies, n_switches)``. Returns new arrays: the states one step on,
+        and the switches in force during this step.
         """
         ...
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
-        """Returns the states after shares of steps in [0, 1], ``(n_copies,)``, up to the section or the move of a switch.
+        """Returns the states after shares of steps in [0, 1], ``(n_copies,)``, up to the section or a switch's move.
 
         ``switches`` are those in force, and ``ahead`` is what `step` returned for them.
         """
@@ -318,7 +318,7 @@ def first_share(flow: Flow, here: Copies, share: Array, past: Callable[[Array], 
 
 
 def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, refine: bool = True) -> Copies:
-    """Lets copies, ``(n_copies, n_states)``, run for their own durations, s, ``(n_copies,)``; returns them at their ends.
+    """Lets copies, ``(n_copies, n_states)``, run for their own durations, s, ``(n_copies,)``; returns them at the ends.
 
     ``before`` are the switches as they were before, ``(n_copies, n_switches)``; with ``refine`` steps end where one
     moves.

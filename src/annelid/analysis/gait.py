@@ -16,11 +16,10 @@ from annelid.analysis.rhythm import run_rhythm
 from annelid.analysis.track import first_heading, fitted_circle, forward_position, track_of
 from annelid.body.worm import WormBody
 from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from annelid.simulation.runfile import Run
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from annelid.analysis.track import Track, track_of
 from annelid.config.arena import ArenaKind
 from annelid.errors import RunFileError
 from annelid.protocols import Array
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.control.sns import paper_controller
 from annelid.protocols import Array
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 CONTRACTED = 0.5  # activation above which a muscle counts as contracted (half of its range)
 SHORTEST_S = 0.02  # contractions, and interruptions of one, that are shorter do not count in a score, s

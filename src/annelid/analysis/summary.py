@@ -15,11 +15,10 @@ from annelid.analysis.gait import net_work, positive_work
 from annelid.analysis.rhythm import CONTRACTED, Rhythm, run_rhythm
 from annelid.analysis.track import forward_position
 from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from annelid.simulation.runfile import Run
 
 
 @dataclass(frozen=True, slots=True)

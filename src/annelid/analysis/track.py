@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +12,7 @@ from annelid.body.worm import WormBody
 from annelid.errors import RunFileError
 from annelid.morphology import heading_turn
 from annelid.protocols import Array
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 # Where a worm leads in its own axes, seen from above.
 _FORWARDS = np.array([-1.0, 0.0])
@@ -79,7 +76,7 @@ class Track:
         return self.crossing_m[..., :2].reshape(len(self.time_s), -1, self.n_per_plane, 2)
 
     def outline_m(self, sample: int) -> Array:
-        """Returns the outline seen from above, m, ``(n_corners, 2)``: closed, along the outermost crossings on either side."""
+        """Returns the outline seen from above, m, ``(n_corners, 2)``: closed, along the outermost crossings."""
         planes = self._planes[sample]
         centre = planes.mean(axis=1)
         along = np.gradient(centre, axis=0)

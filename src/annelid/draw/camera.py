@@ -27,7 +27,7 @@ def view_angles(name: str, heading_deg: float = 0.0) -> tuple[float, float]:
     """Returns azimuth and elevation of a named view, degrees; all but the fixed ones turn with the initial heading.
 
     Raises:
-        RunFileError: No view has that name; the sentence suggests the nearest.
+        RunFileError: No view has that name.
     """
     if name not in VIEWS_DEG:
         raise RunFileError(f"unknown camera {name!r}: {suggest(name, VIEWS_DEG)}")

@@ -7,14 +7,11 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame, render_video
 from annelid.errors import AnnelidError
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 FRAME_TIME_S = 1.5  # time of the frame, as in the paper's Fig. 8; half of the run where it is shorter
 BAR_AFTER_S = 2.0

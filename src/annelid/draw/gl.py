@@ -35,11 +35,7 @@ _PROBE_LIMIT_S = 60.0
 
 
 def candidates(environment: Mapping[str, str], system: str) -> list[str]:
-    """Returns the back-ends worth trying, best first.
-
-    Args:
-        environment: Environment variables, of which ``MUJOCO_GL`` decides if it names a back-end.
-        system: Operating system as `platform.system` calls it.
+    """Returns the back-ends worth trying, best first, on a system as `platform.system` calls it.
 
     Raises:
         RenderingUnavailable: ``MUJOCO_GL`` switches rendering off or names no back-end.
@@ -94,25 +90,14 @@ def find_backend() -> str:
 
 
 class Canvas(AbstractContextManager):
-    """An off-screen picture of a MuJoCo model.
+    """An off-screen picture of a MuJoCo model, whose off-screen size and sampling are set here.
 
     Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
-    the back-end that `find_backend` chose.
+    the back-end that `find_backend` chose. Shadows and smooth edges (``fine``) cost ten times the time where software
+    draws.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int, backend: str, *, fine: bool = True) -> None:
-        """Opens the back-end.
-
-        Args:
-            model: The model; its off-screen size and sampling are set here.
-            width: Pixels.
-            height: Pixels.
-            backend: What `find_backend` returned.
-            fine: Shadows and smooth edges, which cost ten times the time where software draws.
-
-        Raises:
-            RenderingUnavailable: The back-end fails.
-        """
         import mujoco
 
         model.vis.global_.offwidth = width
@@ -154,18 +139,10 @@ class Canvas(AbstractContextManager):
         *,
         upright: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint8]:
-        """Draws the model in a posture.
+        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``.
 
-        Args:
-            data: The posture; kinematics up to the tendons must be up to date.
-            camera: Where it is seen from.
-            option: What is shown.
-            caption: Words in the lower left corner.
-            upright: Rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``; by
-                default the same.
-
-        Returns:
-            Pixels, shape ``(height, width, 3)``.
+        The caption stands in the lower left corner. ``upright`` is the rotation from the model's axes to those that
+        the camera's angles are meant in, ``(3, 3)``; by default the same.
         """
         import mujoco
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from annelid.draw.canvas import STYLE, activation_color
 from annelid.errors import RunFileError
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.text import Text
-
-    from annelid.simulation.runfile import Run
 
 _DPI = 100
 _CM = 100.0
@@ -24,7 +23,7 @@ _WALL = "0.75"
 
 
 class PlanarScene(AbstractContextManager):
-    """Pictures of a planar worm's run.
+    """Pictures of a planar worm's run, ``width`` and ``height`` in pixels.
 
     Each segment is a rhombus, from segment 1 on the left, coloured by its activation. A worm that has forces is drawn
     where it is, with its sides bent as they are and the walls of its pipe; a kinematic one has nothing to push
@@ -32,11 +31,6 @@ class PlanarScene(AbstractContextManager):
     """
 
     def __init__(self, run: Run, width: int, height: int) -> None:
-        """Takes the run's lengths and heights; ``width`` and ``height`` in pixels.
-
-        Raises:
-            RunFileError: The run holds no samples.
-        """
         import matplotlib
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

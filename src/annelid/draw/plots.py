@@ -15,11 +15,10 @@ from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
 from annelid.output import with_suffix
 from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from annelid.simulation.runfile import Run
 
 _CM = 100.0
 PLOT_SUFFIXES = (".png", ".pdf", ".svg")
@@ -70,11 +69,7 @@ RUN_FIGURES.add("figure7", figure7)
 
 
 def plot_path(path: str | Path) -> Path:
-    """Returns the file that `figure7` writes for a name: one without a suffix becomes a ``.png``.
-
-    Raises:
-        RunFileError: Another suffix, or a folder.
-    """
+    """Returns the file that `figure7` writes for a name, a ``.png`` without a suffix; refuses other suffixes."""
     return with_suffix(path, PLOT_SUFFIXES, "a figure", default=".png")
 
 

@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,7 @@ from numpy.typing import NDArray
 from annelid.analysis.rhombi import nearest_time
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1280, 320), "boxerbaum2012": (1280, 320)}
 VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}

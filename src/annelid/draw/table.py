@@ -119,12 +119,9 @@ def framed_table(*headings: str, title: str | None = None, caption: str | None =
 
 
 def summary_table(numbers: Summary, config: RunConfig, locomotion: Gait | None = None) -> Table:
-    """Returns a run's numbers as a table for the terminal, those to compare with beside them.
+    """Returns a run's numbers as a table for the terminal, those to compare with beside them, perhaps with its gait.
 
-    Args:
-        numbers: The summary; rows without a number are left out, unless there is one to compare with.
-        config: The configuration it belongs to, which decides what it is compared with.
-        locomotion: Adds a section with the gait.
+    Rows without a number are left out, unless there is one to compare with.
     """
     compared = COMPARED if references(config) else ()
     duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
@@ -187,10 +184,7 @@ def comparison_table(comparison: Comparison) -> Table:
 
 
 def fields_table(comparison: Comparison) -> Table:
-    """Returns the fields in which the configurations differ.
-
-    Where the kinds of worm differ, so do most fields of body and arena; these are left out.
-    """
+    """Returns the fields in which the configurations differ; of worms of different kinds only those that all have."""
     other_kinds = "body.kind" in comparison.fields
     caption = "worms of different kinds: of body and arena only fields that all have; --json lists all"
     table = _side_by_side("field of the configuration", comparison.labels, caption if other_kinds else None)
@@ -284,10 +278,7 @@ def legend(numbers: Summary, config: RunConfig) -> str:
 
 
 def closing_sentence(numbers: Summary, config: RunConfig) -> str:
-    """Says whether a run reproduces the paper's own formulation, or by how much it does not.
-
-    Where a preset is changed it says what is changed; empty where there is nothing to compare with.
-    """
+    """Says what is changed of a preset, or whether a run reproduces the paper's own formulation; else nothing."""
     if not references(config) or not isinstance(config.body, WormBody):
         return ""
     preset, changed = changed_fields(config)

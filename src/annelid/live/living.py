@@ -83,10 +83,7 @@ class Reel:
         return self._moments[max(0, bisect_right(self._moments, time_s + 1e-9, key=_time_of) - 1)]
 
     def window(self, first_s: float, last_s: float, most: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns times, s, ``(n,)``, and signals, ``(n, n_signals)``, of a stretch of time.
-
-        Of more samples than ``most`` only every second, third .. is taken.
-        """
+        """Returns times, s, ``(n,)``, and signals, ``(n, n_signals)``, of a stretch of time, evenly thinned."""
         start = bisect_left(self._samples, first_s, key=itemgetter(0))
         stop = bisect_right(self._samples, last_s + 1e-9, key=itemgetter(0))
         every = max(1, -(-(stop - start) // most))
@@ -132,10 +129,7 @@ class LivingWorm:
         self._take(self._first)
 
     def adjust(self, values: Mapping[str, Any]) -> None:
-        """Changes fields of the configuration; the worm goes on from where it is.
-
-        Args:
-            values: By dotted path.
+        """Changes fields of the configuration by dotted path; the worm goes on from where it is.
 
         Raises:
             ConfigError: A value is out of range, or the body cannot be built with it; nothing has changed then.
@@ -189,11 +183,7 @@ def signal_names(neurons: Iterable[str], n_muscles: int) -> tuple[str, ...]:
 
 
 def reel_of(run: Run, n_coordinates: int) -> Reel:
-    """Returns the moments and signals that a run of a 3D worm has recorded.
-
-    Raises:
-        RunFileError: It has no postures, or not of so many coordinates.
-    """
+    """Returns the moments and signals that a run of a 3D worm, a body of so many coordinates, has recorded."""
     data, qpos = run.data, postures_of(run, n_coordinates)
     neurons = [str(name) for name in data["neuron"].values] if "potential" in data else []
     activation = data["activation"].values

@@ -59,11 +59,7 @@ def export_page(
 
 
 def page_path(path: str | Path) -> Path:
-    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``.
-
-    Raises:
-        RunFileError: Another suffix, or a folder.
-    """
+    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``."""
     return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
 
 

@@ -50,11 +50,7 @@ class Plot:
 
 
 def plots_of(names: Sequence[str]) -> dict[str, Plot]:
-    """Returns the plots that a worm's signals make, by the names that a user chooses from; the first is the default.
-
-    Args:
-        names: Signals of a reel: neurons as ``role_segment`` or plain names, then ``activation_1`` and so on.
-    """
+    """Returns the plots that the signals of a `Reel` make, by the names to choose from; first the default."""
     muscles = [name for name in names if name.startswith("activation_")]
     segments, others = by_segment(name for name in names if name not in muscles)
     plots: dict[str, Plot] = {}
@@ -100,17 +96,7 @@ class Panel:
         plots: Mapping[str, Plot],
         legend: str,
     ) -> None:
-        """Makes all elements.
-
-        Args:
-            server: Where they are seen.
-            show: What they ask.
-            speed: Simulated seconds per second at the start.
-            weight_N: Of the worm on Earth, which pokes are measured by.
-            knobs: What can be turned, with the values that are shown first; none of a recorded run.
-            plots: What can be plotted, by name; the first is.
-            legend: What colours mean, as HTML.
-        """
+        """Makes all elements on a server, which ask a view; speed, weight on Earth and knobs are those at first."""
         gui = self._gui = server.gui
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()

@@ -113,10 +113,7 @@ def spring_colors(strain: NDArray[np.floating]) -> Colors:
 
 
 def struck(points_m: Array, origin_m: Array, direction: Array) -> Array | None:
-    """Returns the point ``(3,)`` that a ray hits first, or None: of those within `REACH_M` the nearest to the origin.
-
-    Points of the worm, m, ``(n, 3)``; origin, m, and unit direction of the ray, ``(3,)``.
-    """
+    """Returns the point ``(3,)`` that a ray hits first, or None: the nearest, of ``(n, 3)``, within `REACH_M`."""
     offsets = points_m - origin_m
     depth = offsets @ direction
     beside = np.linalg.norm(offsets - depth[:, np.newaxis] * direction, axis=-1)

@@ -106,11 +106,7 @@ class Player:
 
 
 def config_of(source: RunConfig | Run) -> RunConfig:
-    """Returns the configuration that a worm is run under, or was.
-
-    Raises:
-        ConfigError: It is a planar worm.
-    """
+    """Returns the configuration that a worm is run under, or was; refuses a planar worm."""
     config = source.config if isinstance(source, Run) else source
     if not isinstance(config.body, WormBody):
         raise ConfigError(

@@ -227,7 +227,7 @@ def warning_of(host: str) -> str | None:
 
 
 def free_port(host: str, wanted: int | None) -> int:
-    """Returns the port to listen on: the wanted one, 0 for any free one; None for the usual one or the next free one.
+    """Returns the port to listen on: the wanted one, 0 for any free one; None for the usual one or the next free.
 
     Raises:
         ConfigError: It is not free, or there is no such address.

@@ -158,10 +158,7 @@ def _shaded(normals: Array) -> NDArray[np.uint8]:
 
 
 def _squares(height_m: float) -> tuple[Array, NDArray[np.int32]]:
-    """Strips that make squares to see the worm move against: vertices and faces of a mesh.
-
-    An endless grid, or lines, would take longer to draw than the worm.
-    """
+    """Vertices and faces of strips that make squares to see the worm move against; a grid takes longer to draw."""
     (ahead, behind), side = FLOOR_X_M, FLOOR_HALF_WIDTH_M
     strips = [(x - _half_width(x), x + _half_width(x), -side, side) for x in _marks(ahead, behind)]
     strips += [(ahead, behind, y - _half_width(y), y + _half_width(y)) for y in _marks(-side, side)]

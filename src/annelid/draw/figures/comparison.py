@@ -14,11 +14,10 @@ from annelid.draw.canvas import canvas, line_entries, panel_title, save, segment
 from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
 from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from annelid.simulation.runfile import Run
 
 MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to the last, evenly spaced
 _CM = 100.0
@@ -29,11 +28,7 @@ Curves = Callable[["Run"], Sequence[tuple[Values, float | None]]]
 
 
 def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws how much each segment is longer than at rest, and its ring in shares of its longest.
-
-    Raises:
-        RunFileError: No run recorded lengths, or the file cannot be written.
-    """
+    """Draws how much each segment is longer than at rest, and its ring in shares of its longest."""
     panels: dict[str, Curves] = {
         "Segment, longer than at rest (cm)": lambda run: [(_elongation(run), None)],
         "Ring (% of its longest)": lambda run: [(_rings(run), None)],
@@ -42,11 +37,7 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
 
 
 def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin.
-
-    Raises:
-        RunFileError: No run recorded neurons of half-centres, or the file cannot be written.
-    """
+    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin."""
     panels: dict[str, Curves] = {
         "Half-centres, above rest (mV); thick: contraction, thin: expansion": lambda run: [
             (_potentials(run, "contraction"), 1.5),
@@ -57,11 +48,7 @@ def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) ->
 
 
 def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the travel of the centre of mass along the initial heading, and its track seen from above.
-
-    Raises:
-        RunFileError: No run has a centre of mass that moves, or the file cannot be written.
-    """
+    """Draws the travel of the centre of mass along the initial heading, and its track seen from above."""
     tracks = [_centre(run) for run in runs]
     drawn = [track is not None for track in tracks]
     if not any(drawn):

@@ -23,14 +23,9 @@ _LEAST_SHARE = 0.02
 
 
 def load_frame_figure(loops: Mapping[str, tuple[ArrayLike, ArrayLike]], stem: str | Path) -> Path:
-    """Draws loops of a ring cable's force against its displacement over one another, the first in front.
+    """Draws loops of a ring cable's force, N, over its displacement, m, ``(n,)`` each, the first in front.
 
-    Args:
-        loops: Displacement (m) and force (N) of the cable, each ``(n,)``, by the name in the legend.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
+    Writes ``<stem>.svg`` and ``.png``, as the two below, and returns the latter's path.
     """
     with canvas(3.6) as figure:
         axes = figure.subplots()
@@ -53,17 +48,7 @@ class Mark:
 
 
 def progress_figure(marks: Sequence[Mark], label: str, more_is_better: bool, stem: str | Path) -> Path:
-    """Draws every trial's value and the best so far over the trials' numbers; what does not walk is a tick below.
-
-    Args:
-        marks: The trials.
-        label: The objective with its unit.
-        more_is_better: Whether it is.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
-    """
+    """Draws every trial's value and the best so far over the trials' numbers; what does not walk is a tick below."""
     walking = [mark for mark in marks if mark.walks and mark.number >= 0]
     failed = [mark.number for mark in marks if not mark.walks and mark.number >= 0]
     numbers = np.array([mark.number for mark in walking])
@@ -91,15 +76,7 @@ def pareto_figure(
 ) -> Path:
     """Draws one objective against the other, with the front that no trial beats in both: steps over what was reached.
 
-    Args:
-        marks: The trials; those that do not walk are left out.
-        front: Numbers of the trials on the front.
-        labels: The objectives with their units.
-        more_is_better: Whether it is, of the first objective.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
+    ``front`` has the numbers of the trials on it; of the first objective more or less is better.
     """
     walking = [mark for mark in marks if mark.walks]
     on_front = sorted((mark for mark in walking if mark.number in front), key=lambda mark: mark.values)

@@ -26,8 +26,7 @@ def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path, *, se
     """Draws potentials and phase response of one segment's neurons over a cycle, and the multipliers.
 
     Args:
-        cycles: Limit cycles of one worm by the name that the legend gives them; the first is drawn over its phase, and
-            the multipliers of all are compared.
+        cycles: Limit cycles of one worm by the name in the legend; the first is drawn over its phase.
         path: File to write: ``.png``, ``.pdf`` or ``.svg``; a name without a suffix becomes a ``.png``.
         segment: Segment whose neurons are drawn, from 1; states of other names are left out.
     """

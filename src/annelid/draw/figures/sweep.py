@@ -25,14 +25,10 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
     """Draws numbers over the varied fields; runs without a number are marked with crosses.
 
     Args:
-        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``, of which the mean is
-            drawn.
+        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: their mean is drawn.
         fields: The varied fields, coordinates of the data.
         numbers: Variables of the data, at most four; of three or more fields the first only.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written, and the latter's path is returned.
     """
     if len(fields) > 2:
         with canvas(3.8) as figure:

@@ -13,11 +13,10 @@ from annelid.config.kinds import Goals
 from annelid.draw.canvas import WIDTH_IN, canvas, panel_title, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from annelid.simulation.runfile import Run
 
 N_OUTLINES = 6  # outlines drawn, the first and the last posture among them
 FIRST, LAST = "#9bb0c9", "#1b2a6b"

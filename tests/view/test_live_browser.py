@@ -96,7 +96,7 @@ def test_the_panel_says_what_is_seen(live: tuple[Show, Page]) -> None:
         assert page.get_by_text(words).count() > 0
     charts = "Object.values(window.__viserTestpoints.uplots).map(plot => plot.chart.data.length)"
     assert page.evaluate(charts) == [7]
-    ask(show, page, show.choose_plot, "neurons of segment 2")
+    ask(show, page, show.panel.choose_plot, "neurons of segment 2")
     wait_for(lambda: page.evaluate(charts) == [5], page)
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from annelid.config import Knob
+from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
+from annelid.live.living import knobs_of
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
@@ -27,6 +27,7 @@ STRONGEST_POKE = 3.0  # in weights of the worm; more would tear the thinnest
 PLOT_HEIGHT = 190  # of the plots, pixels
 MOST_SEGMENTS = 4  # with more than these the expansion neurons are left out of the first plot
 SECONDS = 5.0  # how far back the plots go, in simulated time
+MOST_SAMPLES = 250  # of one curve of a plot
 
 
 @dataclass(frozen=True)
@@ -83,34 +84,26 @@ def _half_centres(segments: dict[int, list[str]]) -> Plot:
 
 
 class Panel:
-    """The panel's elements."""
+    """The panel's elements; what they change is asked of the loop of a view."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        show: Show,
-        *,
-        speed: float,
-        weight_N: float,
-        knobs: Mapping[Knob, float],
-        plots: Mapping[str, Plot],
-        legend: str,
-    ) -> None:
-        """Makes all elements on a server, which ask a view; speed, weight on Earth and knobs are those at first."""
+    def __init__(self, server: viser.ViserServer, show: Show, speed: float, weight_N: float, legend: str) -> None:
+        """Makes all elements; the worm's weight on Earth is what pokes are measured by."""
         gui = self._gui = server.gui
+        self._player = player = show.player
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self._status = gui.add_html("")
         self._transport(show, speed)
         self._knobs: dict[Knob, Any] = {}
         self._poke: Any = None
-        if show.player.worm is not None:
-            self._physics(show, weight_N, knobs)
+        if player.worm is not None:
+            self._physics(show, player.worm.config, weight_N)
+        self._plots = plots_of(player.reel.names)
         self._plot_folder = gui.add_folder("Nervous system, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
-            choice = gui.add_dropdown("plot", list(plots), initial_value=next(iter(plots)))
-            choice.on_update(lambda event: show.ask(show.choose_plot, str(event.target.value)))
+            choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))
+            choice.on_update(lambda event: show.ask(self.choose_plot, str(event.target.value)))
         with gui.add_folder("Colours"):
             gui.add_html(legend)
         with gui.add_folder("Shown", expand_by_default=False):
@@ -119,6 +112,7 @@ class Panel:
             for layer in LAYERS:
                 box = gui.add_checkbox(layer, initial_value=True)
                 box.on_update(_asking(show, show.stage.set_visible, layer))
+        self.choose_plot(next(iter(self._plots)))
 
     @property
     def poke_N(self) -> float:
@@ -129,58 +123,37 @@ class Panel:
         gui, player = self._gui, show.player
         living = player.worm is not None
         buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: show.restart}
-        row = gui.add_button_group(
-            "",
-            list(buttons),
-            hint="now: the present, and on from there. restart: time zero, with the sliders as they are."
-            if living
-            else "restart: from the beginning.",
-        )
+        live_hint = "now: the present, and on from there. restart: time zero, with the sliders as they are."
+        row = gui.add_button_group("", list(buttons), hint=live_hint if living else "restart: from the beginning.")
         row.on_click(lambda event: show.ask(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
         self._time.on_update(_asking(show, player.seek))
-        pace = gui.add_slider(
-            "speed", SLOWEST, FASTEST, 0.05, speed, hint="Simulated seconds per second; the worm may not keep up."
-        )
+        hint = "Simulated seconds per second; the worm may not keep up."
+        pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, speed, hint=hint)
         pace.on_update(_asking(show, setattr, player, "speed"))
 
-    def _physics(self, show: Show, weight_N: float, knobs: Mapping[Knob, float]) -> None:
-        with self._gui.add_folder("Physics"):
-            for knob, shown in knobs.items():
-                slider = self._gui.add_slider(knob.label, knob.low, knob.high, knob.step, shown, hint=knob.hint)
-                slider.on_update(_asking(show, show.turn, knob))
-                self._knobs[knob] = slider
-            self._poke = self._gui.add_slider(
-                "poke (N)",
-                0.0,
-                STRONGEST_POKE * weight_N,
-                0.1,
-                weight_N,
-                hint="Force of a poke, the worm's weight at first: click on the worm, which is pushed away from "
-                "you for 0.15 s.",
-            )
-            self._gui.add_button("as at first", hint="Gives every slider above its first value.").on_click(
-                lambda _: show.ask(show.reset_knobs)
-            )
+    def _physics(self, show: Show, config: RunConfig, weight_N: float) -> None:
+        gui = self._gui
+        with gui.add_folder("Physics"):
+            for knob in knobs_of(config):
+                self._knobs[knob] = gui.add_slider(
+                    knob.label, knob.low, knob.high, knob.step, knob.shown(config), hint=knob.hint
+                )
+                self._knobs[knob].on_update(_asking(show, show.turn, knob))
+            hint = "Force of a poke, the worm's weight at first: click on the worm to push it away from you for 0.15 s."
+            self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
+            again = gui.add_button("as at first", hint="Gives every slider above its first value.")
+            again.on_click(lambda _: show.ask(show.reset_knobs))
 
-    def show_status(self, status: str) -> None:
-        """Shows the state of things first, as HTML."""
-        self._status.content = status
+    def show_knobs(self, config: RunConfig) -> None:
+        """Moves the sliders to what a configuration says."""
+        for knob, slider in self._knobs.items():
+            slider.value = knob.shown(config)
 
-    def show_time(self, time_s: float, span_s: tuple[float, float]) -> None:
-        """Moves the slider of time."""
-        first, last = span_s
-        self._time.min = first
-        self._time.max = max(last, first + 0.01)
-        self._time.value = time_s
-
-    def show_knobs(self, shown: Mapping[Knob, float]) -> None:
-        """Moves the sliders."""
-        for knob, value in shown.items():
-            self._knobs[knob].value = value
-
-    def show_plot(self, plot: Plot) -> None:
-        """Puts another plot in place of the present one; it is empty until `show_curves`."""
+    def choose_plot(self, name: str) -> None:
+        """Puts another plot in place of the present one; it is empty until `update`."""
+        plot = self._plots[name]
+        self._columns = [self._player.reel.names.index(curve.signal) for curve in plot.curves]
         if self._chart is not None:
             self._chart.remove()
         colors = [_css(color) for color in segment_colors(max(plot.n_colors, 1))]
@@ -196,9 +169,16 @@ class Panel:
                 height=PLOT_HEIGHT,
             )
 
-    def show_curves(self, time_s: NDArray[np.float64], values: Sequence[NDArray[np.float64]]) -> None:
-        """Draws the signals of the present plot, one array a curve."""
-        self._chart.data = (time_s, *values)
+    def update(self, status: str) -> None:
+        """Shows the state of things, as HTML, the present time, and the signals of the last seconds before it."""
+        self._status.content = status
+        reel, time_s = self._player.reel, self._player.moment.time_s
+        first, last = reel.span_s
+        self._time.min, self._time.max = first, max(last, first + 0.01)
+        self._time.value = time_s
+        times, values = reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
+        if len(times):
+            self._chart.data = (times, *values[:, self._columns].T)
 
 
 def _series(curve: Curve, colors: Sequence[str]) -> Any:

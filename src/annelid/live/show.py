@@ -12,8 +12,8 @@ import numpy as np
 
 from annelid.config import Knob, RunConfig
 from annelid.errors import AnnelidError
-from annelid.live.living import Moment, knobs_of
-from annelid.live.panel import SECONDS, Panel, legend_html, plots_of, status_html
+from annelid.live.living import Moment
+from annelid.live.panel import Panel, legend_html, status_html
 from annelid.live.picture import Painter, struck
 from annelid.live.player import config_of, player_of
 from annelid.live.server import LOOPBACK, Server
@@ -28,7 +28,6 @@ LONGEST_TICK_S = 0.25  # a computer that was asleep does not make the view leap
 PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
 PACE_OVER_S = 2.0  # over which the speed that is reached is measured
 EARTH_M_PER_S2 = 9.81
-MOST_SAMPLES = 250  # of one curve of a plot
 
 
 class Show:
@@ -39,6 +38,7 @@ class Show:
     Attributes:
         player: What is shown when.
         stage: Where it is seen.
+        panel: What is beside it.
         follow: Whether the worm is kept in the middle, or may crawl away.
         address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
@@ -68,21 +68,12 @@ class Show:
         self._pace: deque[tuple[float, float]] = deque()
         self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
-        self._knobs = knobs_of(self._config) if self.player.worm is not None else ()
-        self._plots = plots_of(self.player.reel.names)
         self._server = Server(host, port)
         self.address = self._server.address
         self.stage = Stage(self._server, self._config, painter, self.player.moment)
-        self._panel = Panel(
-            self._server,
-            self,
-            speed=speed,
-            weight_N=round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1),
-            knobs={knob: knob.shown(self._config) for knob in self._knobs},
-            plots=self._plots,
-            legend=legend_html(painter.arrow_N, anatomy.geometry.radius_m),
-        )
-        self.choose_plot(next(iter(self._plots)))
+        weight_N = round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1)
+        legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
+        self.panel = Panel(self._server, self, speed, weight_N, legend)
         if self.player.worm is not None:
             self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
 
@@ -102,7 +93,7 @@ class Show:
             last = begun
             self._draw()
             if begun >= panel_due:
-                self._update_panel(begun)
+                self.panel.update(self._status(begun))
                 panel_due = begun + PANEL_INTERVAL_S
             self._ending.wait(max(0.0, begun + 1.0 / FRAMES_A_SECOND - perf_counter()))
 
@@ -138,7 +129,7 @@ class Show:
         assert self.player.worm is not None
         self._notice = ""
         self.player.worm.as_at_first()
-        self._panel.show_knobs({knob: knob.shown(self.player.worm.config) for knob in self._knobs})
+        self.panel.show_knobs(self.player.worm.config)
 
     def poke(self, origin_m: tuple[float, ...], direction: tuple[float, ...]) -> None:
         """Pokes what a line of sight hits, in the page's axes, m."""
@@ -151,13 +142,7 @@ class Show:
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
         place = struck(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
-            worm.poke(place, self._panel.poke_N * sight)
-
-    def choose_plot(self, name: str) -> None:
-        """Plots other signals."""
-        self._plot = self._plots[name]
-        self._columns = [self.player.reel.names.index(curve.signal) for curve in self._plot.curves]
-        self._panel.show_plot(self._plot)
+            worm.poke(place, self.panel.poke_N * sight)
 
     def _meet_wishes(self) -> None:
         with self._wishing:
@@ -178,17 +163,8 @@ class Show:
         self._server.flush()
         self.frames_drawn += 1
 
-    def _update_panel(self, now: float) -> None:
-        player = self.player
-        time_s = player.moment.time_s
-        self._panel.show_time(time_s, player.reel.span_s)
-        times, values = player.reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
-        if len(times):
-            self._panel.show_curves(times, list(values[:, self._columns].T))
-        self._panel.show_status(self._status(now, time_s))
-
-    def _status(self, now: float, time_s: float) -> str:
-        player = self.player
+    def _status(self, now: float) -> str:
+        player, time_s = self.player, self.player.moment.time_s
         self._pace.append((now, time_s))
         while now - self._pace[0][0] > PACE_OVER_S:
             self._pace.popleft()

@@ -75,13 +75,9 @@ class Stage:
                 ("springs", first.springs, first.spring_colors, SPRING_PIXELS),
             )
         )
+        head = {"head_radius": 0.009, "head_length": 0.022}
         self._contacts = scene.add_arrows(
-            f"{_ROOT}/contacts",
-            first.contacts,
-            CONTACT_COLOR,
-            shaft_radius=0.0035,
-            head_radius=0.009,
-            head_length=0.022,
+            f"{_ROOT}/contacts", first.contacts, CONTACT_COLOR, shaft_radius=0.0035, **head
         )
         assert isinstance(config.body, WormBody)
         heading = config.body.heading_deg
@@ -160,21 +156,16 @@ def _shaded(normals: Array) -> NDArray[np.uint8]:
 def _squares(height_m: float) -> tuple[Array, NDArray[np.int32]]:
     """Vertices and faces of strips that make squares to see the worm move against; a grid takes longer to draw."""
     (ahead, behind), side = FLOOR_X_M, FLOOR_HALF_WIDTH_M
-    strips = [(x - _half_width(x), x + _half_width(x), -side, side) for x in _marks(ahead, behind)]
-    strips += [(ahead, behind, y - _half_width(y), y + _half_width(y)) for y in _marks(-side, side)]
-    corners = [[(a, c, height_m), (b, c, height_m), (b, d, height_m), (a, d, height_m)] for a, b, c, d in strips]
-    first = 4 * np.arange(len(strips))[:, np.newaxis, np.newaxis]
-    faces = first + np.array([[0, 1, 2], [0, 2, 3]])
-    return np.array(corners).reshape(-1, 3), faces.reshape(-1, 3).astype(np.int32)
-
-
-def _marks(first: float, last: float) -> Array:
-    return np.linspace(first, last, round((last - first) / SQUARE_M) + 1)
-
-
-def _half_width(place_m: float) -> float:
-    """Of a strip, which is wider at every whole metre."""
-    return STRIP_M / 2 * (2.5 if abs(place_m - round(place_m)) < 1e-6 else 1.0)
+    corners = []
+    for first, last in (FLOOR_X_M, (-side, side)):
+        for place in np.linspace(first, last, round((last - first) / SQUARE_M) + 1):
+            # Wider at every whole metre.
+            half_width = STRIP_M / 2 * (2.5 if abs(place - round(place)) < 1e-6 else 1.0)
+            strip = (place - half_width, place + half_width)
+            (a, b), (c, d) = (strip, (-side, side)) if first == ahead else ((ahead, behind), strip)
+            corners += [(a, c, height_m), (b, c, height_m), (b, d, height_m), (a, d, height_m)]
+    faces = np.arange(0, len(corners), 4)[:, np.newaxis, np.newaxis] + np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array(corners), faces.reshape(-1, 3).astype(np.int32)
 
 
 def _add_walls(scene: viser.SceneApi, arena: ArenaKind) -> None:

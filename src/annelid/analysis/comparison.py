@@ -17,6 +17,8 @@ _NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "wa
 # Fields of the configuration that change nothing in a run.
 _WORDS = ("name", "summary", "published")
 
+LACKING: Any = object()  # stands for the value of a field that a kind of worm does not have
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -27,8 +29,7 @@ class Comparison:
     statuses: tuple[str, ...]
     orders: tuple[tuple[int, ...], ...]  # segments (from 1) in the order of their contractions
     numbers: Mapping[str, tuple[Number, ...]]  # fields of Summary and of Gait (gait.speed_m_per_s), SI units
-    fields: Mapping[str, tuple[Any, ...]]  # of the configuration in which they differ; None where its kind has none
-    lacking: Mapping[str, tuple[bool, ...]]  # which runs do not have such a field at all
+    fields: Mapping[str, tuple[Any, ...]]  # of the configuration in which they differ
 
     def differences(self, field: str) -> list[Number]:
         """Returns the `relative_difference` of each run's number to the first run's; None for the first."""
@@ -59,15 +60,13 @@ def compare(runs: Sequence[Run]) -> Comparison:
         rows[-1] |= {f"gait.{field}": value for field, value in walking.items()}
         rows[-1] |= {f"gait.energy.{part}": share for part, share in energy.items()}
     names = list(dict.fromkeys(field for row in rows for field in row))
-    fields, lacking = differing_fields([run.config for run in runs])
     return Comparison(
         labels=run_labels(runs),
         paths=tuple(str(run.path) for run in runs),
         statuses=tuple(run.status for run in runs),
         orders=tuple(tuple(one.order) for one in summaries),
         numbers={field: tuple(row.get(field) for row in rows) for field in names},
-        fields=fields,
-        lacking=lacking,
+        fields=differing_fields([run.config for run in runs]),
     )
 
 
@@ -78,7 +77,7 @@ def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
         labels = tuple("/".join(part[-depth:]) for part in parts)
         if len(set(labels)) == len(labels):
             return labels
-    return tuple(f"{'/'.join(part[-1:])} ({number})" for number, part in enumerate(parts, start=1))
+    return tuple(f"{part[-1]} ({number})" for number, part in enumerate(parts, start=1))
 
 
 def relative_difference(first: Number, other: Number) -> Number:
@@ -93,23 +92,21 @@ def relative_difference(first: Number, other: Number) -> Number:
     return (other - first) / abs(first) if first else None
 
 
-def differing_fields(
-    configs: Sequence[RunConfig],
-) -> tuple[dict[str, tuple[Any, ...]], dict[str, tuple[bool, ...]]]:
-    """Finds the fields in which configurations differ: values by dotted path, None where lacking; and which lack it."""
+def differing_fields(configs: Sequence[RunConfig]) -> dict[str, tuple[Any, ...]]:
+    """Finds the fields in which configurations differ: values by dotted path, `LACKING` where there is none."""
     own = [fields_of(config) for config in configs]
-    paths = [path for path in dict.fromkeys(path for each in own for path in each) if path not in _WORDS]
-    fields, lacking = {}, {}
-    for path in paths:
-        lacks = tuple(path not in each for each in own)
-        pairs = zip(configs, lacks, strict=True)
-        values = tuple(None if lack else field_value(config, path) for config, lack in pairs)
-        if any(value != values[0] for value in values) or len(set(lacks)) > 1:
-            fields[path], lacking[path] = values, lacks
-    return fields, lacking
+    fields = {}
+    for path in dict.fromkeys(path for each in own for path in each if path not in _WORDS):
+        pairs = zip(configs, own, strict=True)
+        values = tuple(field_value(config, path) if path in each else LACKING for config, each in pairs)
+        if any(value != values[0] for value in values):
+            fields[path] = values
+    return fields
 
 
 def _plain(value: Any) -> Any:
     if hasattr(value, "model_dump"):
         return value.model_dump(mode="json")
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if value is LACKING else value

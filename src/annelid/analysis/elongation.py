@@ -59,9 +59,3 @@ def end_difference(elongation_m: ArrayLike) -> float:
 
 def _deficit(less: float, full: float) -> float:
     return float(1.0 - less / full) if full > 0 else float("nan")
-
-
-def relative_to_first(elongation_m: ArrayLike) -> Array:
-    """Divides the elongations of segments, m, ``(n_segments,)``, by that of segment 1."""
-    values = np.asarray(elongation_m, dtype=float)
-    return values / values[0]

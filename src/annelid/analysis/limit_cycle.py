@@ -25,21 +25,6 @@ from annelid.errors import AnnelidError, ConfigError, suggest
 from annelid.protocols import Array, Controller, Plant, Stateful
 from annelid.simulation import build_controller, build_plant
 
-__all__ = [
-    "LimitCycle",
-    "NoLimitCycle",
-    "Section",
-    "Time",
-    "crossing_times",
-    "find_limit_cycle",
-    "flow_of",
-    "kicked_phase_response",
-    "limit_cycle",
-    "section_at",
-    "settled",
-    "travel",
-]
-
 Time = Literal["continuous", "located", "stepped"]  # how a worm's time is taken; see `limit_cycle`
 
 # Step whose change is the vector field, and the step that the field is integrated with, s.
@@ -464,13 +449,7 @@ def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128],
 
 
 def kicked_phase_response(
-    flow: Flow,
-    cycle: LimitCycle,
-    kicks: Array,
-    phases: NDArray[np.intp],
-    *,
-    n_cycles: int = 3,
-    longest_s: float = 60.0,
+    flow: Flow, cycle: LimitCycle, kicks: Array, phases: NDArray[np.intp], *, n_cycles: int = 3, longest_s: float = 60.0
 ) -> Array:
     """Measures phase response directly: kicks the system at a phase, and sees when it next meets the section.
 

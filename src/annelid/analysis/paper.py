@@ -138,7 +138,7 @@ def changed_fields(config: RunConfig) -> tuple[str, list[str]]:
 
 
 def _changes(preset: RunConfig, config: RunConfig) -> list[str]:
-    fields, _ = differing_fields([preset, config])
+    fields = differing_fields([preset, config])
     uncounted = (*_BESIDE_THE_WORM, *(() if config.sensor.noise_m else ("seed",)))
     changed = [field for field in fields if not field.startswith(uncounted)]
     others = tuple(field.removesuffix("kind") for field in changed if field.endswith(".kind"))

@@ -151,17 +151,13 @@ def without_names(text: str) -> str:
     """Returns a text in which paths are cut down to their last part, and the user and the machine are not named."""
     text = text.replace(str(Path.home()), "/HOME") if len(Path.home().parts) > 1 else text
     text = _PATH.sub(lambda path: "../" + re.split(r"[/\\]", path[0].rstrip("/\\"))[-1], text)
-    for name, instead in ((_user(), "USER"), (platform.node(), "MACHINE"), (platform.node().split(".")[0], "MACHINE")):
-        if name:
-            text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", instead, text)
-    return " ".join(text.replace("|", "/").split())
-
-
-def _user() -> str:
+    names = {platform.node(): "MACHINE", platform.node().split(".")[0]: "MACHINE"}
     # A user without a name, as in some containers, needs none hidden.
     with suppress(OSError, KeyError, ImportError):
-        return getpass.getuser()
-    return ""
+        names = {getpass.getuser(): "USER"} | names
+    for name, instead in names.items():
+        text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", instead, text) if name else text
+    return " ".join(text.replace("|", "/").split())
 
 
 def _processor() -> str:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,10 @@ from annelid.analysis.rhombi import nearest_time
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
+
+if TYPE_CHECKING:
+    from annelid.draw.planar_scene import PlanarScene
+    from annelid.draw.scene import WormScene
 
 FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1280, 320), "boxerbaum2012": (1280, 320)}
 VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
@@ -42,23 +46,8 @@ _FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip instal
 Progress = Callable[[int, int], object]  # called with the number of frames done and their total
 
 
-class Scene(Protocol):
-    """What draws a run: recorded times, and one picture ``(height, width, 3)`` for each."""
-
-    times_s: NDArray[np.float64]
-
-    def picture(self, frame: int) -> NDArray[np.uint8]:
-        """Draws one of the recorded times."""
-        ...
-
-
 def render_frame(
-    run: Run,
-    time_s: float,
-    path: str | Path,
-    *,
-    camera: str | None = None,
-    size: tuple[int, int] | None = None,
+    run: Run, time_s: float, path: str | Path, *, camera: str | None = None, size: tuple[int, int] | None = None
 ) -> Path:
     """Draws the recorded posture nearest to a time.
 
@@ -148,7 +137,7 @@ def render_video(
     return path
 
 
-def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> AbstractContextManager[Scene]:
+def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> WormScene | PlanarScene:
     if run.config.body.is_planar:
         from annelid.draw.planar_scene import PlanarScene
 

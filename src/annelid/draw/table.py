@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from annelid.analysis.comparison import Comparison, Number, relative_difference
+from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
 from annelid.analysis.gait import Gait
 from annelid.analysis.paper import (
     ELONGATION_WITHIN,
@@ -189,10 +189,8 @@ def fields_table(comparison: Comparison) -> Table:
     caption = "worms of different kinds: of body and arena only fields that all have; --json lists all"
     table = _side_by_side("field of the configuration", comparison.labels, caption if other_kinds else None)
     for field, values in comparison.fields.items():
-        lacks = comparison.lacking[field]
-        if not (other_kinds and field.startswith(("body.", "arena.")) and any(lacks)):
-            pairs = zip(values, lacks, strict=True)
-            table.add_row(field, *(UNKNOWN if lack else _setting(value) for value, lack in pairs))
+        if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values):
+            table.add_row(field, *(UNKNOWN if value is LACKING else _setting(value) for value in values))
     return table
 
 

@@ -11,11 +11,10 @@ from annelid.draw.render import Progress
 from annelid.errors import RunFileError
 from annelid.live.panel import legend_html
 from annelid.live.picture import Painter
-from annelid.live.player import Player, config_of, player_of
+from annelid.live.player import config_of, player_of
 from annelid.live.server import Server, content_policy
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
-from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
 
 FRAMES_A_SECOND = 25.0  # of a page, in simulated time; a run has as many as it has recorded, if those are fewer
@@ -49,37 +48,18 @@ def export_page(
         raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
     config = config_of(source)
     player, anatomy = player_of(source)
-    first_s, last_s = (0.0, config.duration_s) if player.worm is not None else player.reel.span_s
-    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
-    times_s = [first_s + frame / FRAMES_A_SECOND for frame in range(n_frames)]
-    page = _page(config, anatomy, player, times_s, speed, progress)
-    with whole_file(path) as draft:
-        draft.write_text(page, encoding="utf-8")
-    return path
-
-
-def page_path(path: str | Path) -> Path:
-    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``."""
-    return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
-
-
-def _page(
-    config: RunConfig,
-    anatomy: Anatomy,
-    player: Player,
-    times_s: list[float],
-    speed: float,
-    progress: Progress | None,
-) -> str:
-    """Lets a server that nobody visits record what it would send."""
-    painter = Painter(anatomy, config, GRAIN_M)
     reel, worm = player.reel, player.worm
-    shown = reel.at(times_s[0])
+    first_s, last_s = reel.span_s if worm is None else (0.0, config.duration_s)
+    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
+    painter = Painter(anatomy, config, GRAIN_M)
+    shown = reel.at(first_s)
+    # A server that nobody visits records what it would send.
     server = Server()
     try:
         stage = Stage(server, config, painter, shown)
         recording = server.get_scene_serializer()
-        for frame, time_s in enumerate(times_s):
+        for frame in range(n_frames):
+            time_s = first_s + frame / FRAMES_A_SECOND
             if worm is not None:
                 worm.advance(time_s, math.inf)
             moment = reel.at(time_s + 0.5 / FRAMES_A_SECOND)
@@ -88,11 +68,19 @@ def _page(
                 shown = moment
             recording.insert_sleep(1.0 / FRAMES_A_SECOND / speed)
             if progress is not None:
-                progress(frame + 1, len(times_s))
+                progress(frame + 1, n_frames)
         page = recording.as_html()
     finally:
         server.stop()
-    return _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
+    page = _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
+    with whole_file(path) as draft:
+        draft.write_text(page, encoding="utf-8")
+    return path
+
+
+def page_path(path: str | Path) -> Path:
+    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``."""
+    return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
 
 
 def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> str:

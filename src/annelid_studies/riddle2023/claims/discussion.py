@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 
 from annelid.analysis.detector import detect_slip, score_detections
-from annelid.analysis.elongation import middle_deficit, relative_to_first
+from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import ROBOT_ELONGATION_M
 from annelid.analysis.track import forward_position
 from annelid.control.program import Program
@@ -232,10 +232,10 @@ def cause_claim(evidence: Evidence) -> Claim:
 
 
 def _robot_claim(evidence: Evidence) -> Claim:
-    robot = relative_to_first(ROBOT_ELONGATION_M)
+    robot = np.divide(ROBOT_ELONGATION_M, ROBOT_ELONGATION_M[0])
     worms = [worm for n, worm in longer_worms(evidence.effort) if n == 4]
     held = {worm: _own(evidence.store.run(longer_worm(4, worm))) for worm in worms}
-    ours = {worm: relative_to_first(own[:, -1]) for worm, own in held.items()}
+    ours = {worm: own[:, -1] / own[0, -1] for worm, own in held.items()}
     weak = [middle_deficit(of_reading) for own in held.values() for of_reading in own.T]
     return _of_discussion(
         "The model closely emulates the robot: ends alike, middle segments clearly weaker.",

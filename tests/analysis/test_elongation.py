@@ -2,23 +2,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.analysis.elongation import elongation, end_difference, interior_deficit, middle_deficit
-
-
-def test_both_readings_of_a_written_down_stretch() -> None:
-    rest = np.array([[0.07, 0.08], [0.07, 0.08], [0.07, 0.08]])
-    stretch = np.repeat(rest[None], 4, axis=0)
-    stretch[1, 0] += [0.04, 0.02]  # segment 1 lengthens
-    stretch[2, 0, 0] -= 0.01  # its first helix shortens below rest
-    stretch[3, 2] += [0.00, 0.03]  # segment 3 lengthens away from the first helix
-    read = elongation(stretch, rest)
-    np.testing.assert_allclose(read.first_helix_pp_m, [0.05, 0.0, 0.0], atol=1e-15)
-    np.testing.assert_allclose(read.mean_max_m, [0.03, 0.0, 0.015], atol=1e-15)
+from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
 
 
 def test_deficits_of_the_published_elongations() -> None:

@@ -34,7 +34,6 @@ class Flow(Protocol):
 
     timestep_s: float
     labels: tuple[str, ...]  # names of the continuous states
-    switch_labels: tuple[str, ...]
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Advances copies, ``(n_copies, n_states)``, by one step.
@@ -137,12 +136,10 @@ class ClosedLoop:
         self._rest: list[State] = [
             {name: array for name, array in state.items() if array.dtype.kind not in "fb"} for state in self._made_of
         ]
-        parts = zip(self._parts, self._made_of, strict=True)
-        arrays = [(part, name, array) for part, state in parts for name, array in state.items()]
-        self.labels = tuple(x for part, name, a in arrays if a.dtype.kind == "f" for x in _labels(part, name, a.size))
-        sensors = tuple(f"{name}[{i}]" for _, name, a in arrays if a.dtype.kind == "b" for i in range(a.size))
-        n_pieces = self.present()[1].shape[1] - len(sensors)
-        self.switch_labels = sensors + tuple(f"piece[{i}]" for i in range(n_pieces))
+        self.labels: tuple[str, ...] = ()
+        for part, state in zip(self._parts, self._made_of, strict=True):
+            floats = ((name, array.size) for name, array in state.items() if array.dtype.kind == "f")
+            self.labels += tuple(label for name, size in floats for label in _labels(part, name, size))
         if len(self.labels) > MOST_STATES:
             raise ConfigError(
                 f"{type(plant).__name__} and {type(controller).__name__} have {len(self.labels)} continuous states; "
@@ -240,7 +237,7 @@ class Continuous:
         self._flow = flow
         self._ratio = timestep_s / flow.timestep_s
         self.timestep_s = timestep_s
-        self.labels, self.switch_labels = flow.labels, flow.switch_labels
+        self.labels = flow.labels
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Returns the states that the field at the beginning leads to in a whole step, and the switches in force."""

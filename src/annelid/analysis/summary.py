@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from annelid.analysis.elongation import elongation, end_difference, middle_deficit
 from annelid.analysis.gait import net_work, positive_work
 from annelid.analysis.rhythm import CONTRACTED, Rhythm, run_rhythm
 from annelid.analysis.track import forward_position
@@ -98,10 +97,6 @@ class Summary:
         """Returns plain lists, numbers, strings and None, ready for JSON."""
         return asdict(self)
 
-    def to_json(self) -> str:
-        """Returns the record as JSON with the attributes' names as keys."""
-        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
-
 
 def summary(run: Run) -> Summary:
     """Reads the numbers of a run, opened with `annelid.open_run`.
@@ -112,11 +107,13 @@ def summary(run: Run) -> Summary:
     n_segments = run.config.body.n_segments
     sampled = bool(data.sizes.get("time"))
     beat = run_rhythm(run) or Rhythm((), (), None, None, None, 0)
-    read = None
+    first_helix = mean = spread = None
     if "stretch_length" in data and sampled:
-        read = elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
-    first_helix, mean = (read.first_helix_pp_m, read.mean_max_m) if read else (None, None)
-    spread = read if read and data.sizes["sensor"] > 1 else None
+        # The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak on the first helix.
+        stretch, rest = data["stretch_length"].values, data["stretch_rest_length"].values
+        peak_to_peak = np.ptp(stretch, axis=0)
+        first_helix, mean = peak_to_peak[:, 0], stretch.mean(axis=2).max(axis=0) - rest.mean(axis=1)
+        spread = peak_to_peak if data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
     pulling = np.concatenate([np.empty(0), *forces])
     ahead = forward_position(run) if "center_of_mass" in data and sampled else None
@@ -152,8 +149,8 @@ def summary(run: Run) -> Summary:
         ring_length_min_m=_number(shortest),
         edge_strain_max=_largest(data, "edge_strain"),
         pin_gap_max_m=_largest(data, "pin_gap"),
-        elongation_least_pp_m=_numbers(spread.least_pp_m) if spread else None,
-        elongation_most_pp_m=_numbers(spread.most_pp_m) if spread else None,
+        elongation_least_pp_m=None if spread is None else _numbers(spread.min(axis=1)),
+        elongation_most_pp_m=None if spread is None else _numbers(spread.max(axis=1)),
         warnings=run.warnings,
     )
 
@@ -184,3 +181,28 @@ def _number(value: float | None) -> float | None:
 
 def _numbers(values: Iterable[float | None] | None) -> list[float | None] | None:
     return None if values is None else [_number(value) for value in values]
+
+
+def middle_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below the first: ``1 - mean(interior) / first``, NaN if that is unmoved.
+
+    With three segments this is the paper's "segment 2 below segment 1" (39.4 %).
+    """
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[1:-1].mean(), values[0])
+
+
+def interior_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below both ends: ``1 - mean(interior) / mean(ends)``."""
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[1:-1].mean(), (values[0] + values[-1]) / 2.0)
+
+
+def end_difference(elongation_m: ArrayLike) -> float:
+    """How far the last segment stays below the first: ``1 - last / first``."""
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[-1], values[0])
+
+
+def _deficit(less: float, full: float) -> float:
+    return float(1.0 - less / full) if full > 0 else float("nan")

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from annelid.config import RunConfig
 
 UNKNOWN = "-"
-_ONSETS_SHOWN = 12
+_ONSETS_SHOWN, _MULTIPLIERS_SHOWN = 12, 4
 COMPARED = ("reference", "deviation")  # headings of what stands beside our numbers
 NEXT = (
     f"annelid run {FORMULATION} (that formulation itself, a minute), "
@@ -194,7 +194,7 @@ def fields_table(comparison: Comparison) -> Table:
     return table
 
 
-def cycle_table(name: str, cycles: Mapping[str, LimitCycle], n_shown: int = 4) -> Table:
+def cycle_table(name: str, cycles: Mapping[str, LimitCycle]) -> Table:
     """Returns the limit cycles of one worm by `annelid.analysis.limit_cycle.Time`, with their largest multipliers."""
     main = next(iter(cycles.values()))
     caption = "A multiplier is what one cycle leaves of a small deviation; the one at 1 is a shift along the cycle."
@@ -204,7 +204,7 @@ def cycle_table(name: str, cycles: Mapping[str, LimitCycle], n_shown: int = 4) -
     # Title and caption would fold where there is only one column.
     table = framed_table("quantity", *(TIMES[time] for time in cycles), title=title, caption=caption, min_width=72)
     table.add_row("period (ms)", *(f"{1e3 * cycle.period_s:.2f}" for cycle in cycles.values()))
-    for i in range(min(n_shown, len(main.labels))):
+    for i in range(min(_MULTIPLIERS_SHOWN, len(main.labels))):
         table.add_row(f"multiplier {i + 1}", *(_multiplier(cycle.multipliers[i]) for cycle in cycles.values()))
     table.add_row("orbit closes within", *(f"{cycle.closing_error:.0e} of a range" for cycle in cycles.values()))
     return table

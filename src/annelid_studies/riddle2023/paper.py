@@ -11,8 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
+from annelid.analysis.summary import middle_deficit
 from annelid.body.worm import WormBody
 from annelid.draw.figures.network_diagram import network_figure
 from annelid.draw.plots import figure7

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.elongation import interior_deficit
 from annelid.analysis.paper import ROBOT_ELONGATION_M, published
+from annelid.analysis.summary import interior_deficit
 from annelid.config import load_config
 from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table

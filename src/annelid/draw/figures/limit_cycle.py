@@ -22,23 +22,22 @@ _MARKERS = "os^"
 _LINEAR_MS_PER_MV = 1.0
 
 
-def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path, *, segment: int = 1) -> Path:
-    """Draws potentials and phase response of one segment's neurons over a cycle, and the multipliers.
+def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path) -> Path:
+    """Draws potentials and phase response of the first segment's neurons over a cycle, and the multipliers.
 
     Args:
         cycles: Limit cycles of one worm by the name in the legend; the first is drawn over its phase.
         path: File to write: ``.png``, ``.pdf`` or ``.svg``; a name without a suffix becomes a ``.png``.
-        segment: Segment whose neurons are drawn, from 1; states of other names are left out.
     """
     path = plot_path(path)
     main = next(iter(cycles.values()))
     with canvas(6.6) as figure:
         orbit, response, multipliers = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 1.0])
-        _neurons(orbit, main, main.state, segment)
-        panel_title(orbit, f"Segment {segment}, period {1e3 * main.period_s:.1f} ms")
+        _neurons(orbit, main, main.state)
+        panel_title(orbit, f"Segment 1, period {1e3 * main.period_s:.1f} ms")
         orbit.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(_ROLES), borderaxespad=0.1)
         orbit.set_ylabel("potential (mV)")
-        _neurons(response, main, 1e3 * main.phase_response, segment)
+        _neurons(response, main, 1e3 * main.phase_response)
         panel_title(response, "Phase response: advance of the cycle by a small kick of each potential")
         response.set_ylabel("advance (ms/mV)")
         response.set_yscale("symlog", linthresh=_LINEAR_MS_PER_MV)
@@ -51,10 +50,10 @@ def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path, *, se
         return save(figure, path)
 
 
-def _neurons(axes: Axes, cycle: LimitCycle, values: np.ndarray, segment: int) -> None:
+def _neurons(axes: Axes, cycle: LimitCycle, values: np.ndarray) -> None:
     phase = cycle.time_s / cycle.period_s
     for color, (role, style) in zip(segment_colors(len(_ROLES)), _ROLES.items(), strict=True):
-        label = f"{role}_{segment}"
+        label = f"{role}_1"
         if label in cycle.labels:
             axes.plot(phase, values[:, cycle.labels.index(label)], style, color=color, label=role)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,9 +47,7 @@ def abbreviations(names: Iterable[str]) -> dict[str, str]:
     return short
 
 
-def network_figure(
-    network: Network, stem: Path, symbols: Mapping[str, str] = PAPER_SYMBOLS, *, conductances: bool = False
-) -> Path:
+def network_figure(network: Network, stem: Path, *, conductances: bool = False) -> Path:
     """Draws any network, each neuron, connection, input and output once, with a key to its symbols.
 
     The keys of `annelid.nervous.drawing.network_shapes` are ids in the SVG file.
@@ -57,13 +55,12 @@ def network_figure(
     Args:
         network: The network.
         stem: Path of the two files without their suffixes.
-        symbols: What to write into a neuron, by its name without the segment's number; default: `abbreviations`.
         conductances: Whether to write on each connection how strong it is.
 
     Returns:
         The path of the PNG file; the SVG file lies beside it.
     """
-    written = abbreviations(network.neurons) | dict(symbols)
+    written = abbreviations(network.neurons) | PAPER_SYMBOLS
     shapes = network_shapes(network, {n: written[role_of(n)] for n in network.neurons}, strengths=conductances)
     left, right, bottom, top = frame_of(shapes, _SMALLEST_UNIT_IN)
     smallest_in = _SMALLEST_UNIT_WITH_NUMBERS_IN if conductances else _SMALLEST_UNIT_IN

@@ -8,8 +8,8 @@ from math import nan
 import numpy as np
 
 from annelid.analysis.detector import detect_slip, score_detections
-from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import ROBOT_ELONGATION_M
+from annelid.analysis.summary import middle_deficit
 from annelid.analysis.track import forward_position
 from annelid.control.program import Program
 from annelid.simulation.runfile import Run

@@ -90,20 +90,34 @@ def find_backend() -> str:
 
 
 class Canvas(AbstractContextManager):
-    """An off-screen picture of a MuJoCo model, whose off-screen size and sampling are set here.
+    """An off-screen picture of a MuJoCo model, whose off-screen size and sampling are set here, from a free camera.
 
     Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
     the back-end that `find_backend` chose. Shadows and smooth edges (``fine``) cost ten times the time where software
-    draws.
+    draws. ``upright`` is the rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``.
     """
 
-    def __init__(self, model: mujoco.MjModel, width: int, height: int, backend: str, *, fine: bool = True) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        width: int,
+        height: int,
+        backend: str,
+        *,
+        fine: bool = True,
+        upright: NDArray[np.float64] | None = None,
+    ) -> None:
         import mujoco
 
         model.vis.global_.offwidth = width
         model.vis.global_.offheight = height
         model.vis.quality.offsamples = 4 if fine else 0
-        self._model, self._size = model, (width, height)
+        self._model, self._size, self._upright = model, (width, height), upright
+        self.camera = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(model, self.camera)
+        # The rings stand for the actuators.
+        self._option = mujoco.MjvOption()
+        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
         self._context: Any = None
         self._buffers: Any = None
         try:
@@ -130,33 +144,22 @@ class Canvas(AbstractContextManager):
                 part.free()
         self._buffers = self._context = None
 
-    def draw(
-        self,
-        data: mujoco.MjData,
-        camera: mujoco.MjvCamera,
-        option: mujoco.MjvOption,
-        caption: str = "",
-        *,
-        upright: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.uint8]:
-        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``.
-
-        The caption stands in the lower left corner. ``upright`` is the rotation from the model's axes to those that
-        the camera's angles are meant in, ``(3, 3)``; by default the same.
-        """
+    def draw(self, data: mujoco.MjData, caption: str = "") -> NDArray[np.uint8]:
+        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``."""
         import mujoco
 
-        width, height = self._size
+        model, camera, scene = self._model, self.camera, self._scene
         # Another canvas may have been opened in between.
         self._context.make_current()
-        mujoco.mjv_updateScene(self._model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene)
-        if upright is not None:
-            for eye in self._scene.camera:
-                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ upright
-                eye.forward, eye.up = eye.forward @ upright, eye.up @ upright
+        mujoco.mjv_updateScene(model, data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
+        if self._upright is not None:
+            for eye in scene.camera:
+                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ self._upright
+                eye.forward, eye.up = eye.forward @ self._upright, eye.up @ self._upright
+        width, height = self._size
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         view = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(view, self._scene, self._buffers)
+        mujoco.mjr_render(view, scene, self._buffers)
         if caption:
             corner = mujoco.mjtGridPos.mjGRID_BOTTOMLEFT
             mujoco.mjr_overlay(mujoco.mjtFont.mjFONT_NORMAL, corner, view, caption, "", self._buffers)
@@ -173,10 +176,8 @@ def _probe(backend: str) -> bool:
     )
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
-    mujoco.mjv_defaultFreeCamera(model, camera)
     with Canvas(model, 32, 32, backend) as canvas:
-        return bool(np.any(canvas.draw(data, camera, mujoco.MjvOption())))
+        return bool(np.any(canvas.draw(data)))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.draw.canvas import STYLE, activation_color
+from annelid.draw.canvas import activation_color, canvas
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
 
@@ -31,9 +31,6 @@ class PlanarScene(AbstractContextManager):
     """
 
     def __init__(self, run: Run, width: int, height: int) -> None:
-        import matplotlib
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
         from matplotlib.patches import Polygon
 
         data = run.data
@@ -44,9 +41,9 @@ class PlanarScene(AbstractContextManager):
         self._heights = _CM * data["ring_length"].values
         self._outline = _CM * data["outline"].values if "outline" in data else None
         self._activation = data["activation"].values
-        with matplotlib.rc_context(STYLE):
-            figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, layout="constrained")
-            self._canvas = FigureCanvasAgg(figure)
+        with canvas(height / _DPI, width / _DPI) as figure:
+            figure.set_dpi(_DPI)
+            self._canvas: Any = figure.canvas
             self._axes = axes = figure.add_subplot()
             axes.set_aspect("equal")
             axes.set_xlabel("along the body (cm)" if self._outline is None else "x (cm)")

@@ -92,16 +92,10 @@ class _Scene(AbstractContextManager):
         fine: bool,
         upright: Array | None,
     ) -> None:
-        self._worm, self._upright = worm, upright
-        self._camera = mujoco.MjvCamera()
-        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        self._camera.azimuth, self._camera.elevation = angles_deg
-        self._camera.distance = distance_m
-        # The rings stand for the actuators.
-        self._option = mujoco.MjvOption()
-        mujoco.mjv_defaultOption(self._option)
-        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
-        self._canvas = Canvas(worm.model, *size, find_backend(), fine=fine)
+        self._worm = worm
+        self._canvas = Canvas(worm.model, *size, find_backend(), fine=fine, upright=upright)
+        self._canvas.camera.azimuth, self._canvas.camera.elevation = angles_deg
+        self._canvas.camera.distance = distance_m
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -114,8 +108,8 @@ class _Scene(AbstractContextManager):
         self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None, target_m: Array, caption: str = ""
     ) -> NDArray[np.uint8]:
         self._worm.pose(qpos, activation)
-        self._camera.lookat[:] = target_m
-        return self._canvas.draw(self._worm.posture, self._camera, self._option, caption, upright=self._upright)
+        self._canvas.camera.lookat[:] = target_m
+        return self._canvas.draw(self._worm.posture, caption)
 
 
 class WormScene(_Scene):

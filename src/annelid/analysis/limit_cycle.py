@@ -65,7 +65,8 @@ class LimitCycle:
         switches: Switches in force there, ``(n_phases + 1, n_switches)``.
         switch_time_s: When a switch moves, s, ``(n_moves,)``.
         range: Peak to peak of every state over the cycle (1 for one that does not move), ``(n_states,)``.
-        monodromy: State-transition matrix of a period, ``(n_states, n_states)``.
+        transitions: State-transition matrices from each instant to the next, ``(n_phases, n_states, n_states)``.
+        monodromy: Their product, the state-transition matrix of a period, ``(n_states, n_states)``.
         multipliers: Floquet multipliers, its eigenvalues, by falling magnitude, ``(n_states,)``, complex.
         eigenvectors: Its right eigenvectors at the section in the same order, one a column, of norm 1 when every
             state is measured by its range, ``(n_states, n_states)``, complex.
@@ -85,6 +86,7 @@ class LimitCycle:
     switches: Switches = field(repr=False)
     switch_time_s: Array = field(repr=False)
     range: Array = field(repr=False)
+    transitions: Array = field(repr=False)
     monodromy: Array = field(repr=False)
     multipliers: NDArray[np.complex128]
     eigenvectors: NDArray[np.complex128] = field(repr=False)
@@ -297,6 +299,7 @@ def find_limit_cycle(
         switches=switches,
         switch_time_s=orbit.time[orbit.moved] * flow.timestep_s,
         range=orbit.range,
+        transitions=transitions,
         monodromy=monodromy,
         multipliers=multipliers,
         eigenvectors=eigenvectors,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -96,6 +97,10 @@ class Summary:
     def to_dict(self) -> dict[str, Any]:
         """Returns plain lists, numbers, strings and None, ready for JSON."""
         return asdict(self)
+
+    def to_json(self) -> str:
+        """Returns the record as JSON with the attributes' names as keys."""
+        return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
 
 def summary(run: Run) -> Summary:

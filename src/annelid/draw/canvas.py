@@ -111,7 +111,7 @@ def panel_title(axes: Axes, text: str) -> None:
     axes.set_title(plain(text), pad=5.0)
 
 
-def line_entries(entries: Iterable[tuple[Any, str, float, str]]) -> list[Line2D]:
+def line_entries(entries: Iterable[tuple[Any, Any, float, str]]) -> list[Line2D]:
     """Legend handles of lines: colour, style, width and text of each."""
     from matplotlib.lines import Line2D
 

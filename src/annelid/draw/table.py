@@ -148,8 +148,8 @@ def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
         of_cycles = f"speed, {numbers.cycles} cycle{'' if numbers.cycles == 1 else 's'}"
         rows.append((of_cycles, f"{100 * numbers.speed_m_per_s:.2f} cm/s{speed.replace(')', '/s)')}"))
         rows.append(("stride", f"{100 * numbers.stride_m:.1f} cm{stride}"))
-    values = {"contact_duty": ("on the ground", 100.0, 0, "%"), **GAIT_ROWS}
-    rows += [(label, quantity(getattr(numbers, field), *look)) for field, (label, *look) in values.items()]
+    values: dict[str, Row] = {"contact_duty": ("on the ground", 100.0, 0, "%"), **GAIT_ROWS}
+    rows += [(row[0], quantity(getattr(numbers, field), *row[1:])) for field, row in values.items()]
     if numbers.turning_radius_m is not None:
         side = "left" if numbers.turning_radius_m > 0 else "right"
         rows.append(("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}"))
@@ -174,12 +174,12 @@ def comparison_table(comparison: Comparison) -> Table:
     table = _side_by_side("quantity", comparison.labels, caption)
     table.add_row("status", *(status.replace("_", " ") for status in comparison.statuses))
     table.add_row("order of contractions", *map(_first_of_order, comparison.orders))
-    for field, (label, *look) in COMPARISON_ROWS.items():
+    for field, row in COMPARISON_ROWS.items():
         values = comparison.numbers.get(field, ())
         if any(value is not None for value in values):
             shares = (_percents(share, lambda percent: f"{percent:+.1f}") for share in comparison.differences(field))
             below = (f"\n({share})" if share else "" for share in shares)
-            table.add_row(label, *(quantity(v, *look) + more for v, more in zip(values, below, strict=True)))
+            table.add_row(row[0], *(quantity(v, *row[1:]) + more for v, more in zip(values, below, strict=True)))
     return table
 
 
@@ -238,12 +238,12 @@ def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, st
     cells = [("segment at onset (s)", onsets + more or "none", "order"), ("wave 1-2-..-N", wave, "wave")]
     # A planar worm has one sensor per segment, and no name for it.
     sensor = f", {config.body.springs.first_sensor}" if isinstance(config.body, WormBody) else ""
-    for field, (label, *look) in SUMMARY_ROWS.items():
-        if sensor or ", mean" not in label:
-            text = quantity(getattr(numbers, field), *look)
+    for field, row in SUMMARY_ROWS.items():
+        if sensor or ", mean" not in row[0]:
+            text = quantity(getattr(numbers, field), *row[1:])
             if field == "period_s" and numbers.period_std_s is not None:
                 text += f" (std {numbers.period_std_s:.3f} s)"
-            cells.append((label.replace(", first helix", sensor), text, field))
+            cells.append((row[0].replace(", first helix", sensor), text, field))
     rows = [
         (label, ours, _theirs(field, beside.get(field)), _deviation(field, numbers, beside.get(field)))
         for label, ours, field in cells

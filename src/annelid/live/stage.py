@@ -75,9 +75,13 @@ class Stage:
                 ("springs", first.springs, first.spring_colors, SPRING_PIXELS),
             )
         )
-        head = {"head_radius": 0.009, "head_length": 0.022}
         self._contacts = scene.add_arrows(
-            f"{_ROOT}/contacts", first.contacts, CONTACT_COLOR, shaft_radius=0.0035, **head
+            f"{_ROOT}/contacts",
+            first.contacts,
+            CONTACT_COLOR,
+            shaft_radius=0.0035,
+            head_radius=0.009,
+            head_length=0.022,
         )
         assert isinstance(config.body, WormBody)
         heading = config.body.heading_deg

@@ -11,7 +11,7 @@ from annelid.analysis.summary import summary
 from annelid.config import RunConfig, field_value, fields_of
 from annelid.simulation.runfile import Run
 
-Number = float | Sequence[float | None] | None  # one number, one a segment, or None for what a run does not have
+Number = float | Sequence[float | None] | None  # one number, one per segment, or None for what a run does not have
 
 _NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
 # Fields of the configuration that change nothing in a run.
@@ -71,7 +71,7 @@ def compare(runs: Sequence[Run]) -> Comparison:
 
 
 def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
-    """Returns a short distinct name for each run: its folder's name, or as much of its path as tells them apart."""
+    """Returns a short distinct name for each run: its folder's name, or as much of its path as makes it distinct."""
     parts = [run.path.absolute().parent.parts for run in runs]
     for depth in range(1, max(map(len, parts)) + 1):
         labels = tuple("/".join(part[-depth:]) for part in parts)

@@ -253,7 +253,7 @@ class Continuous:
         return state + weight * (2.0 * first + 3.0 * second + 4.0 * third) / 9.0
 
     def _held(self, state: Array, switches: Switches, change: Array) -> Array:
-        """The change at a stage; where the stage is past a move of a switch, the one before, as if it held still."""
+        """The change at a stage; where the stage is past a move of a switch, the one before, as if it did not move."""
         here, seen = self._change(state, switches)
         return np.where((seen != switches).any(axis=1, keepdims=True), change, here)
 

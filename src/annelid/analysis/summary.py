@@ -29,7 +29,7 @@ class Summary:
         name: Name of the configuration.
         status: How the run ended, as the run file says.
         n_segments: Number of actuated segments.
-        duration_s: Simulated time that the file holds, s.
+        duration_s: Simulated time in the file, s.
         real_time_factor: Simulated time over wall-clock time.
         order: Segments (from 1) in the order of their contractions.
         onsets_s: Times of those contractions, s, aligned with ``order``.
@@ -161,7 +161,7 @@ def summary(run: Run) -> Summary:
 
 
 def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[Array]:
-    """Forces of all samples in which the muscle itself is contracted, an array a segment; empty without forces.
+    """Forces of all samples in which the muscle itself is contracted, an array per segment; empty without forces.
 
     The short transient at each onset is in there: it sets the peak and hardly moves the median.
     """

@@ -156,7 +156,7 @@ def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
     if (energy := numbers.energy) is not None:
         rows.append(("muscles' net work, whole run", f"{energy.muscle_work_J:.2f} J"))
         parts = {
-            "held": energy.kinetic_J + energy.elastic_J + (energy.potential_J or 0.0),
+            "stored": energy.kinetic_J + energy.elastic_J + (energy.potential_J or 0.0),
             "slip": energy.slip_J,
             "other constraints": energy.constraints_J,
             "damping": energy.damping_J,
@@ -234,7 +234,7 @@ def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, st
     onsets = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
     more = f", and {len(pairs) - _ONSETS_SHOWN} more" if len(pairs) > _ONSETS_SHOWN else ""
     cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
-    wave = f"yes, {cycles}" if numbers.wave else "too short to tell" if numbers.wave is None else f"no ({cycles})"
+    wave = f"yes, {cycles}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({cycles})"
     cells = [("segment at onset (s)", onsets + more or "none", "order"), ("wave 1-2-..-N", wave, "wave")]
     # A planar worm has one sensor per segment, and no name for it.
     sensor = f", {config.body.springs.first_sensor}" if isinstance(config.body, WormBody) else ""

@@ -37,7 +37,7 @@ _ROW, _KEY_COLUMNS, _KEY_UNIT_IN = 0.62, (0.56, 6.22, 11.33), 0.45  # the key's 
 
 
 def abbreviations(names: Iterable[str]) -> dict[str, str]:
-    """Shortens names, without their segments' numbers, to three letters or as many as tell them apart."""
+    """Shortens names, without their segments' numbers, to three letters, or more where these are not distinct."""
     roles = list(dict.fromkeys(role_of(name) for name in names))
     short: dict[str, str] = {}
     for role in roles:

@@ -122,7 +122,8 @@ def gait(run: Run) -> Gait:
     length_m = data.attrs.get("body_length_m")
     mass_kg, arena = data.attrs.get("total_mass_kg"), run.config.arena
     push_J = None if mass_kg is None or arena is None else mass_kg * arena.gravity_m_per_s2 * path
-    positive_J, net_J = (None if work is None else float(work.sum()) for work in (positive_work(data), net_work(data)))
+    works = (muscle_work(data, positive=positive) for positive in (True, False))
+    positive_J, net_J = (None if work is None else float(work.sum()) for work in works)
     slid_m = float(np.ptp(data["slip_distance"].values, axis=0).mean()) if "slip_distance" in data else None
     touches = (data["contact_force"] != 0.0).any("axis") if "contact_force" in data else None
     angles = np.unwrap(np.arctan2(headings[:, 1], headings[:, 0]))
@@ -168,24 +169,13 @@ def _summed_gain(data: xr.Dataset, name: str) -> float:
     return float(np.sum(ends[1]) - np.sum(ends[0]))
 
 
-def net_work(data: xr.Dataset) -> Array | None:
+def muscle_work(data: xr.Dataset, *, positive: bool = False) -> Array | None:
     """Returns the work of every muscle on the body from a run's first sample to its last, J, ``(n_muscles,)``.
 
-    What a muscle takes up while it is lengthened is subtracted; without a recorded sum it is force over shortening.
+    What a muscle takes up while it is lengthened is subtracted, or with ``positive`` not regained. Where no such sum is
+    recorded, the changes from sample to sample are added; without work they are force over shortening, or None.
     """
-    return _work(data, "muscle_work", -np.inf)
-
-
-def positive_work(data: xr.Dataset) -> Array | None:
-    """Returns the work of every muscle while it was positive, J, ``(n_muscles,)``: nothing is regained.
-
-    Without a recorded sum, positive changes of the work from sample to sample are added, which is less.
-    """
-    return _work(data, "positive_work", 0.0)
-
-
-def _work(data: xr.Dataset, recorded: str, least_J: float) -> Array | None:
-    """A recorded sum's gain; else the sum of the work between samples, none of which counts as less than the least."""
+    recorded, least_J = ("positive_work", 0.0) if positive else ("muscle_work", -np.inf)
     if not data.sizes.get("time"):
         return None
     if recorded in data:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.analysis.gait import net_work, positive_work
+from annelid.analysis.gait import muscle_work
 from annelid.analysis.rhythm import CONTRACTED, Rhythm, run_rhythm
 from annelid.analysis.track import forward_position
 from annelid.protocols import Array
@@ -147,8 +147,8 @@ def summary(run: Run) -> Summary:
         contraction_force_peak_N=_number(pulling.max()) if pulling.size else None,
         segment_force_median_N=_numbers([np.median(one) if one.size else None for one in forces] or None),
         segment_force_peak_N=_numbers([one.max() if one.size else None for one in forces] or None),
-        positive_work_J=_by_segment(positive_work(data), n_segments),
-        muscle_work_J=_by_segment(net_work(data), n_segments),
+        positive_work_J=_by_segment(muscle_work(data, positive=True), n_segments),
+        muscle_work_J=_by_segment(muscle_work(data), n_segments),
         travel_m=None if ahead is None else _number(ahead[-1] - ahead[0]),
         travel_path_m=None if ahead is None else _number(np.abs(np.diff(ahead)).sum()),
         ring_length_min_m=_number(shortest),

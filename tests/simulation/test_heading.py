@@ -12,8 +12,7 @@ from small_robot import assert_equal, small_config
 
 from annelid import load_config, simulate, simulate_batch
 from annelid.analysis import summary
-from annelid.analysis.gait import gait
-from annelid.analysis.slip import slip_cost
+from annelid.analysis.gait import gait, slip_cost
 from annelid.analysis.track import track_of
 from annelid.body.mjcf import mjcf_text
 from annelid.draw.camera import VIEWS_DEG, view_angles

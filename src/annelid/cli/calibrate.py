@@ -57,7 +57,7 @@ def calibrate_command(
     annelid calibrate --set body.springs.stiffness_N_per_m=24.5 --set body.springs.rest_length_m=0.065
     annelid calibrate --free young_modulus --free dry_friction --data mine.csv
     """
-    from annelid.draw.lines import load_frame_figure
+    from annelid.draw.figures.experiments import load_frame_figure
     from annelid.experiment.calibration.fit import DEFAULT_FREE, calibrate
     from annelid.experiment.calibration.loop import read_loop
     from annelid.experiment.calibration.report import EQUAL_STIFFNESS, fit_tables, write_calibration

@@ -149,7 +149,7 @@ def doctor(
     from annelid.draw.doctor import examine
 
     if report:
-        from annelid.draw.bug_report import bug_report
+        from annelid.draw.doctor import bug_report
 
         typer.echo(bug_report(list(examine())))
         return

@@ -51,7 +51,7 @@ def load_frame_command(
     annelid experiment load-frame
     annelid experiment load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
-    from annelid.draw.lines import load_frame_figure
+    from annelid.draw.figures.experiments import load_frame_figure
     from annelid.experiment.calibration.frame import load_frame
     from annelid.experiment.calibration.loop import MM, cable_force, read_loop
     from annelid.experiment.calibration.report import frame_table, write_loop

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.config import field_value
-from annelid.draw.figures.tuning import Mark, pareto_figure, progress_figure
+from annelid.draw.figures.experiments import Mark, pareto_figure, progress_figure
 from annelid.experiment.case import extend
 from annelid.experiment.tune.judge import Objective
 from annelid.experiment.tune.search import START, Task, Trial, best, compromise, front

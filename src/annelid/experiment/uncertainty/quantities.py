@@ -39,7 +39,7 @@ class Reading:
 def readings(numbers: Summary) -> list[Reading]:
     """Picks from a summary what gets error bars.
 
-    Elongations stand in both readings (`annelid.analysis.elongation`), "mean" and "pp"; speed is travel over duration.
+    Elongations stand in both readings (`annelid.analysis.summary`), "mean" and "pp"; speed is travel over duration.
     """
     found = [Reading("period_s", "period", "s", numbers.period_s, "s", 1.0, 3)]
     for field, label in (

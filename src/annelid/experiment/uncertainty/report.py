@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from annelid.config import field_value
-from annelid.draw.figures.uncertainty import Panel, uncertainty_figure
+from annelid.draw.figures.experiments import Panel, uncertainty_figure
 from annelid.experiment.uncertainty.parameters import UNMEASURED, scaled_fields
 from annelid.experiment.uncertainty.quantities import Quantity
 from annelid.experiment.uncertainty.study import Uncertainty, VariantRun

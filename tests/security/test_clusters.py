@@ -24,7 +24,7 @@ from annelid.cli import app
 from annelid.config import find_cluster
 from annelid.config.cluster import Slurm
 from annelid.errors import ClusterError, ConfigError
-from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, attempt
+from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, attempt, own_code
 from annelid.experiment.case import Case
 from annelid.experiment.cluster import slurm_cluster
 from annelid.experiment.store import Store, case_key
@@ -233,7 +233,8 @@ def sent(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     store = Store(tmp_path_factory.mktemp("runs"))
     found = []
     for case in (CASE, OTHER):
-        content = attempt(replace(store._task(case, "mark"), home="elsewhere"))
+        name, config = store.path(case).name, case.config.model_dump_json()
+        content = attempt(Task(name, config, own_code(), "elsewhere", "mark", "runs"))
         assert content is not None
         found.append(content)
     return found

@@ -64,10 +64,7 @@ def own_code() -> tuple[str, str]:
 
 
 def attempt(task: Task) -> bytes | None:
-    """Computes a run and publishes it in its store.
-
-    Returns:
-        None; or the content of the file to send, where the store's folder is not that of this machine.
+    """Computes a run and publishes it in its store; returns the file to send where its folder is not on this machine.
 
     Raises:
         ClusterError: This worker has other code.
@@ -79,30 +76,23 @@ def attempt(task: Task) -> bytes | None:
             f"the worker on {platform.node()} has other code: install the same versions of annelid, mujoco-core and "
             "numpy as on this machine"
         )
-    home = Path(task.home)
-    folder = home / task.name
+    home, config = Path(task.home), RunConfig.model_validate_json(task.config)
     if not _is_shared(home, task.mark):
         with tempfile.TemporaryDirectory(prefix="annelid-") as away:
-            compute_run(RunConfig.model_validate_json(task.config), Path(away), task.keep)
+            compute_run(config, Path(away), task.keep)
             return (Path(away) / SENT[task.keep]).read_bytes()
     try:
-        with _draft_of(folder, task.keep) as draft:
-            compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
+        with _draft_of(home / task.name, task.keep) as draft:
+            compute_run(config, draft, task.keep)
     except OSError:
         # Where another attempt has won, this one's folder may have been cleared away under it.
-        if stored_outcome(folder, task.keep) is None:
+        if stored_outcome(home / task.name, task.keep) is None:
             raise
     return None
 
 
 def fetch_results(content: bytes, folder: Path, config: RunConfig, keep: Keep) -> None:
-    """Publishes a run that was computed on another machine, once its file is seen to be of this run.
-
-    Args:
-        content: What the worker sent.
-        folder: Of the run in the store.
-        config: Of the run.
-        keep: What is kept.
+    """Publishes a run that a worker on another machine sent, once its file is seen to be of this run.
 
     Raises:
         ClusterError: It is no file, too large, damaged, or of another run.
@@ -148,19 +138,17 @@ def compute_run(config: RunConfig, folder: Path, keep: Keep = "runs") -> None:
 
 def keep_outcome(run: Run) -> Outcome:
     """Reads the outcome of a run, and writes it beside the run."""
-    read = outcome(run)
-    folder = run.path.parent
-    draft = folder / f".{OUTCOME_NAME}.{uuid.uuid4().hex[:8]}.part"
+    read, folder = outcome(run), run.path.parent
+    draft = new_draft(folder / OUTCOME_NAME)
     write_outcome(read, draft, code_fingerprint(*READERS))
     draft.replace(folder / OUTCOME_NAME)
     return read
 
 
 def stored_outcome(folder: Path, keep: Keep = "runs") -> Outcome | None:
-    """Returns the outcome of the run in a folder, read again where its file is damaged or other code has read the run.
+    """Returns the outcome of a folder's run; None where there is no whole run, or not all of it that is to be kept.
 
-    Returns:
-        The outcome; None where there is no whole run, or not all of it that is to be kept.
+    It is read again where its file is damaged or other code has read the run.
     """
     if keep == "runs" and not (folder / FILE_NAME).exists():
         return None
@@ -201,9 +189,9 @@ def publish(draft: Path, folder: Path, keep: Keep) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def new_draft(folder: Path) -> Path:
-    """Returns a name for an attempt's own folder beside that of the run."""
-    return folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}.part")
+def new_draft(path: Path) -> Path:
+    """Returns a name for an attempt's own file or folder beside that which it is of."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")
 
 
 def run_of_draft(draft: Path) -> Path:

@@ -44,7 +44,7 @@ def workers_of(cluster: settings.Cluster, jobs: int | None = None) -> Workers:
         jobs: How many, instead of what the cluster says; has no effect on a scheduler elsewhere.
 
     Raises:
-        ClusterError: Jobs of Slurm are asked for where there is none.
+        ClusterError: Jobs of Slurm are asked for where there is no Slurm.
     """
     if isinstance(cluster, settings.Pool):
         return Processes(jobs or cluster.workers, cluster.retries)
@@ -56,20 +56,14 @@ def workers_of(cluster: settings.Cluster, jobs: int | None = None) -> Workers:
 class DaskWorkers(Workers):
     """The workers of one scheduler."""
 
-    def __init__(self, retries: int) -> None:
-        """Prepares; nothing starts before the first run."""
-        self.retries = retries
+    def __init__(self, retries: int, where: str) -> None:
+        self.retries, self._where = retries, where
         self._client: Client | None = None
         self._counted: tuple[float, int] = (-float("inf"), 0)
 
     @abstractmethod
     def _join(self) -> Client:
         """Starts or finds the scheduler and returns a client of it."""
-
-    @property
-    @abstractmethod
-    def _where(self) -> str:
-        """Says in words where the scheduler is."""
 
     def slots(self) -> int:
         """Returns how many workers there are now; 0 while the scheduler is gone.
@@ -84,7 +78,7 @@ class DaskWorkers(Workers):
             except ImportError:
                 raise MissingDependency(MISSING) from None
             self._client = self._join()
-            self._greet(threads_of(self._client))
+            self._warn_of_workers(_threads_of(self._client))
         if self._client.status == "closed":
             raise ClusterError(
                 f"the scheduler {self._where} is gone: finished runs are kept, so call again once it is back"
@@ -96,8 +90,7 @@ class DaskWorkers(Workers):
 
     def submit(self, task: Task) -> Result:
         """Has a run computed by one of the workers."""
-        if self._client is None:
-            raise ClusterError("no scheduler has been joined yet")
+        assert self._client is not None
         return self._client.get_executor(pure=False).submit(attempt, task)
 
     def explained(self, error: Exception) -> Exception:
@@ -123,12 +116,12 @@ class DaskWorkers(Workers):
         if client.status != "running":
             return 0
         try:
-            return len(threads_of(client))
+            return len(_threads_of(client))
         # The scheduler is going away right now: the connection breaks, or the client's own loop has ended.
         except (OSError, RuntimeError, CancelledError):
             return 0
 
-    def _greet(self, threads: dict[str, int]) -> None:
+    def _warn_of_workers(self, threads: dict[str, int]) -> None:
         if any(count > 1 for count in threads.values()):
             warnings.warn(
                 f"workers of {self._where} have several threads, of which runs use one: start them with "
@@ -141,13 +134,8 @@ class SchedulerWorkers(DaskWorkers):
     """The workers of a scheduler that is running somewhere."""
 
     def __init__(self, cluster: settings.Scheduler) -> None:
-        """Prepares to join it."""
-        super().__init__(cluster.retries)
+        super().__init__(cluster.retries, cluster.address)
         self._cluster = cluster
-
-    @property
-    def _where(self) -> str:
-        return self._cluster.address
 
     def _join(self) -> Client:
         from distributed import Client
@@ -162,41 +150,39 @@ class SchedulerWorkers(DaskWorkers):
         except (OSError, ValueError, TypeError) as error:
             raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
 
-    def _greet(self, threads: dict[str, int]) -> None:
+    def _warn_of_workers(self, threads: dict[str, int]) -> None:
         if not threads:
             warnings.warn(
                 f"{self._where} has no workers yet: waiting for  {START_WORKERS.replace('ADDRESS', self._where)}",
                 stacklevel=2,
             )
-        super()._greet(threads)
+        super()._warn_of_workers(threads)
 
 
 class SlurmWorkers(DaskWorkers):
     """Workers in jobs of Slurm, under a scheduler in this process; a job that ends is followed by another."""
 
     def __init__(self, cluster: settings.Slurm) -> None:
-        """Prepares to submit the jobs.
-
-        Raises:
-            ClusterError: There is no Slurm here.
-        """
         if shutil.which(SBATCH) is None:
             raise ClusterError(
                 f"cluster 'slurm': there is no program {SBATCH} here: call this where jobs of Slurm are submitted, or "
                 "take --cluster processes"
             )
-        super().__init__(cluster.retries)
+        super().__init__(cluster.retries, "in this process")
         self._settings = cluster
         self._cluster: Cluster | None = None
 
-    @property
-    def _where(self) -> str:
-        return "in this process"
-
     def _join(self) -> Client:
+        from dask import config
         from distributed import Client
 
-        with _quiet(self.retries):
+        taken_over = {
+            "distributed.scheduler.allowed-failures": self.retries,
+            # One run a worker: one that dies is counted against its own run only.
+            "distributed.scheduler.worker-saturation": 1.0,
+            "distributed.worker.daemon": True,
+        }
+        with config.set(taken_over):
             cluster = self._cluster = slurm_cluster(self._settings)
         cluster.adapt(minimum_jobs=self._settings.jobs, maximum_jobs=self._settings.jobs)
         return Client(cluster)
@@ -212,7 +198,7 @@ class SlurmWorkers(DaskWorkers):
 def slurm_cluster(of: settings.Slurm) -> Any:
     """Starts a scheduler in this process that can submit jobs to Slurm; none is submitted yet.
 
-    It must be reached over the network. It speaks TLS with a key made for this one process, which the jobs read from
+    It must be reached over the network, so it speaks TLS with a key made for this one process, which the jobs read from
     files in the user's home folder that nobody else may read.
 
     Raises:
@@ -243,11 +229,7 @@ def slurm_cluster(of: settings.Slurm) -> Any:
 
 
 async def _greet_scheduler(address: str, seconds: float) -> None:
-    """Shakes hands with a scheduler: Dask's client would wait for ever for one that accepts and is silent.
-
-    Raises:
-        OSError: There is none that answers.
-    """
+    """Shakes hands with a scheduler: Dask's client would wait for ever for one that accepts and is silent."""
     from distributed import Security
     from distributed.comm.core import connect
 
@@ -256,21 +238,7 @@ async def _greet_scheduler(address: str, seconds: float) -> None:
     comm.abort()
 
 
-def threads_of(client: Client) -> dict[str, int]:
-    """Returns the number of threads of every worker by its address."""
+def _threads_of(client: Client) -> dict[str, int]:
+    """Number of threads of every worker by its address."""
     threads: Any = client.nthreads()
     return threads
-
-
-def _quiet(retries: int) -> Any:
-    """Sets what a scheduler in this process takes over when it starts."""
-    from dask import config
-
-    return config.set(
-        {
-            "distributed.scheduler.allowed-failures": retries,
-            # One run a worker: one that dies is counted against its own run only.
-            "distributed.scheduler.worker-saturation": 1.0,
-            "distributed.worker.daemon": True,
-        }
-    )

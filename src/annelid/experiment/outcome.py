@@ -44,7 +44,7 @@ class Outcome:
         rhythm: The score of its rhythm.
         holds: Readings of its open-loop contractions, in the order of the program; empty in closed loop.
         message: Why it ended before its time; empty if it did not.
-        gait: How the worm gets along.
+        gait: Its locomotion metrics.
         cpu_time_s: Processor time that the run took, s, whatever else the machine did; 0 where it is not known.
     """
 
@@ -93,14 +93,13 @@ def read_outcome(path: Path, reader: str) -> Outcome:
         OSError: There is no such file.
     """
     try:
-        held = _Written.model_validate_json(path.read_bytes())
+        content = _Written.model_validate_json(path.read_bytes())
     except ValidationError as error:
         wrong = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        part = ".".join(map(str, wrong["loc"]))
-        raise ValueError(f"{path} is no outcome: {part}: {wrong['msg']}") from None
-    if held.reader != reader:
+        raise ValueError(f"{path} is no outcome: {'.'.join(map(str, wrong['loc']))}: {wrong['msg']}") from None
+    if content.reader != reader:
         raise ValueError(f"{path} was read by other code")
-    return Outcome(path.parent, **{name: value for name, value in held if name != "reader"})
+    return Outcome(path.parent, **{name: value for name, value in content if name != "reader"})
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:
@@ -108,30 +107,24 @@ def _holds(run: Run) -> tuple[Hold, ...]:
     if not contractions or not data.sizes.get("time"):
         return ()
     times = data["time"].values
-    n_segments = run.config.body.n_segments
+    shape = len(times), run.config.body.n_segments, -1
     above_rest = data["stretch_length"].values - data["stretch_rest_length"].values
-    ring = data["ring_length"].values.reshape(len(times), n_segments, -1).sum(axis=2)
-    force = _segment_means(data["muscle_force"].values, n_segments) if "muscle_force" in data else None
+    ring = data["ring_length"].values.reshape(shape).sum(axis=2)
+    force = data["muscle_force"].values.reshape(shape).mean(axis=2) if "muscle_force" in data else None
     holds = []
     for contraction in contractions:
-        within = np.flatnonzero(times <= contraction.stop_s + 1e-9)
         if times[-1] < contraction.stop_s - 2 * float(np.diff(times).max(initial=0.0)):
             continue
-        last, segment = within[-1], contraction.segment - 1
-        gap = float(data["pin_gap"].values[last]) if "pin_gap" in data else None
+        last, segment = np.flatnonzero(times <= contraction.stop_s + 1e-9)[-1], contraction.segment - 1
         holds.append(
             Hold(
                 contraction.segment,
                 tuple(above_rest[last].mean(axis=1).tolist()),
                 tuple(above_rest[last, :, 0].tolist()),
                 float(ring[last, segment]),
-                gap,
+                float(data["pin_gap"].values[last]) if "pin_gap" in data else None,
                 # The activation ends with the step that leads to the last sample; the force is of the one before.
                 None if force is None else float(force[max(last - 1, 0), segment]),
             )
         )
     return tuple(holds)
-
-
-def _segment_means(values: np.ndarray, n_segments: int) -> np.ndarray:
-    return values.reshape(len(values), n_segments, -1).mean(axis=2)

@@ -37,7 +37,6 @@ class Interval:
     whole: bool = False
 
     def __contains__(self, value: Any) -> bool:
-        """Whether a value lies in the range."""
         return isinstance(value, int | float) and self.low <= value <= self.high
 
     def rounded(self, value: float) -> float | int:
@@ -49,18 +48,12 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of several values.
-
-    Attributes:
-        field: Dotted path of the field.
-        values: The values: numbers, words, or lists of these.
-    """
+    """One of several values: numbers, words, or lists of these."""
 
     field: str
     values: tuple[Any, ...]
 
     def __contains__(self, value: Any) -> bool:
-        """Whether a value is one of them."""
         return value in self.values
 
 
@@ -105,19 +98,10 @@ def sampled(variable: Variable, share: float) -> Any:
 
 
 def unit_samples(design: Design, n: int, n_variables: int, seed: int) -> Array:
-    """Draws samples of the unit cube.
+    """Draws samples of the unit cube, ``(n, n_variables)``, that depend on the seed alone.
 
-    They depend on the seed alone. Those of a random or a Sobol design begin alike however many are drawn, so that more
-    of them leave the earlier runs as they are; those of a Latin hypercube do not.
-
-    Args:
-        design: ``"random"``, ``"lhs"`` or ``"sobol"``.
-        n: How many.
-        n_variables: Dimensions of the cube.
-        seed: Of the samples.
-
-    Returns:
-        Places in [0, 1), ``(n, n_variables)``.
+    Those of a random or a Sobol design begin alike however many are drawn, so that more of them leave the earlier runs
+    as they are; those of a Latin hypercube do not.
     """
     rng = np.random.default_rng(seed)
     if design == "random":

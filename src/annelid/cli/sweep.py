@@ -47,15 +47,14 @@ def sweep_command(
     if example:
         from importlib.resources import files
 
-        typer.echo((files("annelid.experiment.sweep") / "example.toml").read_text(encoding="utf-8"), nl=False)
+        typer.echo((files("annelid.experiment") / "sweep_example.toml").read_text(encoding="utf-8"), nl=False)
         return
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
     from annelid.experiment.progress import study_progress
     from annelid.experiment.sweep import swept
-    from annelid.experiment.sweep.dataset import dataset_of
-    from annelid.experiment.sweep.results import results_table, write_results
+    from annelid.experiment.sweep_results import results_table, write_results
 
     loaded = load_study(study)
     if samples is not None:
@@ -64,8 +63,6 @@ def sweep_command(
     with going_on(output / "runs"), study_progress(quiet=quiet) as progress:
         to_use = f"add --cluster {shlex.quote(str(study))}"
         done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
-    data = dataset_of(done)
-    written = write_results(done, data)
-    print_results(written, results_table(done, data), quiet=quiet)
+    print_results(write_results(done), results_table(done), quiet=quiet)
     failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
     end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)

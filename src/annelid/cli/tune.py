@@ -69,10 +69,9 @@ def tune_command(
     annelid run tune/best.toml
     """
     from annelid.experiment.case import Case
-    from annelid.experiment.tune.judge import objectives_of
-    from annelid.experiment.tune.results import HISTORY, chosen, results_table, write_results
-    from annelid.experiment.tune.search import Task, Trial, search
-    from annelid.experiment.tune.space import variables_of
+    from annelid.experiment.objectives import objectives_of
+    from annelid.experiment.tune import Task, Trial, leader, search, variables_of
+    from annelid.experiment.tune_results import HISTORY, results_table, write_results
     from annelid.plausibility import refuse_nonsense
 
     changes, objectives = overrides_of(assignments, duration_s=duration), objectives_of(objective or ["speed"])
@@ -89,6 +88,6 @@ def tune_command(
             written = write_results(task, found, typed_command(), output)
     print_results(written, results_table(task, found), quiet=quiet)
     end_study(len(found), sum(trial.failed for trial in found), output / HISTORY)
-    if chosen(task, found) is None:
+    if leader(found, objectives) is None:
         complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / HISTORY}")
         raise typer.Exit(EXIT_ALL_FAILED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 
@@ -20,24 +20,24 @@ class Objective:
     Attributes:
         name: As a user gives it.
         label: With its unit, for axes and tables.
-        better: "more" or "less".
+        number: The gait's number by its name in `Gait`.
+        more_is_better: Whether it is.
         penalty: What counts for a run that does not walk.
-        read: Reads it from a gait's numbers.
     """
 
     name: str
     label: str
-    better: str
+    number: str
+    more_is_better: bool
     penalty: float
-    read: Callable[[Gait], float | None]
 
 
 OBJECTIVES: Mapping[str, Objective] = {
     one.name: one
     for one in (
-        Objective("speed", "speed (m/s)", "more", 0.0, lambda gait: gait.speed_m_per_s),
-        Objective("cost-of-transport", "cost of transport", "less", 100.0, lambda gait: gait.cost_of_transport),
-        Objective("slip", "slip ratio", "less", 10.0, lambda gait: gait.slip_ratio),
+        Objective("speed", "speed (m/s)", "speed_m_per_s", True, 0.0),
+        Objective("cost-of-transport", "cost of transport", "cost_of_transport", False, 100.0),
+        Objective("slip", "slip ratio", "slip_ratio", False, 10.0),
     )
 }
 """The objectives. The cost of transport counts positive work, none of it regained. The penalties are worse than any
@@ -49,7 +49,7 @@ class Judged:
     """What was found of one run.
 
     Attributes:
-        gait: Its numbers; None where it does not walk.
+        gait: Its numbers; None where it was stopped or could not be computed.
         problem: Why it does not count as a gait; empty if it does.
     """
 
@@ -58,12 +58,12 @@ class Judged:
 
     def value(self, objective: Objective) -> float:
         """Returns the value of an objective, its penalty for a run that does not walk."""
-        value = None if self.gait is None or self.problem else objective.read(self.gait)
+        value = None if self.gait is None or self.problem else getattr(self.gait, objective.number)
         return objective.penalty if value is None or not isfinite(value) else value
 
     def score(self, objective: Objective) -> float:
         """Returns the value of an objective, signed so that less is better."""
-        return -self.value(objective) if objective.better == "more" else self.value(objective)
+        return -self.value(objective) if objective.more_is_better else self.value(objective)
 
 
 def objectives_of(names: list[str]) -> list[Objective]:
@@ -80,24 +80,24 @@ def objectives_of(names: list[str]) -> list[Objective]:
     return [OBJECTIVES[name] for name in names]
 
 
-def judge(outcome: Outcome, gait: Gait | None) -> Judged:
+def judge(outcome: Outcome) -> Judged:
     """Judges a run: it must have ended whole, in order, over at least two cycles, and advance.
 
     In order are neighbours that take turns with steady periods and lags; onsets need not be evenly spaced.
     """
-    return Judged(gait, _problem(outcome, gait))
+    return Judged(None if outcome.message else outcome.gait, _problem(outcome))
 
 
-def _problem(outcome: Outcome, gait: Gait | None) -> str:
-    rhythm = outcome.rhythm
+def _problem(outcome: Outcome) -> str:
+    rhythm, gait = outcome.rhythm, outcome.gait
     if outcome.message:
         return f"stopped: {outcome.message}"
     if rhythm.verdict == "silent":
         return f"silent: {rhythm.reason}"
     if not rhythm.is_regular:
         return f"out of order: {rhythm.reason}"
-    if gait is None or gait.cycles < LEAST_CYCLES:
-        return f"fewer than {LEAST_CYCLES} whole cycles"
+    if gait.cycles < LEAST_CYCLES:
+        return f"fewer than {LEAST_CYCLES} complete cycles"
     if gait.speed_m_per_s is None or not gait.speed_m_per_s > 0.0:
         return "does not advance"
     return ""

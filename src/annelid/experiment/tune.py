@@ -1,0 +1,240 @@
+"""Tuning a gait: fields of controller and body in ranges or among choices, by speed, cost of transport or slip.
+
+An optimiser asks for generations of gaits, and the store of runs computes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments
+from annelid.errors import ConfigError, suggest
+from annelid.experiment.case import Case
+from annelid.experiment.objectives import Judged, Objective, judge
+from annelid.experiment.optimisers import optimiser_of
+from annelid.experiment.progress import StudyProgress, in_stage
+from annelid.experiment.space import Choice, Interval, Variable, interval
+from annelid.experiment.store import Done, Store, case_key
+
+START = -1
+"""Number of the gait that the search starts from, which is no trial."""
+LOG = "log"
+HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
+
+
+def variables_of(texts: Sequence[str], config: RunConfig) -> list[Variable]:
+    """Reads what is varied, as `parse_variable` does; where nothing is given, the fields of the controller's timing.
+
+    Raises:
+        ConfigError: As of `parse_variable`, a field is given twice, or the controller has no timing of its own.
+    """
+    kind, tuned = config.controller.kind, config.controller.tuned
+    if not texts and not tuned:
+        raise ConfigError(f"controller.kind = {kind!r} has no fields that are varied by default: {HOW} with --vary")
+    variables = [parse_variable(text, config) for text in texts or tuned]
+    fields = [variable.field for variable in variables]
+    for each in fields:
+        if fields.count(each) > 1:
+            raise ConfigError(f"{each} is varied twice: {HOW} once for each field")
+    return variables
+
+
+def parse_variable(text: str, config: RunConfig) -> Variable:
+    """Reads one variable.
+
+    Args:
+        text: ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log`` for a number, whole where the field's own value is;
+            ``FIELD=VALUE,VALUE,..`` for choices, each as TOML or plain text.
+        config: The configuration that the fields are of.
+
+    Raises:
+        ConfigError: The text is malformed, there is no such field, or a value is out of the field's range.
+    """
+    path, equals, right = (part.strip() for part in text.partition("="))
+    if not equals or not right:
+        raise ConfigError(f"{text!r} says nothing to vary: {HOW}")
+    known = fields_of(config)
+    if path not in known:
+        raise ConfigError(f"unknown field {path!r}: {suggest(path, known)}")
+    variable = _choice(path, right) if ":" not in right else _interval(path, right, field_value(config, path))
+    for end in variable.values if isinstance(variable, Choice) else (variable.low, variable.high):
+        load_config(config.model_dump(), {path: int(end) if getattr(variable, "whole", False) else end})
+    return variable
+
+
+def _choice(path: str, text: str) -> Choice:
+    # As TOML: brackets of a list keep its commas together.
+    listed = parse_assignments([f"{path}=[{text}]"])[path]
+    values = listed if isinstance(listed, list) else [word.strip() for word in text.split(",")]
+    if len(values) < 2:
+        raise ConfigError(f"{path}={text}: one value is no choice: {HOW}")
+    return Choice(path, tuple(values))
+
+
+def _interval(path: str, text: str, present: Any) -> Interval:
+    low_text, high_text, *rest = (part.strip() for part in text.split(":"))
+    try:
+        low, high = float(low_text), float(high_text)
+    except ValueError:
+        raise ConfigError(f"{path}={text}: the ends of a range must be numbers: {HOW}") from None
+    if rest not in ([], [LOG]):
+        raise ConfigError(f"{path}={text}: only 'log' may follow the ends of a range: {HOW}")
+    if not low < high:
+        raise ConfigError(f"{path}={text}: the lower end must be below the upper end")
+    if rest and low <= 0.0:
+        raise ConfigError(f"{path}={text}: a logarithmic range needs a lower end above 0")
+    return interval(path, low, high, present, logarithmic=bool(rest))
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is tuned, and for what.
+
+    Attributes:
+        source: Preset or TOML file.
+        changes: Fields that differ from it in every run.
+        variables: What is varied.
+        objectives: One or two.
+        n_trials: How many runs the search may take.
+        seed: Of the optimiser.
+    """
+
+    source: str
+    changes: Mapping[str, Any]
+    variables: Sequence[Variable]
+    objectives: Sequence[Objective]
+    n_trials: int
+    seed: int = 0
+
+    @property
+    def start(self) -> Case:
+        """The run that the search starts from."""
+        return Case(self.source, self.changes)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of a search.
+
+    Attributes:
+        number: Its number, from 0; `START` for the gait that the search starts from.
+        values: Values of the variables, by field.
+        case: The run.
+        judged: What was found.
+        path: Folder of the run.
+        failed: Whether it could not be computed, though it could be built.
+    """
+
+    number: int
+    values: Mapping[str, Any]
+    case: Case
+    judged: Judged
+    path: Path = field(compare=False)
+    failed: bool = False
+
+
+def search(
+    task: Task, store: Store, *, jobs: int | None = None, progress: StudyProgress | None = None
+) -> Iterator[list[Trial]]:
+    """Searches, and yields the trials generation by generation; first the start alone.
+
+    One objective over numbers is searched by CMA-ES, which starts at the source's own values if they lie in the ranges;
+    two objectives, or choices among the variables, by a tree-structured Parzen estimator. Generations are asked for and
+    scored in the order of their numbers, so that the search depends on its seed and not on the number of processes:
+    called again it asks for the same gaits, finds those in the store that it has computed, and goes on.
+
+    A run that cannot be built, stops, falls silent or out of order, or does not advance counts as a trial with the
+    objectives' penalties.
+
+    Args:
+        task: What is tuned, and for what.
+        store: Where runs are kept.
+        jobs: Processes; default: one a core.
+        progress: Called as runs finish, with the best so far.
+
+    Raises:
+        MissingDependency: Optuna or cmaes is not installed.
+        AnnelidError: The run that it starts from cannot be built or written.
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    found: list[Trial] = []
+
+    def report(stage: str, done: int, _: int, __: float) -> None:
+        if progress is not None:
+            done += max(len(found) - 1, 0)
+            progress(stage, done, task.n_trials, done / task.n_trials)
+
+    start = task.start
+    own = {one.field: field_value(start.config, one.field) for one in task.variables}
+    inside = all(own[one.field] in one for one in task.variables)
+    optimiser = optimiser_of(task.variables, len(task.objectives), own if inside else None, task.seed)
+    generation = next(optimiser)
+    outcomes = store.compute([start], jobs=jobs, progress=in_stage(report, "the gait it starts from"))
+    found.append(_trial(START, {}, start, Done(outcomes[case_key(start)])))
+    yield list(found)
+    while (done := len(found) - 1) < task.n_trials:
+        values = generation[: task.n_trials - done]
+        cases = [start.but(of_trial) for of_trial in values]
+        results = store.finish(cases, _best_words(task, found), jobs=jobs, progress=report)
+        trials = [_trial(done + i, *of_it) for i, of_it in enumerate(zip(values, cases, results, strict=True))]
+        found += trials
+        yield trials
+        if len(trials) == len(generation):
+            generation = optimiser.send([_scores(trial, task.objectives) for trial in trials])
+
+
+def _trial(number: int, values: Mapping[str, Any], case: Case, done: Done) -> Trial:
+    if done.outcome is not None:
+        return Trial(number, values, case, judge(done.outcome), done.outcome.path)
+    failed = not isinstance(done.error, ConfigError)
+    problem = f"{'failed' if failed else 'cannot be built'}: {done.error}"
+    return Trial(number, values, case, Judged(None, problem), Path(), failed)
+
+
+def _best_words(task: Task, found: Sequence[Trial]) -> str:
+    leaders = {objective: leader(found, [objective]) for objective in task.objectives}
+    words = [f"{one.name} {best.judged.value(one):.3g}" for one, best in leaders.items() if best is not None]
+    return f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
+
+
+def _scores(trial: Trial, objectives: Sequence[Objective]) -> tuple[float, ...]:
+    return tuple(trial.judged.score(objective) for objective in objectives)
+
+
+def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Trial]:
+    """Returns the Pareto front: those that walk and that no other beats in all objectives, by the first of them.
+
+    Of trials with the same run the first is taken: one of them may have the start's own values.
+    """
+    walking: dict[Path, Trial] = {}
+    for trial in trials:
+        if not trial.judged.problem:
+            walking.setdefault(trial.path, trial)
+    scores = {trial.number: _scores(trial, objectives) for trial in walking.values()}
+    kept: list[Trial] = []
+    # Whatever beats a trial comes before it.
+    for trial in sorted(walking.values(), key=lambda trial: (scores[trial.number], trial.number)):
+        mine = scores[trial.number]
+        others = (scores[other.number] for other in kept)
+        if not any(other != mine and all(a <= b for a, b in zip(other, mine, strict=True)) for other in others):
+            kept.append(trial)
+    return kept
+
+
+def leader(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial | None:
+    """Returns the best gait: of the front the nearest to the ideal, every objective scaled to its range on the front.
+
+    Of one objective that is the best of all; None if none walks.
+    """
+    on_front = front(trials, objectives)
+    scores = {trial.number: _scores(trial, objectives) for trial in on_front}
+    spans = [(min(column), max(column)) for column in zip(*scores.values(), strict=True)]
+
+    def distance(trial: Trial) -> float:
+        pairs = zip(scores[trial.number], spans, strict=True)
+        return sum(((score - low) / (high - low or 1.0)) ** 2 for score, (low, high) in pairs)
+
+    return min(on_front, key=distance, default=None)

@@ -57,18 +57,16 @@ def calibrate_command(
     annelid calibrate --set body.springs.stiffness_N_per_m=24.5 --set body.springs.rest_length_m=0.065
     annelid calibrate --free young_modulus --free dry_friction --data mine.csv
     """
-    from annelid.draw.lines import load_frame_figure
-    from annelid.experiment.calibration.fit import DEFAULT_FREE, calibrate
-    from annelid.experiment.calibration.loop import read_loop
-    from annelid.experiment.calibration.report import EQUAL_STIFFNESS, fit_tables, write_calibration
+    from annelid.experiment.calibration import DEFAULT_FREE, EQUAL_STIFFNESS, calibrate, fit_tables, write_calibration
+    from annelid.experiment.load_frame import draw_loops, read_loop
     from annelid.experiment.progress import study_progress
 
     report = output / "calibration.json"
     lock(output)
     refuse_existing(report, force)
     measured = read_loop(data)
-    source, changes = preset, EQUAL_STIFFNESS | overrides_of(assignments)
-    config = config_of(source, dict(changes))
+    changes = EQUAL_STIFFNESS | overrides_of(assignments)
+    config = config_of(preset, dict(changes))
     with study_progress(quiet=quiet) as progress:
         fit = calibrate(
             config,
@@ -78,9 +76,5 @@ def calibrate_command(
             if progress is None
             else lambda loops, rms: progress(f"calibrating, {rms:.2f} N off after {loops} loops", 0, 0, 0.0),
         )
-    loops = {
-        "fitted": (fit.simulated.displacement_m, fit.simulated.force_N),
-        "measured": (measured.displacement_m, measured.force_N),
-    }
-    written = *write_calibration(fit, source, changes, report), load_frame_figure(loops, report.with_suffix(""))
-    print_results(written, *fit_tables(fit), quiet=quiet)
+    picture = draw_loops({"fitted": fit.simulated, "measured": measured}, report.with_suffix(""))
+    print_results((*write_calibration(fit, preset, changes, report), picture), *fit_tables(fit), quiet=quiet)

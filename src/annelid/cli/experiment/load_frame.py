@@ -51,10 +51,15 @@ def load_frame_command(
     annelid experiment load-frame
     annelid experiment load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
-    from annelid.draw.lines import load_frame_figure
-    from annelid.experiment.calibration.frame import load_frame
-    from annelid.experiment.calibration.loop import MM, cable_force, read_loop
-    from annelid.experiment.calibration.report import frame_table, write_loop
+    from annelid.experiment.load_frame import (
+        MM,
+        cable_force,
+        draw_loops,
+        frame_table,
+        load_frame,
+        read_loop,
+        write_loop,
+    )
     from annelid.experiment.progress import study_progress
 
     table = output / "load_frame.csv"
@@ -70,7 +75,6 @@ def load_frame_command(
             progress=None if progress is None else lambda share: progress("load frame", 0, 0, share),
         )
     loop = cable_force(tension, cable_friction)
-    write_loop(loop, tension, table)
-    loops = {config.name: (loop.displacement_m, loop.force_N), "measured": (measured.displacement_m, measured.force_N)}
-    written = table, load_frame_figure(loops, table.with_suffix(""))
-    print_results(written, frame_table({config.name: loop, "measured": measured}), quiet=quiet)
+    loops = {config.name: loop, "measured": measured}
+    written = write_loop(loop, tension, table), draw_loops(loops, table.with_suffix(""))
+    print_results(written, frame_table(loops), quiet=quiet)

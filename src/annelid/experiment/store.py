@@ -142,7 +142,7 @@ class Store:
                 end the call.
 
         Returns:
-            The outcome by its `case_key` of every case but those that failed.
+            The outcome by its `case_key` of every case but those that failed, in the order of the cases.
 
         Raises:
             AnnelidError: A case cannot be built, or its file cannot be written, and ``failed`` is None. A run that a
@@ -178,7 +178,7 @@ class Store:
         for draft in self.folder.glob(DRAFTS):
             if stored_outcome(run_of_draft(draft), self._keep) is not None:
                 shutil.rmtree(draft, ignore_errors=True)
-        return found
+        return {key: found[key] for key in wanted if key in found}
 
     def finish(
         self, cases: Sequence[Case], stage: str, *, jobs: int | None = None, progress: StudyProgress | None = None

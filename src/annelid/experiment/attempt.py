@@ -39,21 +39,14 @@ SENT: Mapping[Keep, str] = {"runs": FILE_NAME, "outcomes": OUTCOME_NAME}
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a worker must know of a run, in plain words.
-
-    Attributes:
-        name: Of the run's folder in the store.
-        config: The configuration as JSON.
-        code: Digests of the code that computes runs and that reads them.
-        home: The store's folder, absolute.
-        mark: The store's mark.
-        keep: What is kept.
-    """
+    """What a worker must know of a run, in plain words: the name of its folder, its configuration as JSON, and more."""
 
     name: str
     config: str
     code: tuple[str, str]
+    """Digests of the code that computes runs and that reads them."""
     home: str
+    """The store's folder, absolute."""
     mark: str
     keep: Keep
 
@@ -77,7 +70,11 @@ def attempt(task: Task) -> bytes | None:
             "numpy as on this machine"
         )
     home, config = Path(task.home), RunConfig.model_validate_json(task.config)
-    if not _is_shared(home, task.mark):
+    try:
+        shared = (home / MARK_NAME).read_text(encoding="utf-8") == task.mark
+    except OSError:
+        shared = False
+    if not shared:
         with tempfile.TemporaryDirectory(prefix="annelid-") as away:
             compute_run(config, Path(away), task.keep)
             return (Path(away) / SENT[task.keep]).read_bytes()
@@ -92,12 +89,7 @@ def attempt(task: Task) -> bytes | None:
 
 
 def fetch_results(content: bytes, folder: Path, config: RunConfig, keep: Keep) -> None:
-    """Publishes a run that a worker on another machine sent, once its file is seen to be of this run.
-
-    Raises:
-        ClusterError: It is no file, too large, damaged, or of another run.
-        OSError: It cannot be written.
-    """
+    """Publishes a run that a worker on another machine sent, once its file is seen to be whole and of this run."""
     name = SENT[keep]
     if not isinstance(content, bytes) or len(content) > MOST_BYTES[name]:
         raise ClusterError(f"a worker sent a {name} that is no file of at most {MOST_BYTES[name]:,} bytes")
@@ -197,10 +189,3 @@ def new_draft(path: Path) -> Path:
 def run_of_draft(draft: Path) -> Path:
     """Returns the folder of the run that a draft is of."""
     return draft.with_name(draft.name.removeprefix(".").rsplit(".", 2)[0])
-
-
-def _is_shared(home: Path, mark: str) -> bool:
-    try:
-        return (home / MARK_NAME).read_text(encoding="utf-8") == mark
-    except OSError:
-        return False

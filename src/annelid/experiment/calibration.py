@@ -42,16 +42,7 @@ EQUAL_STIFFNESS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """One thing that the fit may change.
-
-    Attributes:
-        name: What it is called.
-        unit: Its unit.
-        start: First guess.
-        low: Smallest value tried.
-        high: Greatest value tried.
-        fields: The fields that it sets, by dotted path, and what each is of its value; the cable's friction sets none.
-    """
+    """One thing that the fit may change: from a first guess, between two bounds."""
 
     name: str
     unit: str
@@ -59,6 +50,7 @@ class Parameter:
     low: float
     high: float
     fields: Mapping[str, float]
+    """The fields that it sets, by dotted path, and what each is of its value; the cable's friction sets none."""
 
 
 _MODULUS = {"body.strands.young_modulus_Pa": 1.0, "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG}
@@ -278,17 +270,7 @@ def fit_tables(fit: Calibration) -> list[Table]:
 def write_calibration(fit: Calibration, source: str, changes: Mapping[str, Any], path: Path) -> tuple[Path, Path]:
     """Writes all numbers of a fit as JSON, and beside it ``calibrated.toml``, the fitted worm as a file to run.
 
-    Args:
-        fit: The fit.
-        source: Preset or TOML file that the fit started from.
-        changes: What was changed in it before the fit, values by dotted path.
-        path: The JSON file.
-
-    Returns:
-        The paths written.
-
-    Raises:
-        RunFileError: A file cannot be written.
+    The fit started from the preset or file ``source``, with ``changes`` by dotted path.
     """
     known = fit.identifiability
     report = {

@@ -11,7 +11,7 @@ from typing import Any
 
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, toml_value
-from annelid.output import whole_file
+from annelid.output import write_text
 from annelid.textfiles import nested, toml_text
 
 SHEAR_OVER_YOUNG = 1.0 / 1.5
@@ -80,17 +80,8 @@ def absolute(source: str) -> str:
 
 
 def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequence[str]) -> None:
-    """Writes a worm as a file that ``annelid run`` takes: what it extends, and what differs.
+    """Writes a worm as a file that ``annelid run`` takes: the preset or file that it extends, and what differs.
 
-    Args:
-        path: The file to write.
-        source: Preset or TOML file that it extends.
-        fields: Values by dotted path.
-        heading: Lines of the comment that it begins with.
-
-    Raises:
-        RunFileError: The file cannot be written.
+    Fields are given by their dotted paths; the heading are lines of a comment.
     """
-    text = toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading))
-    with whole_file(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+    write_text(path, toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading)))

@@ -13,6 +13,7 @@ import time
 import warnings
 from abc import abstractmethod
 from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from annelid.config import cluster as settings
@@ -39,12 +40,7 @@ START_WORKERS = "dask worker ADDRESS --nworkers auto --nthreads 1"
 def workers_of(cluster: settings.Cluster, jobs: int | None = None) -> Workers:
     """Returns the workers of a cluster, which start with the first run.
 
-    Args:
-        cluster: Where they are.
-        jobs: How many, instead of what the cluster says; has no effect on a scheduler elsewhere.
-
-    Raises:
-        ClusterError: Jobs of Slurm are asked for where there is no Slurm.
+    ``jobs`` is how many, instead of what the cluster says; it has no effect on a scheduler elsewhere.
     """
     if isinstance(cluster, settings.Pool):
         return Processes(jobs or cluster.workers, cluster.retries)
@@ -66,12 +62,7 @@ class DaskWorkers(Workers):
         """Starts or finds the scheduler and returns a client of it."""
 
     def slots(self) -> int:
-        """Returns how many workers there are now; 0 while the scheduler is gone.
-
-        Raises:
-            ClusterError: It cannot be found, or has been gone for too long.
-            MissingDependency: Dask is not installed.
-        """
+        """Returns how many workers there are now; 0 while the scheduler is gone."""
         if self._client is None:
             try:
                 import distributed  # noqa: F401
@@ -85,7 +76,12 @@ class DaskWorkers(Workers):
             )
         now = time.monotonic()
         if now - self._counted[0] > FRESH_S:
-            self._counted = now, self._count(self._client)
+            n_workers = 0
+            if self._client.status == "running":
+                # Else the scheduler is going away right now: the connection breaks, or the client's own loop has ended.
+                with suppress(OSError, RuntimeError, CancelledError):
+                    n_workers = len(_threads_of(self._client))
+            self._counted = now, n_workers
         return self._counted[1]
 
     def submit(self, task: Task) -> Result:
@@ -110,16 +106,6 @@ class DaskWorkers(Workers):
                 self._client.cancel(list(self._client.futures), force=True)
             self._client.close(timeout=2)
             self._client = None
-
-    @staticmethod
-    def _count(client: Client) -> int:
-        if client.status != "running":
-            return 0
-        try:
-            return len(_threads_of(client))
-        # The scheduler is going away right now: the connection breaks, or the client's own loop has ended.
-        except (OSError, RuntimeError, CancelledError):
-            return 0
 
     def _warn_of_workers(self, threads: dict[str, int]) -> None:
         if any(count > 1 for count in threads.values()):
@@ -200,9 +186,6 @@ def slurm_cluster(of: settings.Slurm) -> Any:
 
     It must be reached over the network, so it speaks TLS with a key made for this one process, which the jobs read from
     files in the user's home folder that nobody else may read.
-
-    Raises:
-        MissingDependency: dask-jobqueue or cryptography is not installed.
     """
     try:
         from dask_jobqueue.slurm import SLURMCluster

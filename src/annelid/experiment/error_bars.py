@@ -2,73 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log2, log10, sqrt
 from statistics import stdev
 
 from annelid.analysis import Summary
+from annelid.config import unit_of
 
 NOT_CONVERGED = 0.5
 """Numerical error, of the value, above which a quantity does not count as converged."""
 UNKNOWN = "-"
+SHOWN: Mapping[str, tuple[str, str, float, int]] = {
+    "period_s": ("period", "s", 1.0, 3),
+    "elongation_mean_max_m": ("elongation {}, mean", "cm", 100.0, 2),
+    "elongation_first_helix_pp_m": ("first helix {}, pp", "cm", 100.0, 2),
+    "middle_deficit_mean": ("middle deficit, mean", "%", 100.0, 1),
+    "middle_deficit": ("middle deficit, pp", "%", 100.0, 1),
+    "contraction_force_median_N": ("force, median", "N", 1.0, 2),
+    "travel_m": ("travel forwards", "mm", 1000.0, 1),
+    "speed_m_per_s": ("speed", "mm/s", 1000.0, 2),
+}
+"""What gets error bars: its label, with the segment where it is one per segment, the unit in which it is shown, what
+the value is multiplied by for that, and digits behind the point where no error says how many."""
+
+
+def readings(numbers: Summary) -> dict[str, float | None]:
+    """Returns what gets error bars in SI units by field, with the segment behind a point; speed is travel over time."""
+    travel, duration = numbers.travel_m, numbers.duration_s
+    found: dict[str, float | None] = {}
+    for field, (label, *_) in SHOWN.items():
+        if field == "speed_m_per_s":
+            found[field] = travel / duration if travel is not None and duration else None
+        elif "{}" in label:
+            lengths = getattr(numbers, field) or [None] * numbers.n_segments
+            found |= {f"{field}.{segment}": value for segment, value in enumerate(lengths, start=1)}
+        else:
+            found[field] = getattr(numbers, field)
+    return found
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """One number of a run.
+class Quantity:
+    """A number of a run with its error bars, all in its ``unit``; None for what is not known.
 
     Attributes:
         name: Field of the summary, with the segment behind a point where it is one per segment.
-        label: What it is called.
-        unit: Unit of the value.
-        value: In SI units; None where it is not known.
-        shown_unit: Unit in which it is shown.
-        factor: What the value is multiplied by for that.
-        digits: Digits behind the point where there is no error that says how many.
-    """
-
-    name: str
-    label: str
-    unit: str
-    value: float | None
-    shown_unit: str
-    factor: float
-    digits: int
-
-
-def readings(numbers: Summary) -> list[Reading]:
-    """Picks from a summary what gets error bars.
-
-    Elongations stand in both readings (`annelid.analysis.elongation`), "mean" and "pp"; speed is travel over duration.
-    """
-    found = [Reading("period_s", "period", "s", numbers.period_s, "s", 1.0, 3)]
-    for field, label in (
-        ("elongation_mean_max_m", "elongation {}, mean"),
-        ("elongation_first_helix_pp_m", "first helix {}, pp"),
-    ):
-        lengths: list[float | None] = getattr(numbers, field) or [None] * numbers.n_segments
-        found += [
-            Reading(f"{field}.{segment}", label.format(segment), "m", value, "cm", 100.0, 2)
-            for segment, value in enumerate(lengths, start=1)
-        ]
-    travel, duration = numbers.travel_m, numbers.duration_s
-    speed = travel / duration if travel is not None and duration else None
-    return [
-        *found,
-        Reading("middle_deficit_mean", "middle deficit, mean", "1", numbers.middle_deficit_mean, "%", 100.0, 1),
-        Reading("middle_deficit", "middle deficit, pp", "1", numbers.middle_deficit, "%", 100.0, 1),
-        Reading("contraction_force_median_N", "force, median", "N", numbers.contraction_force_median_N, "N", 1.0, 2),
-        Reading("travel_m", "travel forwards", "m", travel, "mm", 1000.0, 1),
-        Reading("speed_m_per_s", "speed", "m/s", speed, "mm/s", 1000.0, 2),
-    ]
-
-
-@dataclass(frozen=True, slots=True)
-class Quantity(Reading):
-    """A number of the run itself with its error bars, all in ``unit``; None for what is not known.
-
-    Attributes:
+        value: The number.
         parameters: Sample standard deviation over the Monte Carlo samples.
         time_step: Largest difference between the run and one of finer steps.
         discretization: Largest difference between the run and one of more elements.
@@ -77,11 +57,24 @@ class Quantity(Reading):
         n_drawn: Number of Monte Carlo samples that it was read in.
     """
 
+    name: str
+    value: float | None
     parameters: float | None
     time_step: float | None
     discretization: float | None
     order: float | None
     n_drawn: int
+
+    @property
+    def unit(self) -> str:
+        """Unit of the value and its errors; "1" for a share."""
+        return unit_of(self.name.partition(".")[0]) or "1"
+
+    @property
+    def label(self) -> str:
+        """What it is called."""
+        field, _, segment = self.name.partition(".")
+        return SHOWN[field][0].format(segment)
 
     @property
     def errors(self) -> dict[str, float | None]:
@@ -119,23 +112,27 @@ class Quantity(Reading):
 
     def shown(self, value: float | None) -> float | None:
         """Returns a value of it in the unit in which it is shown."""
-        return None if value is None else self.factor * value
+        return None if value is None else self._format[1] * value
 
     def error_text(self, error: float | None) -> str:
         """Writes one of its errors with the digits that show two of the total."""
-        return UNKNOWN if error is None else f"{self.factor * error:.{self._shown_digits}f}"
+        return UNKNOWN if error is None else f"{self.shown(error):.{self._digits}f}"
 
     def __str__(self) -> str:
         """Its value with its total error, to two digits of the error: ``6.15 +- 0.21 cm``."""
         if self.value is None:
             return UNKNOWN
         error = "" if self.total is None else f" +- {self.error_text(self.total)}"
-        return f"{self.factor * self.value:z.{self._shown_digits}f}{error} {self.shown_unit}"
+        return f"{self.shown(self.value):z.{self._digits}f}{error} {self._format[0]}"
 
     @property
-    def _shown_digits(self) -> int:
-        total = self.total
-        return min(max(1 - floor(log10(self.factor * total)), 0), self.digits + 1) if total else self.digits
+    def _format(self) -> tuple[str, float, int]:
+        return SHOWN[self.name.partition(".")[0]][1:]
+
+    @property
+    def _digits(self) -> int:
+        _, factor, digits = self._format
+        return min(max(1 - floor(log10(factor * self.total)), 0), digits + 1) if self.total else digits
 
 
 def scatter(values: Sequence[float | None]) -> float | None:

@@ -285,9 +285,7 @@ def _steps(model: mujoco.MjModel, data: mujoco.MjData, n_steps: int) -> None:
 def gave_way(corners_m: np.ndarray, tension_N: np.ndarray) -> str | None:
     """Says how a ring has snapped through as it is wound in, or None as long as it resists.
 
-    Args:
-        corners_m: Corners of the ring, ``(n, 3)``.
-        tension_N: Tension of its cable so far, ``(k,)``.
+    From its corners, ``(n, 3)``, and the tension of its cable so far, ``(k,)``.
     """
     distance = np.linalg.norm(corners_m - corners_m.mean(axis=0), axis=1)
     if np.ptp(distance) > MOST_UNROUND * distance.mean():

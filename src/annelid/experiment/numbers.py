@@ -15,18 +15,14 @@ Part = Literal["summary", "gait", "energy", "rhythm"]
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One number of a run, or one per segment.
-
-    Attributes:
-        name: Of the variable in the dataset.
-        text: What it is, in words.
-        part: The part of what is kept of a run that it is read from.
-        per_segment: Whether it is one per segment.
-    """
+    """One number of a run, or one per segment."""
 
     name: str
+    """Of the variable in the dataset."""
     text: str
+    """What it is, in words."""
     part: Part
+    """The part of what is kept of a run that it is read from."""
     per_segment: bool = False
 
     @property
@@ -117,11 +113,7 @@ PREFERRED = ("speed_m_per_s", "cost_of_transport", "slip_ratio", "period_s", "tr
 
 
 def chosen_numbers(names: Sequence[str], rank: str | None) -> tuple[Number, ...]:
-    """Returns numbers by name, all for none.
-
-    Raises:
-        ConfigError: An unknown name, or the one to rank runs by is not among them, or is one per segment.
-    """
+    """Returns numbers by name, all for none; the one to rank runs by must be among them, and not one per segment."""
     for name in names:
         if name not in NUMBERS:
             raise ConfigError(f"outputs: unknown number {name!r}: {suggest(name, NUMBERS)}")

@@ -15,21 +15,14 @@ LEAST_CYCLES = 2
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """A number that a gait is tuned for.
-
-    Attributes:
-        name: As a user gives it.
-        label: With its unit, for axes and tables.
-        number: The gait's number by its name in `Gait`.
-        more_is_better: Whether it is.
-        penalty: What counts for a run that does not walk.
-    """
+    """A number that a gait is tuned for: the name that a user gives, a label with its unit, and its name in `Gait`."""
 
     name: str
     label: str
     number: str
     more_is_better: bool
     penalty: float
+    """What counts for a run that does not walk."""
 
 
 OBJECTIVES: Mapping[str, Objective] = {
@@ -46,15 +39,12 @@ gait that advances: no speed, and a cost and a slip beyond reach."""
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What was found of one run.
-
-    Attributes:
-        gait: Its numbers; None where it was stopped or could not be computed.
-        problem: Why it does not count as a gait; empty if it does.
-    """
+    """What was found of one run."""
 
     gait: Gait | None
+    """Its numbers; None where it was stopped or could not be computed."""
     problem: str
+    """Why it does not count as a gait; empty if it does."""
 
     def value(self, objective: Objective) -> float:
         """Returns the value of an objective, its penalty for a run that does not walk."""
@@ -67,11 +57,7 @@ class Judged:
 
 
 def objectives_of(names: list[str]) -> list[Objective]:
-    """Returns one or two objectives by name.
-
-    Raises:
-        ConfigError: An unknown name, the same one twice, or more than two.
-    """
+    """Returns one or two objectives by name."""
     for name in names:
         if name not in OBJECTIVES:
             raise ConfigError(f"unknown objective {name!r}: {suggest(name, OBJECTIVES)}")

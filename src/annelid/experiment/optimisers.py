@@ -28,14 +28,7 @@ def optimiser_of(
 ) -> Optimiser:
     """Returns a CMA-ES for one objective over at least two numbers, else a Parzen estimator.
 
-    Args:
-        variables: What is varied.
-        n_objectives: 1 or 2.
-        own: Values to start from, by field; None for the middle of every range, or a drawn value.
-        seed: Of the optimiser.
-
-    Raises:
-        MissingDependency: Optuna or cmaes is not installed; as the first generation is asked for.
+    It starts from the field's own values; without any from the middle of every range, or a drawn value.
     """
     intervals = [variable for variable in variables if isinstance(variable, Interval)]
     if n_objectives == 1 and len(intervals) == len(variables) > 1:

@@ -15,46 +15,36 @@ from annelid.simulation.runfile import Run
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Readings at the end of one open-loop contraction, the worm about at rest.
-
-    Attributes:
-        segment: The contracted segment, from 1.
-        elongation_mean_m: Mean elongation of every segment's springs, m, the contracted one's among them.
-        elongation_first_helix_m: The same of the spring on the first helix, m.
-        ring_length_m: Length of the contracted segment's ring, m.
-        pin_gap_m: Largest gap between two pinned strands, m; None where pins cannot part.
-        force_N: Force of the contracted segment's muscle, N; None for a worm without forces.
-    """
+    """Readings at the end of one open-loop contraction, the worm about at rest."""
 
     segment: int
+    """The contracted segment, from 1."""
     elongation_mean_m: tuple[float, ...]
+    """Mean elongation of every segment's springs, the contracted one's among them."""
     elongation_first_helix_m: tuple[float, ...]
+    """The same of the spring on the first helix."""
     ring_length_m: float
+    """Length of the contracted segment's ring."""
     pin_gap_m: float | None
+    """Largest gap between two pinned strands; None where pins cannot part."""
     force_N: float | None
+    """Force of the contracted segment's muscle; None for a worm without forces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a study keeps of a run.
-
-    Attributes:
-        path: Folder of the run.
-        summary: Its numbers.
-        rhythm: The score of its rhythm.
-        holds: Readings of its open-loop contractions, in the order of the program; empty in closed loop.
-        message: Why it ended before its time; empty if it did not.
-        gait: Its locomotion metrics.
-        cpu_time_s: Processor time that the run took, s, whatever else the machine did; 0 where it is not known.
-    """
+    """What a study keeps of a run, which lies in the folder ``path``."""
 
     path: Path
     summary: Summary
     rhythm: RhythmScore
     holds: tuple[Hold, ...]
+    """Of its open-loop contractions, in the order of the program; empty in closed loop."""
     message: str
+    """Why it ended before its time; empty if it did not."""
     gait: Gait = field(default_factory=Gait)
     cpu_time_s: float = 0.0
+    """Processor time that the run took, whatever else the machine did; 0 where it is not known."""
 
 
 class _Written(BaseModel):

@@ -20,20 +20,13 @@ DIGITS = 4
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A number in a range.
-
-    Attributes:
-        field: Dotted path of the field.
-        low: Least value.
-        high: Largest value.
-        logarithmic: Whether equal ratios count alike, rather than equal differences.
-        whole: Whether it is a whole number.
-    """
+    """A number in a range, the field by its dotted path."""
 
     field: str
     low: float
     high: float
     logarithmic: bool = False
+    """Whether equal ratios count alike, rather than equal differences."""
     whole: bool = False
 
     def __contains__(self, value: Any) -> bool:
@@ -61,11 +54,7 @@ Variable = Interval | Choice
 
 
 def interval(field: str, low: float, high: float, present: Any, *, logarithmic: bool = False) -> Interval:
-    """Returns the range of a field, one of whole numbers where its present value is whole.
-
-    Raises:
-        ConfigError: The field holds no number, or is whole and an end of the range is not.
-    """
+    """Returns the range of a field, one of whole numbers where its present value is whole; refuses any other."""
     if isinstance(present, bool | str | tuple):
         raise ConfigError(f"{field} is {toml_value(present)}, which is no number with a range")
     whole = isinstance(present, int)

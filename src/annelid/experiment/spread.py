@@ -146,14 +146,7 @@ def read_spread(path: Path | None = None) -> Spread:
 
 
 def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str]]:
-    """Splits what a spread can change in a worm from what it cannot.
-
-    Returns:
-        The spread of those parameters that change the worm, and the reason of every other one by its name.
-
-    Raises:
-        ConfigError: The body is planar.
-    """
+    """Returns the spread of those parameters that change a 3D worm, and the reason of every other one by its name."""
     if not isinstance(config.body, WormBody):
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has no calibrated parameters and no elements, so no error bars; they "
@@ -195,13 +188,7 @@ def draw(n: int, spread: Spread, seed: int) -> Array:
 
 
 def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any]:
-    """Returns the fields of one Monte Carlo sample by dotted path.
-
-    Args:
-        config: The worm that is varied.
-        spread: Parameters that change it, see `applicable`.
-        relative: Change of the logarithm of each, ``(p,)``.
-    """
+    """Returns the fields of one Monte Carlo sample by dotted path, from changes of the logarithms, ``(p,)``."""
     changed: dict[str, Any] = {}
     for name, change in zip(spread.names, relative.tolist(), strict=True):
         factor = exp(change)

@@ -47,17 +47,12 @@ POLL_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What became of a case.
-
-    Attributes:
-        outcome: What is kept of its run; None where there is none.
-        error: Why there is none.
-        refused: Whether that was known before anything ran.
-    """
+    """What became of a case: what is kept of its run, or why there is nothing."""
 
     outcome: Outcome | None
     error: Exception | None = None
     refused: bool = False
+    """Whether the error was known before anything ran."""
 
     @property
     def status(self) -> Literal["complete", "stopped", "failed"]:
@@ -81,11 +76,7 @@ class Done:
 
 
 class Store:
-    """A folder of runs, which is made when the first run is computed.
-
-    Attributes:
-        folder: The folder.
-    """
+    """A folder of runs, which is made when the first run is computed."""
 
     def __init__(self, folder: Path, workers: Workers | None = None, keep: Keep = "runs") -> None:
         """Opens a store.
@@ -165,7 +156,7 @@ class Store:
             return found
         given = self._workers
         with Processes(jobs) if given is None else nullcontext(given) as workers:
-            for case, error in self._computed(workers, missing, self._mark()):
+            for case, error in self._computed(workers, missing):
                 left_s, done = left_s - case.cost_s, done + 1
                 if error is None:
                     found[case_key(case)] = self[case]
@@ -185,14 +176,7 @@ class Store:
     ) -> list[Done]:
         """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
 
-        Args:
-            cases: The cases.
-            stage: What ``progress`` is called with as they are run.
-            jobs: As of `compute`.
-            progress: Called as cases are checked and run.
-
-        Returns:
-            What became of every case, in their order.
+        ``stage`` is what ``progress`` is called with as they are run. Returns what became of each case, in their order.
         """
         report: StudyProgress = progress or (lambda *_: None)
         refused: dict[int, ConfigError] = {}
@@ -216,14 +200,16 @@ class Store:
             for i, case in enumerate(cases)
         ]
 
-    def _computed(
-        self, workers: Workers, missing: Sequence[Case], mark: str
-    ) -> Iterator[tuple[Case, Exception | None]]:
-        """Has runs computed, and hands each over as it is there or has failed."""
+    def _computed(self, workers: Workers, missing: Sequence[Case]) -> Iterator[tuple[Case, Exception | None]]:
+        """Has runs computed, and yields each as it is there or has failed."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        marked = self.folder / MARK_NAME
+        if not marked.exists():
+            marked.write_text(uuid.uuid4().hex, encoding="utf-8")
+        home, mark, code = str(self.folder.resolve()), marked.read_text(encoding="utf-8"), own_code()
         # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
         # dies would be counted against the runs behind the one that killed it.
         waiting, running, tries = deque(missing), dict[Result, Case](), Counter[str]()
-        home, code = str(self.folder.resolve()), own_code()
         while waiting or running:
             while waiting and len(running) < workers.slots():
                 case = waiting.popleft()
@@ -253,14 +239,6 @@ class Store:
                         yield case, workers.explained(error)
                 else:
                     yield case, None
-
-    def _mark(self) -> str:
-        """Returns the store's mark, by which a worker can see that it has the same folder."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / MARK_NAME
-        if not path.exists():
-            path.write_text(uuid.uuid4().hex, encoding="utf-8")
-        return path.read_text(encoding="utf-8")
 
 
 def case_key(case: Case) -> str:

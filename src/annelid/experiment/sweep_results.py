@@ -22,11 +22,7 @@ N_ENDS, N_FAILED = 3, 8
 
 
 def write_results(sweep: Sweep) -> list[Path]:
-    """Writes a sweep's dataset, its rows and its figure; without the figure where there is no number to draw.
-
-    Raises:
-        RunFileError: A file cannot be written.
-    """
+    """Writes a sweep's dataset, its rows and its figure; without the figure where there is no number to draw."""
     sweep.folder.mkdir(parents=True, exist_ok=True)
     path = sweep.folder / DATASET
     with whole_file(path) as draft:

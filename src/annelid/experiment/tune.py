@@ -26,11 +26,7 @@ HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
 
 
 def variables_of(texts: Sequence[str], config: RunConfig) -> list[Variable]:
-    """Reads what is varied, as `parse_variable` does; where nothing is given, the fields of the controller's timing.
-
-    Raises:
-        ConfigError: As of `parse_variable`, a field is given twice, or the controller has no timing of its own.
-    """
+    """Reads what is varied, as `parse_variable` does; where nothing is given, the fields of the controller's timing."""
     kind, tuned = config.controller.kind, config.controller.tuned
     if not texts and not tuned:
         raise ConfigError(f"controller.kind = {kind!r} has no fields that are varied by default: {HOW} with --vary")
@@ -43,15 +39,10 @@ def variables_of(texts: Sequence[str], config: RunConfig) -> list[Variable]:
 
 
 def parse_variable(text: str, config: RunConfig) -> Variable:
-    """Reads one variable.
+    """Reads one variable of a configuration, and refuses values out of the field's range.
 
-    Args:
-        text: ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log`` for a number, whole where the field's own value is;
-            ``FIELD=VALUE,VALUE,..`` for choices, each as TOML or plain text.
-        config: The configuration that the fields are of.
-
-    Raises:
-        ConfigError: The text is malformed, there is no such field, or a value is out of the field's range.
+    ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log`` is a number, whole where the field's own value is;
+    ``FIELD=VALUE,VALUE,..`` are choices, each as TOML or plain text.
     """
     path, equals, right = (part.strip() for part in text.partition("="))
     if not equals or not right:
@@ -91,23 +82,16 @@ def _interval(path: str, text: str, present: Any) -> Interval:
 
 @dataclass(frozen=True)
 class Task:
-    """What is tuned, and for what.
-
-    Attributes:
-        source: Preset or TOML file.
-        changes: Fields that differ from it in every run.
-        variables: What is varied.
-        objectives: One or two.
-        n_trials: How many runs the search may take.
-        seed: Of the optimiser.
-    """
+    """What is tuned, and for what: a preset or TOML file, and fields that differ from it in every run."""
 
     source: str
     changes: Mapping[str, Any]
     variables: Sequence[Variable]
     objectives: Sequence[Objective]
+    """One or two."""
     n_trials: int
     seed: int = 0
+    """Of the optimiser."""
 
     @property
     def start(self) -> Case:
@@ -117,23 +101,18 @@ class Task:
 
 @dataclass(frozen=True)
 class Trial:
-    """One run of a search.
-
-    Attributes:
-        number: Its number, from 0; `START` for the gait that the search starts from.
-        values: Values of the variables, by field.
-        case: The run.
-        judged: What was found.
-        path: Folder of the run.
-        failed: Whether it could not be computed, though it could be built.
-    """
+    """One run of a search."""
 
     number: int
+    """From 0; `START` for the gait that the search starts from."""
     values: Mapping[str, Any]
+    """Of the variables, by field."""
     case: Case
     judged: Judged
     path: Path = field(compare=False)
+    """Folder of the run."""
     failed: bool = False
+    """Whether it could not be computed, though it could be built."""
 
 
 def search(
@@ -147,18 +126,7 @@ def search(
     called again it asks for the same gaits, finds those in the store that it has computed, and goes on.
 
     A run that cannot be built, stops, falls silent or out of order, or does not advance counts as a trial with the
-    objectives' penalties.
-
-    Args:
-        task: What is tuned, and for what.
-        store: Where runs are kept.
-        jobs: Processes; default: one a core.
-        progress: Called as runs finish, with the best so far.
-
-    Raises:
-        MissingDependency: Optuna or cmaes is not installed.
-        AnnelidError: The run that it starts from cannot be built or written.
-        KeyboardInterrupt: Finished runs are kept.
+    objectives' penalties; the run that it starts from must be one that can be built and written.
     """
     found: list[Trial] = []
 

@@ -31,19 +31,9 @@ MOST_SHOWN = 8
 
 
 def write_results(task: Task, trials: Sequence[Trial], command: str, folder: Path) -> list[Path]:
-    """Writes what has been found so far: the CSV, the figure, and the best gaits where one walks.
+    """Writes what has been found so far by a command: the CSV, the figure, and the best gaits where one walks.
 
-    Args:
-        task: What is tuned.
-        trials: All trials so far, the start first.
-        command: The command line that makes them.
-        folder: Where to.
-
-    Returns:
-        The paths of the CSV, the picture in pixels and the best gait.
-
-    Raises:
-        RunFileError: A file cannot be written.
+    Returns the paths of the CSV, the picture in pixels and the best gait.
     """
     folder.mkdir(parents=True, exist_ok=True)
     fields = [variable.field for variable in task.variables]

@@ -28,14 +28,7 @@ from annelid.draw.figures.uncertainty import Panel, uncertainty_figure
 from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
-from annelid.experiment.error_bars import (
-    Quantity,
-    Reading,
-    largest_difference,
-    order_of_convergence,
-    readings,
-    scatter,
-)
+from annelid.experiment.error_bars import Quantity, largest_difference, order_of_convergence, readings, scatter
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Progress, Store, case_key
@@ -220,31 +213,32 @@ def more_elements(config: RunConfig) -> list[int]:
     return [finer for finer in (count + 1, count + 2) if finer <= MOST_ELEMENTS]
 
 
-def combine(nominal: Sequence[Reading], runs: Sequence[VariantRun]) -> tuple[Quantity, ...]:
+def combine(nominal: Mapping[str, float | None], runs: Sequence[VariantRun]) -> tuple[Quantity, ...]:
     """Joins the readings of a run and of its variants to error bars; runs that were stopped have no part in them."""
 
     def values(kind: Kind, name: str) -> list[float | None]:
         return [None if run.message else run.values[name] for run in runs if run.kind == kind]
 
     quantities = []
-    for reading in nominal:
-        drawn, steps = values("drawn", reading.name), values("time step", reading.name)
+    for name, value in nominal.items():
+        drawn, steps = values("drawn", name), values("time step", name)
         quantities.append(
             Quantity(
-                **asdict(reading),
+                name,
+                value,
                 parameters=scatter(drawn),
-                time_step=largest_difference(reading.value, steps),
-                discretization=largest_difference(reading.value, values("elements", reading.name)),
-                order=order_of_convergence(reading.value, *steps) if len(steps) > 1 else None,
-                n_drawn=sum(value is not None for value in drawn),
+                time_step=largest_difference(value, steps),
+                discretization=largest_difference(value, values("elements", name)),
+                order=order_of_convergence(value, *steps) if len(steps) > 1 else None,
+                n_drawn=sum(one is not None for one in drawn),
             )
         )
     return tuple(quantities)
 
 
 def _done(kind: Kind, changed: Mapping[str, Any], of: Outcome) -> VariantRun:
-    values = {reading.name: reading.value for reading in readings(of.summary)}
-    return VariantRun(kind, changed, of.path, of.rhythm.verdict, of.rhythm.reason, of.message, values)
+    rhythm = of.rhythm
+    return VariantRun(kind, changed, of.path, rhythm.verdict, rhythm.reason, of.message, readings(of.summary))
 
 
 def uncertainty_table(result: Uncertainty) -> Table:

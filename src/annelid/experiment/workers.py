@@ -26,21 +26,14 @@ _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NU
 
 
 class Workers(ABC):
-    """Workers that each compute one run at a time; used as a context, at whose end they are let go.
-
-    Attributes:
-        retries: How often a run is tried again whose files could not be written.
-    """
+    """Workers that each compute one run at a time; used as a context, at whose end they are let go."""
 
     retries: int = 0
+    """How often a run is tried again whose files could not be written."""
 
     @abstractmethod
     def slots(self) -> int:
-        """Returns how many runs can be under way now.
-
-        Raises:
-            ClusterError: The workers are lost for good.
-        """
+        """Returns how many runs can be under way now; a `ClusterError` where the workers are lost for good."""
 
     @abstractmethod
     def submit(self, task: Task) -> Result:
@@ -63,17 +56,13 @@ class Workers(ABC):
 
 @dataclass
 class _Process:
-    """A process with a queue of its own: should it die, only its own run is lost.
-
-    Attributes:
-        pool: The process.
-        ready: Done once it has started.
-        result: Of its last run.
-    """
+    """A process with a queue of its own: should it die, only its own run is lost."""
 
     pool: ProcessPoolExecutor
     ready: Future[int]
+    """Done once it has started."""
     result: Result | None = None
+    """Of its last run."""
 
 
 class Processes(Workers):
@@ -94,11 +83,7 @@ class Processes(Workers):
         return self._jobs
 
     def submit(self, task: Task) -> Result:
-        """Has a run computed by a process that is free.
-
-        Raises:
-            ClusterError: Processes end as they start.
-        """
+        """Has a run computed by a process that is free."""
         # The pool starts its process as it takes work.
         with _single_threaded():
             for _ in range(STARTS):

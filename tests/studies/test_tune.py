@@ -25,7 +25,7 @@ from annelid.experiment.optimisers import cma_es, generation_size, optimiser_of,
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.space import Choice, Interval, from_unit, to_unit
 from annelid.experiment.store import Store, case_key
-from annelid.experiment.tune import START, Task, Trial, front, leader, parse_variable, search, variables_of
+from annelid.experiment.tune import START, Task, Trial, front, leader, parsed_variables, search
 from annelid.experiment.tune_results import write_gait, write_results
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
@@ -47,11 +47,22 @@ def a_gait(speed: float = 0.1, cost: float = 1.0, slip: float | None = 0.5, cycl
 
 
 def test_ranges_and_choices_are_read() -> None:
-    assert parse_variable(f"{GATE}=80:600:log", CONFIG) == Interval(GATE, 80.0, 600.0, True)
-    assert parse_variable("body.mesh.n_segments=3:6", CONFIG) == Interval("body.mesh.n_segments", 3, 6, whole=True)
-    assert parse_variable("controller.scheme=euler,heun", CONFIG) == Choice("controller.scheme", ("euler", "heun"))
-    ranges = parse_variable("body.rings.length_range_m=[0.5,1.0],[0.6,1.1]", CONFIG)
-    assert ranges == Choice("body.rings.length_range_m", ([0.5, 1.0], [0.6, 1.1]))
+    assert parsed_variables(
+        [
+            f"{GATE}=80:600:log",
+            "sensor.tolerance=0.001:0.02",
+            "body.mesh.n_segments=3:6",
+            "controller.scheme=euler,heun",
+            "body.rings.length_range_m=[0.5,1.0],[0.6,1.1]",
+        ],
+        CONFIG,
+    ) == [
+        Interval(GATE, 80.0, 600.0, True),
+        Interval(TOLERANCE, 0.001, 0.02),
+        Interval("body.mesh.n_segments", 3, 6, whole=True),
+        Choice("controller.scheme", ("euler", "heun")),
+        Choice("body.rings.length_range_m", ([0.5, 1.0], [0.6, 1.1])),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -59,8 +70,9 @@ def test_ranges_and_choices_are_read() -> None:
     [
         (GATE, "says nothing to vary"),
         ("controller.gate_ms=1:2", "did you mean"),
-        (f"{GATE}=600:80", "lower end must be below"),
-        (f"{GATE}=0:80:log", "needs a lower end above 0"),
+        (f"{GATE}=600:80", "from = 600.0 must be given, and be below to = 80.0"),
+        (f"{GATE}=0:80:log", "from = 0 must be above 0 where log = true"),
+        ("body.gain=1:2", "unknown field 'body.gain'"),
         (f"{GATE}=-5:80", "gate_time_constant_ms"),
         (f"{GATE}=a:b", "must be numbers"),
         (f"{GATE}=1:2:lin", "only 'log'"),
@@ -72,25 +84,25 @@ def test_ranges_and_choices_are_read() -> None:
 )
 def test_what_cannot_be_varied_is_refused_in_a_sentence(text: str, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
-        parse_variable(text, CONFIG)
+        parsed_variables([text], CONFIG)
 
 
 def test_a_field_is_varied_once() -> None:
-    with pytest.raises(ConfigError, match="varied twice"):
-        variables_of([f"{GATE}=80:600", f"{GATE}=100:200"], CONFIG)
+    with pytest.raises(ConfigError, match="stands twice"):
+        parsed_variables([f"{GATE}=80:600", f"{GATE}=100:200"], CONFIG)
 
 
 @pytest.mark.parametrize(
     "kind", ["sns", "adaptive", "sns-robust", "sns-pressure", "sine", "timed", "shc", "phase-chain"]
 )
 def test_every_controller_has_something_to_tune(kind: str) -> None:
-    assert variables_of([], load_config(PRESET, {"controller.kind": kind}))
+    assert parsed_variables([], load_config(PRESET, {"controller.kind": kind}))
 
 
 def test_a_program_must_be_told_what_to_vary() -> None:
     program = {"controller": {"kind": "program", "contractions": [{"segment": 1, "start_s": 0.0, "stop_s": 1.0}]}}
     with pytest.raises(ConfigError, match="--vary"):
-        variables_of([], load_config(PRESET, program))
+        parsed_variables([], load_config(PRESET, program))
 
 
 @pytest.mark.parametrize("names", [["fast"], ["speed", "speed"], ["speed", "slip", "cost-of-transport"], []])
@@ -175,7 +187,7 @@ class Toy(Store):
 
 
 def toy_task(n_trials: int = 40, objectives: Sequence[str] = ("speed",), seed: int = 0) -> Task:
-    variables = variables_of([f"{GATE}=80:600:log", f"{TOLERANCE}=0.001:0.02"], CONFIG)
+    variables = parsed_variables([f"{GATE}=80:600:log", f"{TOLERANCE}=0.001:0.02"], CONFIG)
     return Task(PRESET, {"duration_s": 1.0}, variables, objectives_of(list(objectives)), n_trials, seed)
 
 

@@ -333,7 +333,7 @@ def tune_command(
     """
     from annelid.experiment.case import Case
     from annelid.experiment.objectives import objectives_of
-    from annelid.experiment.tune import Task, Trial, leader, search, variables_of
+    from annelid.experiment.tune import Task, Trial, leader, parsed_variables, search
     from annelid.experiment.tune_results import HISTORY, results_table, write_results
     from annelid.plausibility import refuse_nonsense
 
@@ -341,7 +341,7 @@ def tune_command(
     base = Case(preset, changes).config
     for doubt in refuse_nonsense(base):
         complain(f"warning: {doubt}")
-    task = Task(preset, changes, variables_of(vary or [], base), objectives, trials, seed)
+    task = Task(preset, changes, parsed_variables(vary or [], base), objectives, trials, seed)
     found: list[Trial] = []
     written: list[Path] = []
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):

@@ -19,28 +19,24 @@ from annelid.config import (
     Cluster,
     RunConfig,
     Study,
-    Vary,
     field_paths,
-    field_value,
-    fields_of,
     find_cluster,
     load_config,
     load_study,
     toml_value,
     unit_of,
-    whole_path,
 )
 from annelid.config.study import MOST_RUNS
-from annelid.errors import ConfigError, suggest
+from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.cluster import workers_of
 from annelid.experiment.numbers import Number, chosen_numbers
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.space import Choice, Variable, from_unit, interval, sampled, unit_samples
+from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
 from annelid.simulation.lock import locks
 
-__all__ = ["Sweep", "sweep", "swept"]
+__all__ = ["Sweep", "sweep"]
 
 SAMPLE, REPEAT, SEGMENT = "sample", "repeat", "segment"
 """Dimensions beside those of the varied fields."""
@@ -224,22 +220,7 @@ def swept(
 ) -> Sweep:
     """Computes a sweep as `sweep` does, in a folder that the caller has locked, and writes nothing but the runs.
 
-    Args:
-        study: The study.
-        folder: Folder of the results; runs are kept in ``runs`` below it.
-        cluster: As of `sweep`.
-        jobs: As of `sweep`.
-        progress: As of `sweep`.
-        to_use: What the user has to do to have the cluster used that the study describes, for a sentence.
-
-    Returns:
-        The runs and their numbers.
-
-    Raises:
-        ConfigError: The study is refused, or all of its runs are.
-        MissingDependency: Dask or dask-jobqueue is needed and not installed.
-        ClusterError: The workers are lost for good; finished runs are kept.
-        KeyboardInterrupt: Finished runs are kept.
+    ``to_use`` is what the user has to do to have the cluster used that the study describes, for a sentence.
     """
     numbers = chosen_numbers(study.outputs, study.rank)
     if cluster is None and study.cluster is not None:
@@ -265,11 +246,8 @@ def plan_of(study: Study) -> Plan:
         ConfigError: The preset, a fixed field or a varied field is refused, or there are too many runs.
     """
     base = load_config(study.preset, flattened(study.set))
-    variables = [_variable(vary, base) for vary in study.vary]
+    variables = variables_of(study.vary, base)
     fields = tuple(variable.field for variable in variables)
-    for field in fields:
-        if fields.count(field) > 1:
-            raise ConfigError(f"vary {field!r} stands twice: give all of its values once")
     if "seed" in fields and study.repeats > 1:
         raise ConfigError(f"vary 'seed' and repeats = {study.repeats} both set the seed: leave one out")
     _check_size(study)
@@ -293,22 +271,6 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         below = flattened(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
         fields |= below
     return fields
-
-
-def _variable(vary: Vary, base: RunConfig) -> Variable:
-    field = whole_path(vary.field, base.model_dump())
-    # A field of another kind than the preset's counts: the kind may be varied, too.
-    if field not in field_paths():
-        raise ConfigError(f"vary: unknown field {vary.field!r}: {suggest(field, fields_of(base))}")
-    present = field_value(base, field) if field in fields_of(base) else None
-    if vary.choices is not None:
-        return Choice(field, vary.choices)
-    if vary.values is not None:
-        numbers = [int(value) if isinstance(present, int) and value.is_integer() else value for value in vary.values]
-        return Choice(field, tuple(numbers))
-    assert vary.from_ is not None
-    assert vary.to is not None
-    return interval(field, vary.from_, vary.to, present, logarithmic=vary.log)
 
 
 def _levels(variable: Variable, number: int | None) -> tuple[Any, ...]:

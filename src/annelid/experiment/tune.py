@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from annelid.config import RunConfig, field_value, fields_of, load_config, parse_assignments
+from annelid.config import RunConfig, Vary, field_value, fields_of, load_config, parse_assignments
+from annelid.config.checking import check_section
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
 from annelid.experiment.objectives import Judged, Objective, judge
 from annelid.experiment.optimisers import optimiser_of
 from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.space import Choice, Interval, Variable, interval
+from annelid.experiment.space import Choice, Variable, variables_of
 from annelid.experiment.store import Done, Store, case_key
 
 START = -1
@@ -25,59 +26,42 @@ LOG = "log"
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
 
 
-def variables_of(texts: Sequence[str], config: RunConfig) -> list[Variable]:
-    """Reads what is varied, as `parse_variable` does; where nothing is given, the fields of the controller's timing."""
+def parsed_variables(texts: Sequence[str], config: RunConfig) -> list[Variable]:
+    """Reads what is varied of a configuration; where nothing is given, the fields of the controller's timing.
+
+    ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log`` is a number, whole where the field's own value is;
+    ``FIELD=VALUE,VALUE,..`` are choices, each as TOML or plain text. Values out of the field's range are refused.
+    """
     kind, tuned = config.controller.kind, config.controller.tuned
     if not texts and not tuned:
         raise ConfigError(f"controller.kind = {kind!r} has no fields that are varied by default: {HOW} with --vary")
-    variables = [parse_variable(text, config) for text in texts or tuned]
-    fields = [variable.field for variable in variables]
-    for each in fields:
-        if fields.count(each) > 1:
-            raise ConfigError(f"{each} is varied twice: {HOW} once for each field")
+    variables = variables_of([check_section(Vary, _parsed(text)) for text in texts or tuned], config)
+    for one in variables:
+        if one.field not in (known := fields_of(config)):
+            raise ConfigError(f"unknown field {one.field!r}: {suggest(one.field, known)}")
+        for end in one.values if isinstance(one, Choice) else map(one.rounded, (one.low, one.high)):
+            load_config(config.model_dump(), {one.field: end})
     return variables
 
 
-def parse_variable(text: str, config: RunConfig) -> Variable:
-    """Reads one variable of a configuration, and refuses values out of the field's range.
-
-    ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log`` is a number, whole where the field's own value is;
-    ``FIELD=VALUE,VALUE,..`` are choices, each as TOML or plain text.
-    """
+def _parsed(text: str) -> dict[str, Any]:
     path, equals, right = (part.strip() for part in text.partition("="))
     if not equals or not right:
         raise ConfigError(f"{text!r} says nothing to vary: {HOW}")
-    known = fields_of(config)
-    if path not in known:
-        raise ConfigError(f"unknown field {path!r}: {suggest(path, known)}")
-    variable = _choice(path, right) if ":" not in right else _interval(path, right, field_value(config, path))
-    for end in variable.values if isinstance(variable, Choice) else (variable.low, variable.high):
-        load_config(config.model_dump(), {path: int(end) if getattr(variable, "whole", False) else end})
-    return variable
-
-
-def _choice(path: str, text: str) -> Choice:
-    # As TOML: brackets of a list keep its commas together.
-    listed = parse_assignments([f"{path}=[{text}]"])[path]
-    values = listed if isinstance(listed, list) else [word.strip() for word in text.split(",")]
-    if len(values) < 2:
-        raise ConfigError(f"{path}={text}: one value is no choice: {HOW}")
-    return Choice(path, tuple(values))
-
-
-def _interval(path: str, text: str, present: Any) -> Interval:
-    low_text, high_text, *rest = (part.strip() for part in text.split(":"))
-    try:
-        low, high = float(low_text), float(high_text)
-    except ValueError:
-        raise ConfigError(f"{path}={text}: the ends of a range must be numbers: {HOW}") from None
+    if ":" not in right:
+        # As TOML: brackets of a list keep its commas together.
+        listed = parse_assignments([f"{path}=[{right}]"])[path]
+        choices = listed if isinstance(listed, list) else [word.strip() for word in right.split(",")]
+        if len(choices) < 2:
+            raise ConfigError(f"{text}: one value is no choice: {HOW}")
+        return {"field": path, "choices": choices}
+    low, high, *rest = (part.strip() for part in right.split(":"))
     if rest not in ([], [LOG]):
-        raise ConfigError(f"{path}={text}: only 'log' may follow the ends of a range: {HOW}")
-    if not low < high:
-        raise ConfigError(f"{path}={text}: the lower end must be below the upper end")
-    if rest and low <= 0.0:
-        raise ConfigError(f"{path}={text}: a logarithmic range needs a lower end above 0")
-    return interval(path, low, high, present, logarithmic=bool(rest))
+        raise ConfigError(f"{text}: only 'log' may follow the ends of a range: {HOW}")
+    try:
+        return {"field": path, "from": float(low), "to": float(high), "log": bool(rest)}
+    except ValueError:
+        raise ConfigError(f"{text}: the ends of a range must be numbers: {HOW}") from None
 
 
 @dataclass(frozen=True)

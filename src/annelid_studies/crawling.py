@@ -17,9 +17,9 @@ from annelid.draw.markdown import Table
 from annelid.draw.style import panel_title
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
-from annelid.experiment.objectives import Judged, judge
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
+from annelid.experiment.tune import Judged, judge
 from annelid.morphology import Array
 from annelid.output import write_csv
 from annelid_studies.riddle2023.examination import Effort

@@ -64,7 +64,7 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheduler: socket.soc
     cluster = f'[cluster]\nkind = "scheduler"\naddress = "{address}"\nreconnect_s = 0.5\n'
     Path("study.toml").write_text(STUDY + cluster)
     monkeypatch.setattr("annelid.experiment.workers.Processes.submit", lambda _, task: computed(task))
-    monkeypatch.setattr("annelid.experiment.sweep_results.write_results", lambda *_: [])
+    monkeypatch.setattr("annelid.experiment.sweep.write_results", lambda *_: [])
     return "study.toml"
 
 

@@ -23,8 +23,17 @@ from annelid.errors import ConfigError
 from annelid.experiment.attempt import attempt
 from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.space import unit_samples
-from annelid.experiment.sweep import Plan, Sweep, flattened, plan_of, swept
-from annelid.experiment.sweep_results import failures, results_table, shown_numbers, write_results
+from annelid.experiment.sweep import (
+    Plan,
+    Sweep,
+    failures,
+    flattened,
+    plan_of,
+    results_table,
+    shown_numbers,
+    swept,
+    write_results,
+)
 from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
 
@@ -173,7 +182,7 @@ ONE = [{"field": GATE, "values": [100.0]}]
         ({"vary": [{"field": "controller.gate_ms", "values": [1.0]}]}, "vary: unknown field .* did you mean"),
         ({"vary": [*ONE, *ONE]}, "stands twice"),
         ({"vary": [{"field": "controller.scheme", "from": 1.0, "to": 2.0, "number": 2}]}, "no number with a range"),
-        ({"vary": [{"field": SEGMENTS, "from": 3, "to": 5, "number": 4}]}, "only 3 values to tell apart"),
+        ({"vary": [{"field": SEGMENTS, "from": 3, "to": 5, "number": 4}]}, "only 3 distinct values"),
         ({"vary": [{"field": SEGMENTS, "from": 3.5, "to": 5, "number": 2}]}, "must be whole numbers"),
         ({"vary": [{"field": "seed", "values": [1, 2]}], "repeats": 2}, "both set the seed"),
         ({"set": {"body": {"gian": 1.0}}}, "unknown field 'body.gian'"),

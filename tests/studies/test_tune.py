@@ -20,13 +20,25 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import workers
 from annelid.experiment.case import Case
-from annelid.experiment.objectives import OBJECTIVES, Judged, judge, objectives_of
 from annelid.experiment.optimisers import cma_es, generation_size, optimiser_of, parzen
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.space import Choice, Interval, from_unit, to_unit
 from annelid.experiment.store import Store, case_key
-from annelid.experiment.tune import START, Task, Trial, front, leader, parsed_variables, search
-from annelid.experiment.tune_results import write_gait, write_results
+from annelid.experiment.tune import (
+    OBJECTIVES,
+    START,
+    Judged,
+    Task,
+    Trial,
+    front,
+    judge,
+    leader,
+    objectives_of,
+    parsed_variables,
+    search,
+    write_gait,
+    write_results,
+)
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -20,7 +20,6 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment import uncertainty as study
 from annelid.experiment.calibration import EQUAL_STIFFNESS, calibrate
-from annelid.experiment.error_bars import largest_difference, order_of_convergence, readings, scatter
 from annelid.experiment.load_frame import read_loop
 from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
 from annelid.experiment.store import case_key
@@ -31,9 +30,13 @@ from annelid.experiment.uncertainty import (
     VariantRun,
     combine,
     finer_steps,
+    largest_difference,
     more_elements,
+    order_of_convergence,
     plan,
     read_spread,
+    readings,
+    scatter,
     uncertainty,
     uncertainty_table,
     variant,

@@ -275,8 +275,7 @@ def sweep_command(
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
     from annelid.experiment.progress import study_progress
-    from annelid.experiment.sweep import swept
-    from annelid.experiment.sweep_results import results_table, write_results
+    from annelid.experiment.sweep import results_table, swept, write_results
 
     loaded = load_study(study)
     if samples is not None:
@@ -331,27 +330,25 @@ def tune_command(
     annelid tune riddle2025 --objective speed --objective slip --trials 200 -o front
     annelid run tune/best.toml
     """
+    from annelid.experiment import tune
     from annelid.experiment.case import Case
-    from annelid.experiment.objectives import objectives_of
-    from annelid.experiment.tune import Task, Trial, leader, parsed_variables, search
-    from annelid.experiment.tune_results import HISTORY, results_table, write_results
     from annelid.plausibility import refuse_nonsense
 
-    changes, objectives = overrides_of(assignments, duration_s=duration), objectives_of(objective or ["speed"])
+    changes, objectives = overrides_of(assignments, duration_s=duration), tune.objectives_of(objective or ["speed"])
     base = Case(preset, changes).config
     for doubt in refuse_nonsense(base):
         complain(f"warning: {doubt}")
-    task = Task(preset, changes, parsed_variables(vary or [], base), objectives, trials, seed)
-    found: list[Trial] = []
+    task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed)
+    found: list[tune.Trial] = []
     written: list[Path] = []
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        for generation in search(task, store, jobs=jobs, progress=progress):
+        for generation in tune.search(task, store, jobs=jobs, progress=progress):
             found += generation
-            written = write_results(task, found, typed_command(), output)
-    print_results(written, results_table(task, found), quiet=quiet)
-    end_study(len(found), sum(trial.failed for trial in found), output / HISTORY)
-    if leader(found, objectives) is None:
-        complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / HISTORY}")
+            written = tune.write_results(task, found, typed_command(), output)
+    print_results(written, tune.results_table(task, found), quiet=quiet)
+    end_study(len(found), sum(trial.failed for trial in found), output / tune.HISTORY)
+    if tune.leader(found, objectives) is None:
+        complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / tune.HISTORY}")
         raise typer.Exit(EXIT_ALL_FAILED)
 
 

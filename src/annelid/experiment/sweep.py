@@ -1,4 +1,8 @@
-"""Sweeps: fields of a configuration varied over a grid or in samples, all runs in one labelled dataset."""
+"""Sweeps: fields of a configuration varied over a grid or in samples, all runs in one labelled dataset.
+
+Beside the dataset (netCDF), a sweep leaves a row a run as CSV, a figure, and a table of the highest, lowest and failed
+runs.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from rich.table import Table
 
 import annelid
 from annelid.config import (
     Cluster,
     RunConfig,
     Study,
+    Vary,
     field_paths,
     find_cluster,
     load_config,
@@ -27,42 +33,42 @@ from annelid.config import (
     unit_of,
 )
 from annelid.config.study import MOST_RUNS
+from annelid.draw.figures.sweep import sweep_figure, worded
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.cluster import workers_of
-from annelid.experiment.numbers import Number, chosen_numbers
+from annelid.experiment.numbers import PREFERRED, Number, chosen_numbers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
+from annelid.output import whole_file, write_csv
 from annelid.simulation.lock import locks
 
 __all__ = ["Sweep", "sweep"]
 
 SAMPLE, REPEAT, SEGMENT = "sample", "repeat", "segment"
 """Dimensions beside those of the varied fields."""
-RUNS = "runs"
-"""Subfolder of the runs."""
+RUNS, DATASET, ROWS, FIGURE = "runs", "sweep.nc", "sweep.csv", "sweep"
+"""What is in the folder of the results."""
+N_SHOWN = 4
+"""Numbers in the table and panels in the figure."""
+N_ENDS, N_FAILED = 3, 8
+"""Rows of the table: from either end, and of reasons."""
 LONG_S = 100 * 3600.0
 """Studies that take longer on one core begin with a warning, s."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All runs of a sweep.
-
-    Attributes:
-        study: What the user wrote.
-        base: The configuration whose fields are varied.
-        fields: The varied fields, by dotted path.
-        samples: Values of the fields of each combination or sample, ``(n, n_fields)``.
-        levels: By dimension, what stands along it: a field's values, numbers of samples, seeds of repeats.
-    """
+    """All runs of a sweep: the fields of a configuration that are varied, by dotted path."""
 
     study: Study
     base: RunConfig
     fields: tuple[str, ...]
     samples: Sequence[tuple[Any, ...]]
+    """Values of the fields of each combination or sample, ``(n, n_fields)``."""
     levels: Mapping[str, Sequence[Any]]
+    """By dimension, what stands along it: a field's values, numbers of samples, seeds of repeats."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -128,11 +134,8 @@ class Sweep:
         meanings = field_paths()
         for i, field in enumerate(plan.fields):
             dim, values = (field, levels[field]) if field in levels else (SAMPLE, [row[i] for row in plan.samples])
-            coords[field] = (
-                dim,
-                _column(values),
-                {"units": unit_of(field) or "1", "long_name": meanings[field] or field},
-            )
+            attrs = {"units": unit_of(field) or "1", "long_name": meanings[field] or field}
+            coords[field] = (dim, _column(values), attrs)
         return xr.Dataset(
             variables,
             coords=coords,
@@ -201,8 +204,6 @@ def sweep(
         RunFileError: A file cannot be written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    from annelid.experiment.sweep_results import write_results
-
     to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
     done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
     write_results(done)
@@ -250,17 +251,22 @@ def plan_of(study: Study) -> Plan:
     fields = tuple(variable.field for variable in variables)
     if "seed" in fields and study.repeats > 1:
         raise ConfigError(f"vary 'seed' and repeats = {study.repeats} both set the seed: leave one out")
-    _check_size(study)
-    levels: dict[str, Sequence[Any]]
-    if study.design == "grid":
-        levels = {one.field: _levels(one, vary.number) for one, vary in zip(variables, study.vary, strict=True)}
-        samples = list(product(*levels.values()))
+    grid = {} if study.samples else dict(zip(fields, map(_levels, variables, study.vary), strict=True))
+    levels: dict[str, Sequence[Any]] = dict(grid) or {SAMPLE: range(study.samples or 0)}
+    if study.repeats > 1:
+        levels[REPEAT] = range(base.seed, base.seed + study.repeats)
+    n = prod(map(len, levels.values()))
+    total_s = n * Case(study.preset, flattened(study.set)).cost_s
+    size = f"the study has {n:,} runs, about {total_s / 3600:,.0f} hours of one core"
+    if n > MOST_RUNS:
+        raise ConfigError(f"{size}: it must have at most {MOST_RUNS:,}; take fewer values, samples or repeats")
+    if total_s > LONG_S:
+        warnings.warn(size, stacklevel=2)
+    if grid:
+        samples = list(product(*grid.values()))
     else:
         places = unit_samples(study.design, study.samples or 0, len(variables), study.seed)
         samples = [tuple(map(sampled, variables, row)) for row in places.tolist()]
-        levels = {SAMPLE: range(len(samples))}
-    if study.repeats > 1:
-        levels[REPEAT] = range(base.seed, base.seed + study.repeats)
     return Plan(study, base, fields, samples, levels)
 
 
@@ -268,30 +274,123 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Returns the fields of nested tables by dotted path."""
     fields: dict[str, Any] = {}
     for name, value in tree.items():
-        below = flattened(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
-        fields |= below
+        path = f"{prefix}{name}"
+        fields |= flattened(value, f"{path}.") if isinstance(value, Mapping) else {path: value}
     return fields
 
 
-def _levels(variable: Variable, number: int | None) -> tuple[Any, ...]:
+def _levels(variable: Variable, vary: Vary) -> tuple[Any, ...]:
     if isinstance(variable, Choice):
         return variable.values
-    levels = tuple(dict.fromkeys(from_unit(variable, share) for share in np.linspace(0.0, 1.0, number or 0).tolist()))
-    if len(levels) != number:
+    shares = np.linspace(0.0, 1.0, vary.number or 0).tolist()
+    levels = tuple(dict.fromkeys(from_unit(variable, share) for share in shares))
+    if len(levels) != vary.number:
         raise ConfigError(
-            f"vary {variable.field!r}: number = {number}: from {variable.low:g} to {variable.high:g} there are only "
-            f"{len(levels)} values to tell apart"
+            f"vary {variable.field!r}: number = {vary.number}: from {variable.low:g} to {variable.high:g} there are "
+            f"only {len(levels)} distinct values"
         )
     return levels
 
 
-def _check_size(study: Study) -> None:
-    """Refuses too many runs before they are laid out, and warns of such as take days."""
-    n = study.samples or prod(vary.number or len(vary.values or vary.choices or ()) for vary in study.vary)
-    n *= study.repeats
-    total_s = n * Case(study.preset, flattened(study.set)).cost_s
-    size = f"the study has {n:,} runs, about {total_s / 3600:,.0f} hours of one core"
-    if n > MOST_RUNS:
-        raise ConfigError(f"{size}: it must have at most {MOST_RUNS:,}; take fewer values, samples or repeats")
-    if total_s > LONG_S:
-        warnings.warn(size, stacklevel=3)
+def write_results(sweep: Sweep) -> list[Path]:
+    """Writes a sweep's dataset, its rows and its figure; without the figure where there is no number to draw."""
+    sweep.folder.mkdir(parents=True, exist_ok=True)
+    path = sweep.folder / DATASET
+    with whole_file(path) as draft:
+        sweep.data.to_netcdf(draft, engine="h5netcdf")
+    written = [path, _write_rows(sweep, sweep.folder / ROWS)]
+    if names := shown_numbers(sweep):
+        written.append(sweep_figure(_drawn(sweep.data, names), sweep.plan.fields, names, sweep.folder / FIGURE))
+    return written
+
+
+def _write_rows(sweep: Sweep, path: Path) -> Path:
+    """Writes one row a run as CSV with a header; what there is per segment has a column for each."""
+    columns: dict[str, np.ndarray] = {}
+    for number in sweep.numbers:
+        values = sweep.data[number.name].values.reshape(len(sweep.runs), -1)
+        names = [f"{number.name}_{i}" for i in sweep.data[SEGMENT].values] if number.per_segment else [number.name]
+        columns |= dict(zip(names, values.T, strict=True))
+    rows = (
+        [
+            i,
+            *_varied(sweep, i),
+            run.status,
+            run.reason,
+            " | ".join(run.warnings),
+            "" if run.outcome is None else run.outcome.path.name,
+            *("" if np.isnan(values[i]) else f"{values[i]:.10g}" for values in columns.values()),
+        ]
+        for i, run in enumerate(sweep.runs)
+    )
+    seed = ["seed"] if REPEAT in sweep.plan.levels else []
+    return write_csv(path, ["number", *sweep.plan.fields, *seed, "status", "reason", "warnings", "run", *columns], rows)
+
+
+def shown_numbers(sweep: Sweep) -> list[str]:
+    """Returns which numbers the table and the figure show: the one to rank by first, and only such as there are."""
+    study, kept = sweep.plan.study, {number.name for number in sweep.numbers}
+    wanted = dict.fromkeys([*([] if study.rank is None else [study.rank]), *(study.outputs or PREFERRED)])
+    return [name for name in wanted if name in kept and bool(np.isfinite(sweep.data[name]).any())][:N_SHOWN]
+
+
+def _drawn(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Numbers to draw, those per segment as their mean over the segments."""
+    chosen = data[[*names, "status"]]
+    for name in names:
+        if SEGMENT in chosen[name].dims:
+            text = f"{chosen[name].attrs['long_name']}, mean of segments"
+            chosen[name] = chosen[name].mean(SEGMENT).assign_attrs(chosen[name].attrs | {"long_name": text})
+    return chosen
+
+
+def results_table(sweep: Sweep) -> Table:
+    """Returns the runs with the highest and the lowest values of the first number, and those that failed and why."""
+    plan, names = sweep.plan, shown_numbers(sweep)
+    drawn = _drawn(sweep.data, names)
+    columns = [drawn[name].values.reshape(-1) for name in names]
+    content = f"highest and lowest {names[0]}" if names else "no number has a value"
+    table = Table(title=f"{plan.study.name}: {content}", caption=_caption(sweep))
+    heads = [worded(name.rsplit(".", 1)[-1], sweep.data[name].attrs["units"]) for name in (*plan.fields, *names)]
+    n = len(plan.fields)
+    for head in ("run", *heads[:n], *([REPEAT] if REPEAT in plan.levels else []), *heads[n:]):
+        table.add_column(head, justify="right")
+    if names:
+        order = [i for i in np.argsort(-columns[0], kind="stable").tolist() if np.isfinite(columns[0][i])]
+        for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:
+            for i in rows:
+                values = ("" if np.isnan(column[i]) else f"{column[i]:.4g}" for column in columns)
+                table.add_row(str(i), *_varied(sweep, i), *values)
+            table.add_section()
+    return table
+
+
+def failures(sweep: Sweep) -> list[tuple[str, list[int]]]:
+    """Returns why runs failed or were stopped, and the numbers of those runs, the most frequent reason first."""
+    by_reason: dict[str, list[int]] = {}
+    for i, run in enumerate(sweep.runs):
+        if run.status != "complete":
+            by_reason.setdefault(f"{run.status}: {run.reason}", []).append(i)
+    return sorted(by_reason.items(), key=lambda item: -len(item[1]))
+
+
+def _caption(sweep: Sweep) -> str:
+    reasons = failures(sweep)
+    lines = [f"{len(sweep.runs)} runs, of which {sum(run.status == 'complete' for run in sweep.runs)} are complete"]
+    if doubtful := [i for i, run in enumerate(sweep.runs) if run.warnings]:
+        lines[0] += f", and {len(doubtful)} have warnings (run {_listed(doubtful)}), which {ROWS} has"
+    lines += [f"{len(numbers)} {reason} (run {_listed(numbers)})" for reason, numbers in reasons[:N_FAILED]]
+    if len(reasons) > N_FAILED:
+        lines.append(f"{len(reasons) - N_FAILED} more reasons in {ROWS}")
+    return "\n".join(lines)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:5])) + (", .." if len(numbers) > 5 else "")
+
+
+def _varied(sweep: Sweep, i: int) -> list[str]:
+    """Values of the varied fields of a run, and its seed where there are repeats."""
+    values, case = sweep.plan.points[i]
+    seed = [str(case.changes["seed"])] if REPEAT in sweep.plan.levels else []
+    return [*map(label, values.values()), *seed]

@@ -1,13 +1,14 @@
 """What is uncertain about a worm's body, by how much, and Monte Carlo samples of it.
 
-Errors and their correlations are those of a fit to the load frame (`annelid.experiment.calibration`); the one that lies
-beside this module is what ``annelid calibrate`` writes. They are relative and are laid about the run's own values.
+Errors and their correlations are those of a fit to the load frame (`annelid.experiment.calibration`); the one that
+comes with annelid is what ``annelid calibrate`` writes. They are relative, about the run's own values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from importlib import resources
 from math import exp, inf, sqrt
 from pathlib import Path
@@ -20,8 +21,8 @@ from pydantic import BaseModel
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
-from annelid.experiment.calibration.fit import PARAMETERS
-from annelid.experiment.calibration.loop import wrap_factors
+from annelid.experiment.calibration import PARAMETERS
+from annelid.experiment.load_frame import wrap_factors
 from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text
@@ -34,10 +35,9 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
 }
 """What can be varied, and the fields that it scales: what a fit may change, and the floor. The shear modulus keeps its
 ratio to Young's. The cable's friction is no field of a body: it scales the rings' force by the mean tension of a cable,
-``(1 - exp(-m)) / m`` of that at its pulled end. By default what the load frame tells apart is varied: the first three.
-The others have no error that anyone has measured."""
+``(1 - exp(-m)) / m`` of that at its pulled end. By default what the load frame can tell apart is varied: the first
+three. The others have no error that anyone has measured."""
 CALIBRATION = "calibration.json"
-DEFAULT_SOURCE = "annelid calibrate"
 LEAST_EIGENVALUE = -1e-6
 ABSENT, UNMEASURED, EXACT = "0 or not set in this worm", "its error is not known", "its error is 0"
 """Why a parameter is not varied."""
@@ -52,7 +52,7 @@ class Spread:
         relative_error: Standard deviation of the logarithm of each, ``(p,)``.
         correlation: Of those, ``(p, p)``.
         source: Where the errors come from.
-        cable_exponent: m, friction of the cable times the angle it is wrapped round, where that is uncertain.
+        cable_exponent: m, friction of the cable times its wrap angle, where that is uncertain.
     """
 
     names: tuple[str, ...]
@@ -74,12 +74,11 @@ class Spread:
                 raise ConfigError(f"relative error of {name} = {error:g} must be at least 0 and below 1")
         if CABLE in errors and self.cable_exponent is None:
             raise ConfigError(f"{CABLE} cannot be varied: {self.source} has no value of it")
-        names = (*self.names, *(name for name in errors if name not in self.names))
         known = dict(zip(self.names, self.relative_error.tolist(), strict=True)) | dict(errors)
-        correlation = np.eye(len(names))
+        correlation = np.eye(len(known))
         correlation[: len(self.names), : len(self.names)] = self.correlation
         source = f"{self.source}; {', '.join(f'{name} as given' for name in errors)}" if errors else self.source
-        return Spread(names, np.array([known[name] for name in names]), correlation, source, self.cable_exponent)
+        return Spread(tuple(known), np.array(list(known.values())), correlation, source, self.cable_exponent)
 
     def only(self, names: Sequence[str]) -> Spread:
         """Returns the spread of some of its parameters."""
@@ -94,7 +93,7 @@ class _Parameter(BaseModel):
 
 
 class _Fit(BaseModel):
-    """What is read of a ``calibration.json``; None is what the fit does not tell."""
+    """What is read of a ``calibration.json``; None is what cannot be known from the fit."""
 
     parameters: dict[str, _Parameter]
     correlation: list[list[float | None]]
@@ -106,12 +105,16 @@ def read_spread(path: Path | None = None) -> Spread:
     Args:
         path: A ``calibration.json`` of ``annelid calibrate``; None for the one that comes with annelid.
 
+    Returns:
+        Its parameters with their errors and correlations.
+
     Raises:
-        ConfigError: The file cannot be read, is no such file, or the fit does not tell a parameter at all.
+        ConfigError: The file cannot be read, is no such file, or a parameter's error is not finite.
     """
-    bundled = (resources.files(__package__ or __name__) / CALIBRATION).read_text(encoding="utf-8")
+    bundled = resources.files("annelid") / "data" / CALIBRATION
+    text = bundled.read_text(encoding="utf-8") if path is None else read_text(path)
     try:
-        fit = _Fit.model_validate(parse_json(bundled if path is None else read_text(path), str(path)))
+        fit = _Fit.model_validate(parse_json(text, str(path)))
         fitted, correlation = fit.parameters, np.array(fit.correlation, dtype=float)
         if correlation.shape != (len(fitted), len(fitted)):
             raise ValueError("shape")
@@ -123,27 +126,27 @@ def read_spread(path: Path | None = None) -> Spread:
         if name not in FIELDS:
             raise ConfigError(f"{path} has an unknown parameter {name!r}: {suggest(name, FIELDS)}")
         if parameter.relative_error is None or not 0.0 <= parameter.relative_error < inf:
-            raise ConfigError(f"{path} does not tell {name}: its relative error is not finite; fit fewer with --free")
-    if not _is_correlation(correlation):
+            raise ConfigError(
+                f"{path} does not determine {name}: its relative error is not finite; fit fewer with --free"
+            )
+    if not (
+        np.isfinite(correlation).all()
+        and np.allclose(correlation, correlation.T)
+        and np.allclose(np.diag(correlation), 1.0)
+        and (np.linalg.eigvalsh(correlation) > LEAST_EIGENVALUE).all()
+    ):
         raise ConfigError(f"{path}: correlation must be symmetric and positive, with ones on its diagonal")
     return Spread(
         tuple(fitted),
         np.array([parameter.relative_error for parameter in fitted.values()]),
         correlation,
-        DEFAULT_SOURCE if path is None else str(path),
+        "annelid calibrate" if path is None else str(path),
         fitted[CABLE].value if CABLE in fitted else None,
     )
 
 
 def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str]]:
-    """Splits what a spread can change in a worm from what it cannot.
-
-    Returns:
-        The spread of those parameters that change the worm, and the reason of every other one by its name.
-
-    Raises:
-        ConfigError: The body is planar.
-    """
+    """Returns the spread of those parameters that change a 3D worm, and the reason of every other one by its name."""
     if not isinstance(config.body, WormBody):
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has no calibrated parameters and no elements, so no error bars; they "
@@ -152,7 +155,7 @@ def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str
     left_out: dict[str, str] = {}
     errors = dict(zip(spread.names, spread.relative_error.tolist(), strict=True))
     for name in FIELDS:
-        if not any(scaled_fields(config, name)):
+        if not scaled_fields(config, name):
             left_out[name] = ABSENT
         elif not errors.get(name):
             left_out[name] = EXACT if name in errors else UNMEASURED
@@ -167,16 +170,8 @@ def draw(n: int, spread: Spread, seed: int) -> Array:
     few independent draws correlate by chance. Fewer than p + 1 worms cannot have such a sample: theirs lies in a
     subspace drawn at random and has the same total variance.
 
-    Args:
-        n: How many worms, at least 2.
-        spread: Errors and correlations of p parameters.
-        seed: Of the draw.
-
     Returns:
-        Shape ``(n, p)``.
-
-    Raises:
-        MissingDependency: SciPy is not installed.
+        The changes of p parameters in each of n >= 2 samples, ``(n, p)``.
     """
     p = len(spread.names)
     if not p:
@@ -193,43 +188,23 @@ def draw(n: int, spread: Spread, seed: int) -> Array:
 
 
 def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any]:
-    """Returns the fields of one Monte Carlo sample by dotted path.
-
-    Args:
-        config: The worm that is varied.
-        spread: Parameters that change it, see `applicable`.
-        relative: Change of the logarithm of each, ``(p,)``.
-    """
+    """Returns the fields of one Monte Carlo sample by dotted path, from changes of the logarithms, ``(p,)``."""
     changed: dict[str, Any] = {}
     for name, change in zip(spread.names, relative.tolist(), strict=True):
         factor = exp(change)
         if name == CABLE and spread.cable_exponent is not None:
             pulled, drawn = (wrap_factors(m)[0] for m in (spread.cable_exponent, spread.cable_exponent * factor))
             factor = pulled / drawn
-        for path, value in scaled_fields(config, name):
+        for path, value in scaled_fields(config, name).items():
             changed[path] = [factor * each for each in value] if isinstance(value, tuple) else factor * value
     return changed
 
 
-def scaled_fields(config: RunConfig, name: str) -> Iterator[tuple[str, Any]]:
-    """Gives the fields that a parameter scales in this worm by dotted path, and their values."""
-    for path in FIELDS[name]:
-        value = _value(config, path)
-        if value:
-            yield path, value
+def scaled_fields(config: RunConfig, name: str) -> dict[str, Any]:
+    """Returns the fields that a parameter scales in this worm by dotted path, with their values."""
+    values = {path: reduce(_part, path.split("."), config) for path in FIELDS[name]}
+    return {path: value for path, value in values.items() if value}
 
 
-def _value(config: RunConfig, path: str) -> Any:
-    value: Any = config
-    for key in path.split("."):
-        value = getattr(value, key, None)
-    return value
-
-
-def _is_correlation(matrix: Array) -> bool:
-    return bool(
-        np.isfinite(matrix).all()
-        and np.allclose(matrix, matrix.T)
-        and np.allclose(np.diag(matrix), 1.0)
-        and (np.linalg.eigvalsh(matrix) > LEAST_EIGENVALUE).all()
-    )
+def _part(of: Any, name: str) -> Any:
+    return getattr(of, name, None)

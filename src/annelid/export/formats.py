@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.body.mjcf import Keyframe, mjcf_text
+from annelid.body.mjcf import mjcf_text
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError
 from annelid.export.page import write_page
@@ -100,7 +100,7 @@ def write_mjcf(run: Run, path: Path) -> Path:
     return write_text(path, mjcf_text(run.config, [] if run.config.body.is_planar else _keyframes(run)))
 
 
-def _keyframes(run: Run) -> list[Keyframe]:
+def _keyframes(run: Run) -> list[dict[str, Any]]:
     from annelid.simulation.runfile import read_checkpoint
     from annelid.simulation.worm import WormPlant
 
@@ -111,10 +111,10 @@ def _keyframes(run: Run) -> list[Keyframe]:
         if not run.data.sizes.get("frame"):
             return []
         posture, time_s = run.data["qpos"].values[-1], float(run.data["frame_time"].values[-1])
-        return [Keyframe("last_posture", time_s, posture, act=plant.anatomy.first_act)]
+        return [{"name": "last_posture", "time": time_s, "qpos": posture, "act": plant.anatomy.first_act}]
     plant.set_state(state)
     parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
-    return [Keyframe("final", float(plant.data.time), **parts)]
+    return [{"name": "final", "time": float(plant.data.time), **parts}]
 
 
 def _video(run: Run, path: Path, progress: Progress, fps: float = 25.0) -> list[Path]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.body.mjcf import mjcf_text
+from annelid.body.assemble import mjcf_text
 from annelid.errors import RunFileError
 from annelid.output import whole_file
 

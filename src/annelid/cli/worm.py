@@ -73,7 +73,7 @@ def build(
     annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
-    from annelid.body.mjcf import mjcf_text
+    from annelid.body.assemble import mjcf_text
     from annelid.output import write_text
 
     refuse_existing(output, force)

@@ -125,23 +125,14 @@ def simulate_batch(
         for run in runs:
             run.end_with(error)
         raise
-    with reporting(progress, 0.0, own[0].duration_s) as report:
-        wall_time_s = _run_all(teams, report)
-    return BatchResult(
-        tuple(folders),
-        tuple(run.status for run in runs),
-        tuple(run.message for run in runs),
-        wall_time_s,
-    )
-
-
-def _run_all(teams: Sequence[Team], report: ProgressCallback | None) -> float:
-    """Runs every team in a thread of its own to the end; returns the wall-clock time, s."""
     began = perf_counter()
-    with Interruption() as interruption, ThreadPoolExecutor(len(teams)) as pool:
-        running = {pool.submit(team.run, interruption) for team in teams}
+    with (
+        reporting(progress, 0.0, own[0].duration_s) as report,
+        Interruption() as interruption,
+        ThreadPoolExecutor(len(teams)) as pool,
+    ):
+        running = left = {pool.submit(team.run, interruption) for team in teams}
         try:
-            left = running
             while left:
                 _, left = wait(left, PROGRESS_INTERVAL_S)
                 if report is not None:
@@ -152,7 +143,8 @@ def _run_all(teams: Sequence[Team], report: ProgressCallback | None) -> float:
             raise
         for team in running:
             team.result()
-    return perf_counter() - began
+    statuses, messages = tuple(run.status for run in runs), tuple(run.message for run in runs)
+    return BatchResult(tuple(folders), statuses, messages, perf_counter() - began)
 
 
 def checked_configs(
@@ -185,15 +177,9 @@ def checked_configs(
     for one in own:
         if not isinstance(one.body, WormBody):
             raise ConfigError(f"body.kind = {one.body.kind!r} cannot be batched; only the 3D worm ('worm') can")
-    _refuse_differences(own)
-    return own
-
-
-def _refuse_differences(configs: Sequence[RunConfig]) -> None:
     parts = tuple(f"{part}." for part in ALIKE)
     first, *others = (
-        {path: field_value(config, path) for path in fields_of(config) if f"{path}.".startswith(parts)}
-        for config in configs
+        {path: field_value(one, path) for path in fields_of(one) if f"{path}.".startswith(parts)} for one in own
     )
     for number, other in enumerate(others, start=1):
         for field in {**first, **other}:
@@ -202,6 +188,7 @@ def _refuse_differences(configs: Sequence[RunConfig]) -> None:
                     f"{field} is {other.get(field)!r} for worm {number} and {first.get(field)!r} for worm 0: all "
                     f"worms of a batch must agree in {', '.join(ALIKE)}; other fields may differ"
                 )
+    return own
 
 
 def threads_for(n_worms: int, threads: int | None) -> int:
@@ -249,12 +236,12 @@ class Team(Loop):
             activation |= of_group
             for number, error in errors.items():
                 self.drop(number, error)
-        self.each_numbered(lambda number, run: run.simulation.check_activation(activation[number]))
+        self.each(lambda number, run: run.simulation.check_activation(activation[number]))
         moved = self._move(one.moves_due(n_steps), activation)
         step += n_steps
         if moved or step % schedule.sample_every == 0 or step % schedule.frame_every == 0:
             self.settle()
-        self.each_numbered(
+        self.each(
             lambda number, run: run.simulation.advanced(
                 self._worms[number].strode(n_steps, moved.get(number)), activation[number], step, number in moved
             )

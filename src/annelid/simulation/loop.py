@@ -88,11 +88,8 @@ def simulate(
 class RecordedRun:
     """A worm with its controller and its run file, which says how the run ended, however it ends.
 
-    Attributes:
-        simulation: Plant and controller.
-        status: How it ended, one of `annelid.simulation.runfile.STATUSES`.
-        message: Why it ended before its time; empty if it did not.
-        error: What ended it; None if nothing did.
+    Its status is one of `annelid.simulation.runfile.STATUSES`, its message says why it ended before its time, and its
+    error is what ended it.
     """
 
     def __init__(self, config: RunConfig, simulation: Simulation, path: Path, origin: Origin | None = None) -> None:
@@ -112,27 +109,23 @@ class RecordedRun:
         attrs: dict[str, Any] = {"controller": getattr(controller, "name", type(controller).__name__)}
         attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
         rest_stretch_m = simulation.sensation.rest_stretch_m
-        self._recorder = Recorder(path, simulation.schedule, parts, rest_stretch_m, packed, attrs)
+        self.recorder = Recorder(path, simulation.schedule, parts, rest_stretch_m, packed, attrs)
 
     def record(self, wall_time_s: float) -> None:
         """Records a sample and a frame, where one is due."""
         simulation, schedule = self.simulation, self.simulation.schedule
         if simulation.step % schedule.sample_every == 0:
             own: Values = {"activation": simulation.activation, "wall_time": wall_time_s}
-            self._recorder.sample(*(read(False) for read in self._readers), own)
+            self.recorder.sample(*(read(False) for read in self._readers), own)
         if simulation.step % schedule.frame_every == 0:
-            self._recorder.frame(*(read(True) for read in self._readers))
-
-    def flush(self) -> None:
-        """Writes what was recorded so far."""
-        self._recorder.flush()
+            self.recorder.frame(*(read(True) for read in self._readers))
 
     def checkpoint(self) -> None:
         """Writes the state, so that the run can be continued from here, and what is doubtful so far."""
         state = self.simulation.checkpoint()
         if state is not None:
-            self._recorder.checkpoint(state.to_bytes())
-        self._recorder.warn(self.simulation.doubts())
+            self.recorder.checkpoint(state.to_bytes())
+        self.recorder.warn(self.simulation.doubts())
 
     def finish(self, interrupted_by: str | None) -> None:
         """Writes all that is left and closes the file: the run is complete, or a signal of that name ended it."""
@@ -145,11 +138,11 @@ class RecordedRun:
     def end_with(self, error: BaseException) -> None:
         """Ends the run because of an error; a file that is closed stays as it is."""
         self.error = self.error or error
-        if self._recorder.closed:
+        if self.recorder.closed:
             return
         with suppress(RunFileError):
             if isinstance(error, SimulationStopped):
-                self._recorder.warn(self.simulation.doubts())
+                self.recorder.warn(self.simulation.doubts())
                 self._end("stopped_by_guard", str(error))
             elif isinstance(error, RunFileError):
                 self._end("disk_failure", str(error), whole=False)
@@ -161,7 +154,7 @@ class RecordedRun:
 
     def _end(self, status: str, message: str = "", whole: bool = True) -> None:
         self.status, self.message = status, message
-        (self._recorder.finish if whole else self._recorder.close)(status, message)
+        self.recorder.finish(status, message, whole=whole)
 
 
 class Loop:
@@ -188,17 +181,18 @@ class Loop:
         due["report"] = began
         try:
             if self._schedule.start == 0:
-                self.each(lambda run: run.record(0.0))
+                self.each(lambda _, run: run.record(0.0))
             while (step := self._step()) < self._schedule.end and interruption.requested is None:
                 self.advance(step)
                 now = perf_counter()
-                self.record(now - began)
+                wall_time_s = now - began
+                self.each(lambda _, run, wall_time_s=wall_time_s: run.record(wall_time_s))
                 if now >= due["flush"]:
-                    self.each(RecordedRun.flush)
+                    self.each(lambda _, run: run.recorder.flush())
                     due["flush"] = now + self.flush_interval_s
                 if now >= due["checkpoint"]:
                     self.settle()
-                    self.each(RecordedRun.checkpoint)
+                    self.each(lambda _, run: run.checkpoint())
                     cost_s = perf_counter() - now
                     due["checkpoint"] = now + max(self.checkpoint_interval_s, cost_s / _CHECKPOINT_SHARE)
                 if report is not None and now >= due["report"]:
@@ -206,7 +200,7 @@ class Loop:
                     due["report"] = now + PROGRESS_INTERVAL_S
             self.settle()
             by = interruption.requested if self._step() < self._schedule.end else None
-            self.each(lambda run: run.finish(by))
+            self.each(lambda _, run: run.finish(by))
             if report is not None:
                 report(self.simulated_s, now - began)
         except BaseException as error:
@@ -216,21 +210,13 @@ class Loop:
 
     def advance(self, step: int) -> None:
         """Takes control steps up to the next event, from ``step`` on."""
-        self.each(lambda run: run.simulation.advance())
+        self.each(lambda _, run: run.simulation.advance())
 
     def settle(self) -> None:
         """Brings all controllers up to the step that was reached, where something of them is read."""
 
-    def record(self, wall_time_s: float) -> None:
-        """Records every run that is due."""
-        self.each(lambda run: run.record(wall_time_s))
-
-    def each(self, action: Callable[[RecordedRun], None]) -> None:
-        """Does something with every run that is going on; one that fails ends, and the others go on."""
-        self.each_numbered(lambda _, run: action(run))
-
-    def each_numbered(self, action: Callable[[int, RecordedRun], None]) -> None:
-        """Does as `each` with every run and its number."""
+    def each(self, action: Callable[[int, RecordedRun], object]) -> None:
+        """Does something with every run that is going on and its number; one that fails ends, and the others go on."""
         for number, run in tuple(self.going.items()):
             try:
                 action(number, run)

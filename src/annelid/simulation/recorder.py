@@ -275,28 +275,22 @@ class Recorder:
             self._writer.write(WARNINGS, _padded("\n".join(doubts), WARNING_BYTES))
             self._doubts = doubts
 
-    def finish(self, status: str, message: str = "") -> None:
-        """Writes what is left, how the run ended and why, and closes the file.
+    def finish(self, status: str, message: str = "", *, whole: bool = True) -> None:
+        """Writes how the run ended and why and closes the file, after what is left in memory if it is to be whole.
 
         A run is not complete where its last samples cannot be written: its file is left open, to be closed otherwise.
-        """
-        try:
-            if not self._writer.closed:
-                self.flush()
-        except BaseException:
-            if status != "complete":
-                self.close(status, message)
-            raise
-        self.close(status, message)
-
-    def close(self, status: str, message: str = "") -> None:
-        """Writes how the run ended and closes the file, without the samples still in memory.
-
         What a file says that is closed already, also by an error in the middle of this, is left as it is.
         """
         writer = self._writer
         if writer.closed:
             return
+        try:
+            if whole:
+                self.flush()
+        except BaseException:
+            if status != "complete":
+                self.finish(status, message, whole=False)
+            raise
         try:
             writer.write("status_message", _padded(message, MESSAGE_BYTES))
             writer.write(CPU_TIME, np.array(process_time() - self._began_cpu_s, dtype="<f8"))

@@ -49,7 +49,7 @@ class ServoRings(ActuatorKind):
             yield from _findings(body, self, low, high, force_N)
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
-        """Adds a cable whose slack length is the engine's state: its rate is the control, `winding_speed`."""
+        """Adds a cable whose slack length is the engine's state: its rate is the control, `drive`."""
         import mujoco
 
         stiffness, speed = self.stiffness_N_per_m, self.speed_limit_m_per_s
@@ -90,9 +90,18 @@ class ServoRings(ActuatorKind):
         return np.array([actuator.actrange[1] for actuator in spec.actuators])
 
     def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
-        """Returns `winding_speed`; the states are the slack lengths of the cables, m."""
-        limits = -model.actuator_forcerange[:, 0]
-        return winding_speed(activation, state, length_m, model.actuator_actrange, limits, self, time_s)
+        """Returns the rate at which the slack lengths of the cables, the states, change, m/s: negative while they wind.
+
+        Towards the commanded length, but never so short that the tension at rest would exceed the force limit: a
+        stalled servo does not wind on, gives way to what pulls harder, and lets go at once when it is commanded to. The
+        rate is applied for a time, so that a cable does not overshoot the length that it is wound to.
+        """
+        (shortest, longest), limits_N = model.actuator_actrange.T, -model.actuator_forcerange[:, 0]
+        commanded = longest + activation * (shortest - longest)
+        stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
+        rate = (np.maximum(commanded, stalled) - state) / time_s
+        speed = self.speed_limit_m_per_s
+        return np.minimum(np.maximum(rate, -speed), speed)
 
 
 def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:
@@ -123,34 +132,3 @@ def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_
         yield from weak(body, "stiffness_N_per_m", rings.stiffness_N_per_m, rate * (rest - low))
         yield from weak(body, rings.force_field, force_N, force_N)
         yield from crushes(rings.force_field, force_N, bearable, low / rest)
-
-
-def winding_speed(
-    activation: Array,
-    slack_m: Array,
-    length_m: Array,
-    range_m: Array,
-    force_limit_N: Array,
-    rings: ServoRings,
-    time_s: float,
-) -> Array:
-    """Rate at which servos change the slack length of their cables, m/s: negative while they wind.
-
-    Towards the commanded length, but never so short that the tension at rest would exceed the force limit: a stalled
-    servo does not wind on, gives way to what pulls harder, and lets go at once when it is commanded to.
-
-    Args:
-        activation: In [0, 1], ``(.., n_servos)``; commands a slack length between the ends of the range.
-        slack_m: Present slack lengths, m, same shape.
-        length_m: Present lengths of the cables' paths, m, same shape.
-        range_m: Shortest and longest slack length, m, ``(n_servos, 2)``.
-        force_limit_N: Tension at which a servo stalls, N, ``(n_servos,)``.
-        rings: Speed and stiffness.
-        time_s: For how long the rate is applied, s: a cable does not overshoot the length that it is wound to.
-    """
-    shortest, longest = range_m[:, 0], range_m[:, 1]
-    commanded = longest + activation * (shortest - longest)
-    stalled = np.minimum(length_m - force_limit_N / rings.stiffness_N_per_m, longest)
-    rate = (np.maximum(commanded, stalled) - slack_m) / time_s
-    speed = rings.speed_limit_m_per_s
-    return np.minimum(np.maximum(rate, -speed), speed)

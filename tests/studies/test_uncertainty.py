@@ -20,6 +20,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment import uncertainty as study
 from annelid.experiment.calibration import EQUAL_STIFFNESS, calibrate
+from annelid.experiment.case import Case
 from annelid.experiment.load_frame import read_loop
 from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
 from annelid.experiment.store import case_key
@@ -39,7 +40,6 @@ from annelid.experiment.uncertainty import (
     scatter,
     uncertainty,
     uncertainty_table,
-    variant,
     write_uncertainty,
 )
 from annelid.simulation.loop import simulate
@@ -55,6 +55,10 @@ NOTHING: dict[str, float] = {"young_modulus": 0.0, "dry_friction": 0.0, "cable_f
 def spread(errors: Mapping[str, float], correlation: Any = None, exponent: float | None = None) -> Spread:
     matrix = np.eye(len(errors)) if correlation is None else np.asarray(correlation, dtype=float)
     return Spread(tuple(errors), np.array(list(errors.values())), matrix, "a test", exponent)
+
+
+def variant(config: RunConfig, changed: Mapping[str, Any]) -> Case:
+    return Case(config.name, changed, config)
 
 
 # The draw

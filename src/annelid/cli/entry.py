@@ -141,8 +141,11 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the command ``annelid``."""
-    warnings.showwarning = _complain_of_warning
-    _end_as_ctrl_c_does("SIGTERM", "SIGHUP")
+    warnings.showwarning = lambda message, *_, **__: complain(f"warning: {message}")
+    # Further signals end a command in good order; one that the process was told to ignore stays ignored.
+    for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
     _open_what_is_closed()
     # Pictures are drawn into files only; another back-end, or one that does not exist, would serve nothing.
     os.environ["MPLBACKEND"] = "agg"
@@ -165,13 +168,6 @@ def _throw_away(stream: TextIO) -> None:
     """Sends nowhere what is still to be written to a stream that fails: it would fail again when Python ends."""
     with suppress(OSError, ValueError), open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
-
-
-def _end_as_ctrl_c_does(*signals: str) -> None:
-    """Has further signals end a command in good order; one that the process was told to ignore stays ignored."""
-    for number in (getattr(signal, name) for name in signals if hasattr(signal, name)):
-        if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
 
 
 def _print_version(wanted: bool) -> None:
@@ -214,10 +210,6 @@ def end_study(n_runs: int, failed: int, reasons: object, *, stopped: int = 0) ->
 def typed_command(*further: str) -> str:
     """Returns the command line that the user gave, with further words."""
     return shlex.join(["annelid", *_typed.get(), *further])
-
-
-def _complain_of_warning(message: Warning | str, *_: object, **__: object) -> None:
-    complain(f"warning: {message}")
 
 
 def lock(folder: Path, *, new: bool = False) -> None:

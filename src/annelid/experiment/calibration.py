@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -165,7 +165,6 @@ def calibrate(
     measured: Loop,
     *,
     free: Sequence[str] = DEFAULT_FREE,
-    simulate: Callable[[RunConfig], Loop] | None = None,
     progress: Callable[[int, float], object] | None = None,
 ) -> Calibration:
     """Fits parameters by bounded least squares (`scipy.optimize.least_squares`, trust region reflective).
@@ -174,7 +173,6 @@ def calibrate(
         base: The worm; what is not fitted stays as it is here, and the cable slides freely unless it is fitted.
         measured: The loop to fit.
         free: Names of parameters (`PARAMETERS`).
-        simulate: Gives the tension's loop of a worm; by default `load_frame` as far as the measured loop goes.
         progress: Called with the number of loops simulated and the root mean square error, N, after each.
 
     Raises:
@@ -191,7 +189,7 @@ def calibrate(
 
     at_m = places(measured)
     wanted = measured.branches(at_m)
-    run = simulate or partial(load_frame, displacement_m=float(measured.displacement_m.max()))
+    reach_m = float(measured.displacement_m.max())
     kept: dict[tuple[tuple[str, float], ...], Loop] = {}
 
     def loop_of(values: Array) -> Loop:
@@ -200,7 +198,8 @@ def calibrate(
         changes = _changes(fitted)
         key = tuple(changes.items())
         if key not in kept:
-            kept[key] = run(load_config(base.model_dump(exclude_none=True), changes))
+            worm = load_config(base.model_dump(exclude_none=True), changes)
+            kept[key] = load_frame(worm, displacement_m=reach_m)
         return cable_force(kept[key], fitted.get("cable_friction", 0.0))
 
     def residual(log_values: Array) -> Array:

@@ -32,8 +32,6 @@ FRESH_S = 0.3
 """For how long the number of workers is not asked again, s."""
 HANDSHAKE_S = 5.0
 """For how long a scheduler may take that has been reached, s."""
-_NO_DASHBOARD = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
-"""Of the page that tells whether a scheduler is well there is no getting rid: it is for this machine only."""
 
 
 def workers_of(cluster: settings.Cluster, jobs: int | None = None) -> Workers:
@@ -180,7 +178,8 @@ def slurm_cluster(of: settings.Slurm) -> Any:
         job_script_prologue=list(of.prologue),
         security=security,
         shared_temp_directory="~",
-        scheduler_options=_NO_DASHBOARD,
+        # The page that says whether a scheduler is well cannot be left out: it is for this machine only.
+        scheduler_options={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
         **{name: value for name, value in optional.items() if value is not None},
     )
 

@@ -40,14 +40,13 @@ def study_progress(*, quiet: bool = False) -> Iterator[StudyProgress | None]:
 class TimeLeft:
     """Estimates the end of a stage from the share of its work that was done since it began."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._stage: str | None = None
         self._start = (0.0, 0.0)
 
     def __call__(self, stage: str, share: float) -> float | None:
         """Returns the time left in s, or None as long as it cannot be known."""
-        now = self._clock()
+        now = time.monotonic()
         if stage != self._stage or share < self._start[1]:
             self._stage, self._start = stage, (now, share)
         began, before = self._start
@@ -57,12 +56,12 @@ class TimeLeft:
 class Lines:
     """Writes a plain line at most every half minute."""
 
-    def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
-        self._stream, self._clock, self._left, self._last = stream, clock, TimeLeft(clock), -float("inf")
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._left, self._last = stream, TimeLeft(), -float("inf")
 
     def __call__(self, stage: str, done: int, total: int, share: float) -> None:
         """Takes note of how far a stage has come."""
-        left, now = self._left(stage, share), self._clock()
+        left, now = self._left(stage, share), time.monotonic()
         if now - self._last >= LINE_EVERY_S:
             self._last = now
             self._stream.write(": ".join(filter(None, (stage, _text(done, total, left)))) + "\n")

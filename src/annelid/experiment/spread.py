@@ -202,9 +202,7 @@ def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any
 
 def scaled_fields(config: RunConfig, name: str) -> dict[str, Any]:
     """Returns the fields that a parameter scales in this worm by dotted path, with their values."""
-    values = {path: reduce(_part, path.split("."), config) for path in FIELDS[name]}
+    values: dict[str, Any] = {
+        path: reduce(lambda of, part: getattr(of, part, None), path.split("."), config) for path in FIELDS[name]
+    }
     return {path: value for path, value in values.items() if value}
-
-
-def _part(of: Any, name: str) -> Any:
-    return getattr(of, name, None)

@@ -30,7 +30,6 @@ from annelid.output import write_csv
 
 START = -1
 """Number of the gait that the search starts from, which is no trial."""
-LOG = "log"
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
 LEAST_CYCLES = 2
 """Complete cycles that a gait must have."""
@@ -155,7 +154,7 @@ def _parsed(text: str) -> dict[str, Any]:
             raise ConfigError(f"{text}: one value is no choice: {HOW}")
         return {"field": path, "choices": choices}
     low, high, *rest = (part.strip() for part in right.split(":"))
-    if rest not in ([], [LOG]):
+    if rest not in ([], ["log"]):
         raise ConfigError(f"{text}: only 'log' may follow the ends of a range: {HOW}")
     try:
         return {"field": path, "from": float(low), "to": float(high), "log": bool(rest)}
@@ -229,7 +228,10 @@ def search(
     while (done := len(found) - 1) < task.n_trials:
         values = generation[: task.n_trials - done]
         cases = [start.but(of_trial) for of_trial in values]
-        results = store.finish(cases, _best_words(task, found), jobs=jobs, progress=report)
+        leaders = {objective: leader(found, [objective]) for objective in task.objectives}
+        words = [f"{one.name} {best.judged.value(one):.3g}" for one, best in leaders.items() if best is not None]
+        stage = f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
+        results = store.finish(cases, stage, jobs=jobs, progress=report)
         trials = [_trial(done + i, *of_it) for i, of_it in enumerate(zip(values, cases, results, strict=True))]
         found += trials
         yield trials
@@ -243,12 +245,6 @@ def _trial(number: int, values: Mapping[str, Any], case: Case, done: Done) -> Tr
     failed = not isinstance(done.error, ConfigError)
     problem = f"{'failed' if failed else 'cannot be built'}: {done.error}"
     return Trial(number, values, case, Judged(None, problem), Path(), failed)
-
-
-def _best_words(task: Task, found: Sequence[Trial]) -> str:
-    leaders = {objective: leader(found, [objective]) for objective in task.objectives}
-    words = [f"{one.name} {best.judged.value(one):.3g}" for one, best in leaders.items() if best is not None]
-    return f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
 
 
 def _scores(trial: Trial, objectives: Sequence[Objective]) -> tuple[float, ...]:

@@ -266,7 +266,7 @@ def uncertainty(
     if n < FEWEST:
         raise ConfigError(f"n = {n} worms have no standard deviation: draw at least {FEWEST}")
     chosen, left_out = applicable(config, read_spread() if spread is None else spread)
-    variants = [(kind, variant(config, changed)) for kind, changed in plan(config, n, chosen)]
+    variants = [(kind, Case(config.name, changed, config)) for kind, changed in plan(config, n, chosen)]
     # A study goes on in its own folder, and into an empty one.
     if overwrite or not (folder / RUNS).is_dir():
         refuse_used_folder(folder, overwrite)
@@ -290,11 +290,6 @@ def plan(config: RunConfig, n: int, spread: Spread) -> list[tuple[Kind, dict[str
         *(("time step", finer) for finer in finer_steps(config)),
         *(("elements", {ELEMENTS: count}) for count in more_elements(config)),
     ]
-
-
-def variant(config: RunConfig, changed: Mapping[str, Any]) -> Case:
-    """Returns a variant of a run, with what is changed in it by dotted path."""
-    return Case(config.name, changed, config)
 
 
 def finer_steps(config: RunConfig) -> list[dict[str, float]]:

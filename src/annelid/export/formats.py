@@ -97,24 +97,23 @@ def write_mjcf(run: Run, path: Path) -> Path:
         ConfigError: The worm is planar or started with a heading, or its friction depends on the direction.
         RunFileError: The file cannot be written.
     """
-    return write_text(path, mjcf_text(run.config, [] if run.config.body.is_planar else _keyframes(run)))
-
-
-def _keyframes(run: Run) -> list[dict[str, Any]]:
     from annelid.simulation.runfile import read_checkpoint
     from annelid.simulation.worm import WormPlant
 
-    plant = WormPlant(run.config)
-    try:
-        state = read_checkpoint(run.path).plant
-    except RunFileError:
-        if not run.data.sizes.get("frame"):
-            return []
-        posture, time_s = run.data["qpos"].values[-1], float(run.data["frame_time"].values[-1])
-        return [{"name": "last_posture", "time": time_s, "qpos": posture, "act": plant.anatomy.first_act}]
-    plant.set_state(state)
-    parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
-    return [{"name": "final", "time": float(plant.data.time), **parts}]
+    keyframes: list[dict[str, Any]] = []
+    if not run.config.body.is_planar:
+        plant = WormPlant(run.config)
+        try:
+            plant.set_state(read_checkpoint(run.path).plant)
+            parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
+            keyframes.append({"name": "final", "time": float(plant.data.time), **parts})
+        except RunFileError:
+            if run.data.sizes.get("frame"):
+                posture, time_s = run.data["qpos"].values[-1], float(run.data["frame_time"].values[-1])
+                keyframes.append(
+                    {"name": "last_posture", "time": time_s, "qpos": posture, "act": plant.anatomy.first_act}
+                )
+    return write_text(path, mjcf_text(run.config, keyframes))
 
 
 def _video(run: Run, path: Path, progress: Progress, fps: float = 25.0) -> list[Path]:

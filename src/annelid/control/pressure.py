@@ -13,7 +13,7 @@ from annelid.control.neural import require_step_within
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network
-from annelid.nervous.pressure import PressureParameters, pressure_network
+from annelid.nervous.peristalsis import pressure_network
 from annelid.protocols import Array, Plant, Sensation
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class PressureSns(ControllerKind):
-    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.pressure`.
+    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
 
     A segment that bears load holds itself expanded until the one before it is extended, and one that begins to contract
     ends the contraction two segments before. Lengths and loads are those of the six-segment robot, of 0.16 m radius and
@@ -93,7 +93,7 @@ class PressureSns(ControllerKind):
 
 
 class PressureController(PeristalsisController[PressureSns]):
-    """Drives a worm by `annelid.nervous.pressure`.
+    """Drives a worm by `annelid.nervous.peristalsis`.
 
     A segment's load is the sum of the normal forces on its four sides, its length the mean of its stretch sensors, both
     rising linearly from nothing to R. As long as segment 1's stretch sensor is held off at the start, so is its load.
@@ -105,9 +105,15 @@ class PressureController(PeristalsisController[PressureSns]):
     def _network(self, n_segments: int, control_timestep_s: float) -> Network:
         config = self._config
         require_step_within(control_timestep_s, pressure_time_constant_s=config.pressure_time_constant_s)
-        strengths = config.hold, config.release, config.landing, config.exchange
-        design = PressureParameters(self._parameters, *strengths, 1e3 * config.pressure_time_constant_s)
-        return pressure_network(n_segments, design)
+        return pressure_network(
+            n_segments,
+            self._parameters,
+            hold=config.hold,
+            release=config.release,
+            landing=config.landing,
+            exchange=config.exchange,
+            pressure_ms=1e3 * config.pressure_time_constant_s,
+        )
 
     def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
         config, further = self._config, self._inputs_nA[self._n_segments + 1 :]

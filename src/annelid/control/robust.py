@@ -13,9 +13,16 @@ from annelid.control.adaptive import DRIVE_HINT
 from annelid.control.neural import NeuralController, design_of
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous.adaptive import DRIVE_NEURON
-from annelid.nervous.driven import MOTOR, MOTOR_SHARE, DriveParameters, add_motor_neurons, driven_robust_network
-from annelid.nervous.robust import ROLES, RobustParameters, robust_network
+from annelid.nervous.peristalsis import DRIVE_NEURON
+from annelid.nervous.robust import (
+    MOTOR,
+    MOTOR_SHARE,
+    ROLES,
+    RobustParameters,
+    add_motor_neurons,
+    driven_robust_network,
+    robust_network,
+)
 from annelid.protocols import SIDES, Array, Plant, Sensation, Values
 
 if TYPE_CHECKING:
@@ -50,7 +57,7 @@ class RobustSns(ControllerKind):
 
     All contraction neurons suppress each other, a slow relay counts each turn, and the stretch sensors entrain it
     within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used. With
-    ``descending.lift`` the wave adapts to narrow pipes: `annelid.nervous.driven`.
+    ``descending.lift`` the wave adapts to narrow pipes: `annelid.nervous.robust`.
     """
 
     sensor_fields: ClassVar[frozenset[str]] = frozenset({"noise_m"})
@@ -114,7 +121,7 @@ BACK = SIDES.index("back")
 
 
 class RobustController(NeuralController):
-    """Drives a worm by `annelid.nervous.robust`, or with a drive by `annelid.nervous.driven`.
+    """Drives a worm by `annelid.nervous.robust`, or with a drive by `annelid.nervous.robust`.
 
     One step, from t to t + dt: the segments' mean lengthening at t, graded and clipped, drives the stretch neurons
     during the whole step; activation is ``1 / (1 + exp(-slope (U1 - U2)))`` of the contraction and expansion neurons at
@@ -146,9 +153,14 @@ class RobustController(NeuralController):
         self._config, drive = config, config.descending
         self._parameters = parameters = design_of(RobustParameters, config)
         if drive.lift:
-            times_ms = 1e3 * drive.time_constant_s, 1e3 * drive.pressure_time_constant_s
-            pathway = DriveParameters(drive.lift, drive.per_segment, *times_ms)
-            network = driven_robust_network(n_segments, parameters, pathway)
+            network = driven_robust_network(
+                n_segments,
+                parameters,
+                lift=drive.lift,
+                per_segment=drive.per_segment,
+                drive_ms=1e3 * drive.time_constant_s,
+                pressure_ms=1e3 * drive.pressure_time_constant_s,
+            )
         else:
             network = robust_network(n_segments, parameters)
         if config.let_go_s:

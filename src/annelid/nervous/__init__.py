@@ -1,10 +1,5 @@
 """Neurons, synapses, networks and the paper's peristalsis network; knows no engine and no body."""
 
-from annelid.nervous.adaptive import (
-    adaptive_half_centre,
-    adaptive_peristalsis_network,
-    drive_conductance_uS,
-)
 from annelid.nervous.arrays import NetworkArrays
 from annelid.nervous.diagram import Diagram
 from annelid.nervous.functional_subnetworks import (
@@ -31,6 +26,9 @@ from annelid.nervous.neurons import Channel, Firing, Gate, Neuron, persistent_so
 from annelid.nervous.peristalsis import (
     Conductances,
     PeristalsisParameters,
+    adaptive_half_centre,
+    adaptive_peristalsis_network,
+    drive_conductance_uS,
     neuron_names,
     peristalsis_network,
 )

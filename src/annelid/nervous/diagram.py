@@ -9,8 +9,6 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from annelid.errors import ConfigError
 from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
@@ -185,14 +183,14 @@ def _svg(title: str, shapes: Sequence[Shape]) -> str:
 
 def _svg_element(shape: Shape) -> str:
     if isinstance(shape, Words):
-        x, y = _PX * np.multiply(shape.place, (1.0, -1.0))
+        x, y = _PX * shape.place.real, -_PX * shape.place.imag
         size = _PX_PER_PT * shape.size_pt
         y += {"bottom": 0.0, "center": 0.35, "top": 0.75}[shape.along] * size
         anchor = {"left": "start", "center": "middle", "right": "end"}[shape.across]
         halo = ' stroke="white" stroke-width="2.5" paint-order="stroke"' if shape.halo else ""
         words = escape(_line(shape.text))
         return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:.1f}" text-anchor="{anchor}"{halo}>{words}</text>'
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in _PX * shape.points * (1.0, -1.0))
+    points = " ".join(f"{point.real:.1f},{point.imag:.1f}" for point in _PX * shape.points.conj())
     look = f'fill="{shape.fill or "none"}" stroke="{shape.color}" stroke-width="{_PX_PER_PT * shape.width_pt:.1f}"'
     key = f' id="{escape(_line(shape.key))}"' if shape.key else ""
     dashes = ' stroke-dasharray="5 3"' if shape.dashed else ""

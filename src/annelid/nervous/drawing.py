@@ -8,28 +8,26 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from annelid.nervous.layout import RADIUS, STUB, Stub, arc_length, lay_out, points_at, rounded, with_resistor
-from annelid.nervous.neurons import Array
+from annelid.nervous.layout import RADIUS, STUB, Points, Stub, arc_length, lay_out, points_at, rounded, with_resistor
 from annelid.nervous.synapses import GapJunction, ModulatorySynapse
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Connection, Network
 
 Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
+_GREY = "#595959"
 # Dark and light in grey, hues far apart for colour-blind eyes.
 COLORS: dict[Effect, str] = {
     "excitatory": "#c2410c",
     "inhibitory": "#1b2a6b",
-    "modulatory": "#595959",
-    "gap junction": "#595959",
-    "rectified gap junction": "#595959",
+    "modulatory": _GREY,
+    "gap junction": _GREY,
+    "rectified gap junction": _GREY,
 }
 _TRIANGLE, _DOT = 0.17, 0.065
-_HEADER = RADIUS + STUB + 0.16
-"""Height of a segment's name above its uppermost neuron."""
-_GREY = "#4d4d4d"
 _ROUND = 48
 """Corners of what looks round."""
+_ARROW = "#4d4d4d"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +35,7 @@ class Line:
     """A line through points; with a fill it is closed.
 
     Attributes:
-        points: In units of the distance between neighbouring neurons, y upwards, shape ``(n, 2)``.
+        points: As `annelid.nervous.layout` has them, shape ``(n,)``.
         color: Of the line.
         width_pt: Its width, points.
         fill: Colour of what it encloses; empty for an open line.
@@ -45,7 +43,7 @@ class Line:
         key: Names the part of the network; empty for a part of another shape.
     """
 
-    points: Array
+    points: Points
     color: str
     width_pt: float = 1.3
     fill: str = ""
@@ -59,15 +57,15 @@ class Words:
 
     Attributes:
         text: The words.
-        place: Shape ``(2,)``, in units of the distance between neighbouring neurons.
+        place: A point as `annelid.nervous.layout` has it.
         size_pt: Size of the letters, points.
-        across: Where the words begin, have their middle, or end: at the place.
-        along: Whether the words stand on the place, around it, or hang from it.
+        across: Which end of the words is at the place.
+        along: Whether the words stand on the place, around it, or below it.
         halo: Whether to clear what lies under the words.
     """
 
     text: str
-    place: Array
+    place: complex
     size_pt: float
     across: Literal["left", "center", "right"] = "center"
     along: Literal["bottom", "center", "top"] = "center"
@@ -124,10 +122,9 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
             place = points_at(route, share * arc_length(route)[-1:])[0]
             numbers.append(Words(strength_of(link), place, 7.0, halo=True))
     for stub in layout.inputs:
-        arrow = arrow_shapes(np.array([stub.outer, stub.rim]), f"input-{stub.name}-{stub.neuron}")
-        front += [*arrow, *_name_of(stub)]
+        front += [*arrow_shapes(stub.outer, stub.rim, f"input-{stub.name}-{stub.neuron}"), *_name_of(stub)]
     for stub in layout.outputs:
-        front += [*arrow_shapes(np.array([stub.rim, stub.outer]), f"output-{stub.name}"), *_name_of(stub)]
+        front += [*arrow_shapes(stub.rim, stub.outer, f"output-{stub.name}"), *_name_of(stub)]
     for name, place in layout.places.items():
         neuron = network.neurons[name]
         spiking, gated = neuron.firing is not None, bool(neuron.channels)
@@ -135,7 +132,7 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
     return [*columns, *paths, *marks, *numbers, *front]
 
 
-def neuron_shapes(place: Array, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
+def neuron_shapes(place: complex, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
     """Draws a circle, or an octagon for a neuron that spikes, with a double rim if it has gated channels."""
     size_pt = 9.0 if len(label) <= 3 else min(7.0, max(5.0, 65.0 / len(label)))
     n_corners = 8 if spiking else _ROUND
@@ -145,86 +142,82 @@ def neuron_shapes(place: Array, label: str, *, spiking: bool, gated: bool, key: 
     return [*rims, Words(label, place, size_pt)]
 
 
-def connection_shapes(route: Array, effect: Effect, key: str = "") -> list[Shape]:
-    """Draws a path, ``(n, 2)``, that ends in a triangle, a dot or a square, or has a resistor in its middle."""
-    color, tip = COLORS[effect], route[-1]
-    if effect == "gap junction":
-        return [Line(with_resistor(route), color, key=key)]
-    if effect == "rectified gap junction":
-        along = 0.9 * arc_length(route)[-1]
-        tip, back = points_at(route, np.array([along, along - 0.1]))
-        across = 0.55 * _left_of(tip - back)
-        return [
-            Line(with_resistor(route), color, key=key),
-            Line(np.array([tip, back + across, back - across]), color, 1.0, color),
-            Line(np.array([tip + across, tip - across]), color),
-        ]
+def connection_shapes(route: Points, effect: Effect, key: str = "") -> list[Shape]:
+    """Draws a path that ends in a triangle, a dot or a square, or has a resistor in its middle."""
+    color, along = COLORS[effect], arc_length(route)
+    if "gap" in effect:
+        path = Line(with_resistor(route), color, key=key)
+        if effect == "gap junction":
+            return [path]
+        tip, back = points_at(route, 0.9 * along[-1] - np.array([0.0, 0.1]))
+        across = 0.55j * (tip - back)
+        return [path, _triangle(tip, back, across, color, 1.0, color), Line(np.array([tip + across, tip - across]), color)]
     length = _TRIANGLE if effect == "excitatory" else 2.0 * _DOT
-    along = arc_length(route)
     end = along[-1] - length
     body = points_at(route, np.append(along[along < end], end))
-    forward = (tip - body[-1]) / np.hypot(*(tip - body[-1]))
+    tip, forward = route[-1], (route[-1] - body[-1]) / abs(route[-1] - body[-1])
     back, middle = tip - length * forward, tip - _DOT * forward
     if effect == "inhibitory":
         mark = Line(_polygon(middle, _DOT, _ROUND), color, 1.0, color)
     elif effect == "excitatory":
-        across = 0.5 * length * _left_of(forward)
-        mark = Line(np.array([tip, back + across, back - across]), color, 1.2, "white")
+        mark = _triangle(tip, back, 0.5j * length * forward, color, 1.2, "white")
     else:
-        across = _DOT * _left_of(forward)
+        across = 1j * _DOT * forward
         mark = Line(np.array([tip, middle + across, back, middle - across]), color, 1.2, "white")
     return [Line(body, color, dashed=effect == "modulatory", key=key), mark]
 
 
-def arrow_shapes(path: Array, key: str = "") -> list[Shape]:
-    """Draws an input or an output from tail to head, ``(2, 2)``."""
-    forward = (path[1] - path[0]) / np.hypot(*(path[1] - path[0]))
-    back, across = path[1] - 0.08 * forward, 0.04 * _left_of(forward)
+def arrow_shapes(tail: complex, head: complex, key: str = "") -> list[Shape]:
+    """Draws an input or an output."""
+    forward = (head - tail) / abs(head - tail)
+    back = head - 0.08 * forward
     return [
-        Line(np.array([path[0], back]), _GREY, 1.0, key=key),
-        Line(np.array([path[1], back + across, back - across]), _GREY, 1.0, _GREY),
+        Line(np.array([tail, back]), _ARROW, 1.0, key=key),
+        _triangle(head, back, 0.04j * forward, _ARROW, 1.0, _ARROW),
     ]
 
 
 def frame_of(shapes: Iterable[Shape], unit_in: float) -> tuple[float, float, float, float]:
     """Returns left, right, bottom and top of all shapes with a margin, if a unit is drawn ``unit_in`` inches long."""
-    corners = [np.zeros(2)]
+    corners = [np.zeros(1, dtype=complex)]
     for shape in shapes:
         if isinstance(shape, Line):
-            corners += [shape.points.min(axis=0), shape.points.max(axis=0)]
+            corners.append(shape.points)
         else:
             height = shape.size_pt / 72.0 / unit_in
             width = 0.6 * height * len(shape.text)
-            left = {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
-            corners += [np.add(shape.place, (left, -height)), np.add(shape.place, (left + width, height))]
-    (left, bottom), (right, top) = np.min(corners, axis=0) - 0.15, np.max(corners, axis=0) + 0.15
-    return float(left), float(right), float(bottom), float(top)
+            left = shape.place + {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
+            corners.append(np.array([left - 1j * height, left + width + 1j * height]))
+    points = np.concatenate(corners)
+    x, y = points.real, points.imag
+    return float(x.min()) - 0.15, float(x.max()) + 0.15, float(y.min()) - 0.15, float(y.max()) + 0.15
 
 
-def _column(name: str, places: Array) -> list[Shape]:
+def _triangle(tip: complex, back: complex, across: complex, color: str, width_pt: float, fill: str) -> Line:
+    return Line(np.array([tip, back + across, back - across]), color, width_pt, fill)
+
+
+def _column(name: str, places: Points) -> list[Shape]:
     """Draws a segment's background around its neurons, and its name above them."""
-    (left, bottom), (right, top) = places.min(axis=0) - 0.44, places.max(axis=0) + 0.44
+    x, y = places.real, places.imag
+    left, right, bottom, top = x.min() - 0.44, x.max() + 0.44, y.min() - 0.44, y.max() + 0.44
     middle = (left + right) / 2.0
-    corners = np.array([(middle, top), (left, top), (left, bottom), (right, bottom), (right, top), (middle, top)])
-    header = Words(name, np.array([middle, places.max(axis=0)[1] + _HEADER]), 9.0)
-    return [Line(rounded(corners, 0.2), "none", 0.0, "#f1f1f1"), header]
+    corners = [(middle, top), (left, top), (left, bottom), (right, bottom), (right, top), (middle, top)]
+    header = Words(name, complex(middle, y.max() + RADIUS + STUB + 0.16), 9.0)
+    return [Line(rounded(np.array([complex(*corner) for corner in corners]), 0.2), "none", 0.0, "#f1f1f1"), header]
 
 
 def _name_of(stub: Stub) -> list[Shape]:
     """Writes an input's or output's name, unless that is the neuron's, beyond its outer end."""
     if stub.name == stub.neuron:
         return []
-    sideways, upwards = direction = (stub.outer - stub.rim) / STUB
-    across = "center" if abs(sideways) < 0.3 else "left" if sideways > 0 else "right"
-    along = "center" if abs(upwards) < 0.3 else "bottom" if upwards > 0 else "top"
+    direction = (stub.outer - stub.rim) / STUB
+    across = "center" if abs(direction.real) < 0.3 else "left" if direction.real > 0 else "right"
+    along = "center" if abs(direction.imag) < 0.3 else "bottom" if direction.imag > 0 else "top"
     return [Words(stub.name.replace("_", " "), stub.outer + 0.06 * direction, 8.0, across, along)]
 
 
-def _polygon(center: Array, radius: float, n_corners: int) -> Array:
+def _polygon(center: complex, radius: float, n_corners: int) -> Points:
     """Returns the corners of a polygon around a circle, which its sides touch."""
     turn = np.pi * (2 * np.arange(n_corners) + 1) / n_corners
-    return center + radius / np.cos(np.pi / n_corners) * np.column_stack([np.cos(turn), np.sin(turn)])
-
-
-def _left_of(vector: Array) -> Array:
-    return np.array([-vector[1], vector[0]])
+    return center + radius / np.cos(np.pi / n_corners) * np.exp(1j * turn)

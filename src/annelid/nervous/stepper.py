@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import partial
 from math import prod
-from typing import Literal, Self, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from annelid.nervous.synapses import Modulated
 Scheme = Literal["euler", "toolbox", "heun"]
 GateStart = Literal["steady", "toolbox"]
 Operations = list[Callable[[], object]]
+Factors = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""Places of what is modulated, and the column of the factor that scales each."""
 
 # As arrays, numpy need not convert them at every call.
 _ZERO, _HALF, _ONE = np.array(0.0), np.array(0.5), np.array(1.0)
@@ -48,41 +50,28 @@ class NetworkState:
         return NetworkState(*(getattr(self, field.name).copy() for field in fields(self)))
 
 
-@dataclass(frozen=True, slots=True)
 class _Motion:
-    """Gates and potentials, or a change of them, in one row of numbers, so that one call adds both.
+    """Gates and potentials, or a change of them, in one row of numbers, so that one call adds both."""
 
-    Attributes:
-        all: The row.
-        gate: Its slow gates, ``(n_slow, n_worms, n_channels)``.
-        potential: Its potentials, ``(n_worms, n_neurons)``.
-    """
-
-    all: Array
-    gate: Array
-    potential: Array
-
-    @classmethod
-    def empty(cls, arrays: NetworkArrays, n_worms: int) -> Self:
+    def __init__(self, arrays: NetworkArrays, n_worms: int) -> None:
         gates = arrays.n_slow, n_worms, arrays.channel_neuron.size
-        row = np.empty(prod(gates) + n_worms * len(arrays.neurons))
-        return cls(row, row[: prod(gates)].reshape(gates), row[prod(gates) :].reshape(n_worms, -1))
+        self.all = np.empty(prod(gates) + n_worms * len(arrays.neurons))
+        self.gate = self.all[: prod(gates)].reshape(gates)
+        self.potential = self.all[prod(gates) :].reshape(n_worms, -1)
 
 
 class Stepper:
     """Advances ``n_worms`` copies of a compiled network by a fixed step.
 
     With ``y = sqrt(factor exp(slope (midpoint - U)))`` a gate's steady state is ``1 / (1 + y^2)`` and its rate
-    ``(1 - z (1 + y^2)) / (y time_constant_ms)``, which needs one exponential a gate. The exponents of the gates and
+    ``(1 - z (1 + y^2)) / (y time_constant_ms)``, which needs one exponential per gate. The exponents of the gates and
     the open fractions of the terminals are one affine map of the potentials; ``dt / C`` is part of the weights.
 
-    For small networks the time goes into calling numpy, not into arithmetic. So a step is laid down once as a list of
-    calls bound to fixed buffers, and made by going through the list. Every copy gets the same bits whatever their
-    number: the product with the weights is taken copy by copy, since a matrix product of all copies sums in another
-    order.
+    For small networks the time goes into calling numpy, not into arithmetic. So a step is a list of calls bound to fixed
+    buffers, made once. Every copy gets the same bits whatever their number: the product with the weights is taken copy
+    by copy, since a matrix product of all copies sums in another order.
 
-    Two steppers that run at once need not share anything but their arrays; one stepper keeps scratch buffers
-    and must not be used from two threads.
+    A stepper has scratch buffers and must not be used from two threads; two steppers share nothing but their arrays.
 
     Attributes:
         arrays: The network's parameters.
@@ -105,95 +94,84 @@ class Stepper:
         self.n_worms = n_worms
         self._prepare_parameters()
         self._prepare_buffers()
-        self._step = self._lay_down_step()
+        self._step = self._listed_step()
 
     def _prepare_parameters(self) -> None:
         a, dt, w = self.arrays, self.timestep_ms, self.n_worms
-        n_slots, n_slow, n_channels = len(a.gates), a.n_slow, a.channel_neuron.size
+        n_slots, n_channels = len(a.gates), a.channel_neuron.size
         gates = [gate for slot in a.gates for gate in slot]
         with np.errstate(divide="ignore"):
             log_factor = np.log([gate.factor for gate in gates])
         slope = np.array([gate.slope_per_mV for gate in gates])
         midpoint = np.array([gate.midpoint_mV for gate in gates])
         power = np.array([gate.power for gate in gates])
-        taus = [gate.time_constant_ms for slot in a.gates[:n_slow] for gate in slot]
+        taus = [gate.time_constant_ms for slot in a.gates[: a.n_slow] for gate in slot]
 
-        def by_slot(values: Array, n: int) -> Array:
+        def by_slot(values: Array) -> Array:
             """A row of channels for every slot and copy, as the buffers of the gates have it."""
-            return np.repeat(values.reshape(n, 1, n_channels), w, axis=1)
+            return np.repeat(values.reshape(-1, 1, max(n_channels, 1)), w, axis=1)
 
-        def laid_out(of_terminals: Array, of_gates: Array) -> Array:
+        def in_row(of_terminals: Array, of_gates: Array) -> Array:
             """A row of terminals for every copy, then the gates."""
-            return np.concatenate([np.tile(of_terminals, w), by_slot(of_gates, n_slots).ravel()])
+            return np.concatenate([np.tile(of_terminals, w), by_slot(of_gates).ravel()])
 
         terminal_slope = a.terminal_slope_per_mV
-        self._affine_slope = laid_out(terminal_slope, -0.5 * slope)
-        self._affine_offset = laid_out(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
+        self._affine_slope = in_row(terminal_slope, -0.5 * slope)
+        self._affine_offset = in_row(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
         first = len(a.neurons) * np.arange(w)[:, np.newaxis]
         bearers = (first + a.channel_neuron).ravel()
         self._looked_at = np.concatenate([(first + a.terminal_neuron).ravel(), *[bearers] * n_slots])
-        self._power = None if (power == 1.0).all() else by_slot(power, n_slots)
-        self._gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), n_slow)
+        self._power = None if (power == 1.0).all() else by_slot(power)
+        self._gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]))
         membrane_rate = dt / a.capacitance_nF
         self._weights = a.weights * np.tile(membrane_rate, 2)
         self._leak_step = a.leak_conductance_uS * membrane_rate
         self._threshold_rate = dt / a.adaptation_time_constant_ms
         self._release_decay = np.exp(-dt / a.release_time_constant_ms)
-        self._prepare_modulation()
 
-    def _prepare_modulation(self) -> None:
-        """Finds, for each modulated quantity, which factor scales which column."""
-        a = self.arrays
-
-        def pairs(quantity: Modulated, neurons: Iterable[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-            factors = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
-            found = [(place, factors[neuron]) for place, neuron in enumerate(neurons) if neuron in factors]
+        def factors(quantity: Modulated, neurons: Iterable[int]) -> Factors:
+            """Which of the neurons (or channels) have the quantity modulated, and by which factor."""
+            column = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
+            found = [(place, column[neuron]) for place, neuron in enumerate(neurons) if neuron in column]
             places, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
             return places, columns
 
         everyone, bearers = range(len(a.neurons)), a.channel_neuron.tolist()
-        self._leak_factor = pairs("leak", everyone)
-        self._membrane_factor = pairs("membrane", everyone)
-        self._channel_factor = pairs("channels", bearers)
-        self._gate_factor = pairs("gates", bearers)
+        self._leak_factor = factors("leak", everyone)
+        self._membrane_factor = factors("membrane", everyone)
+        self._channel_factor = factors("channels", bearers)
+        self._gate_factor = factors("gates", bearers)
 
     def _prepare_buffers(self) -> None:
         a, w, n = self.arrays, self.n_worms, len(self.arrays.neurons)
-        n_channels, n_slow, n_slots = a.channel_neuron.size, a.n_slow, len(a.gates)
-        n_terminals, n_firing = a.terminal_neuron.size, a.firing_neuron.size
-        where = a.drive_slices()
+        n_terminals, n_slow, slots = a.terminal_neuron.size, a.n_slow, (len(a.gates), w, a.channel_neuron.size)
         drive = np.zeros((w, a.weights.shape[0]))
-        # One matrix-vector product a copy.
+        # One matrix-vector product per copy.
         self._drive = drive[:, np.newaxis]
-        self._open = drive[:, where["terminals"]]
-        self._release = drive[:, where["releases"]]
-        self._channel_open = drive[:, where["channels"]]
-        self._rectified = drive[:, where["rectified"]]
-        self._potentials = drive[:, where["potentials"]]
-        drive[:, where["one"]] = 1.0
-        self._inputs = drive[:, where["inputs"]]
+        self._open = drive[:, a.drive["terminals"]]
+        self._release = drive[:, a.drive["releases"]]
+        self._channel_open = drive[:, a.drive["channels"]]
+        self._rectified = drive[:, a.drive["rectified"]]
+        self._potentials = drive[:, a.drive["potentials"]]
+        drive[:, a.drive["one"]] = 1.0
+        self._inputs = drive[:, a.drive["inputs"]]
         total = np.empty((w, 2 * n))
         self._total = total[:, np.newaxis]
         self._conductance, self._current = total[:, :n], total[:, n:]
-        # Terminals and gates of all copies lie in one row, so that one call serves both at any number of copies.
+        # Terminals and gates of all copies are in one row, so that one call serves both at any number of copies.
         self._affine = np.empty(self._looked_at.size)
         self._transmission = self._affine[: w * n_terminals].reshape(w, n_terminals)
         self._exponent = self._affine[w * n_terminals :]
-        self._y = self._exponent.reshape(n_slots, w, n_channels)
-        self._y_slow = self._y[:n_slow]
-        self._q = np.empty((n_slots, w, n_channels))
-        self._q_slow, self._q_instant = self._q[:n_slow], self._q[n_slow:]
-        self._z = np.empty((n_slots, w, n_channels))
-        self._gate_scratch = np.empty((n_slow, w, n_channels))
-        self._rectified_target = np.empty((w, a.rectified_target.size))
+        self._y = self._exponent.reshape(slots)
+        self._q, self._z = np.empty(slots), np.empty(slots)
         self._modulation = np.ones((w, len(a.modulated)))
-        self._motion = _Motion.empty(a, w)
+        self._motion = _Motion(a, w)
         self._now = NetworkState(
             self._motion.potential,
             self._motion.gate.swapaxes(0, 1),
-            np.empty((w, n_firing)),
+            np.empty((w, a.firing_neuron.size)),
             np.empty((w, a.release_source.size)),
-            np.zeros((w, n_firing), dtype=bool),
+            np.zeros((w, a.firing_neuron.size), dtype=bool),
         )
 
     def initial_state(self, gate_start: GateStart = "steady") -> NetworkState:
@@ -208,12 +186,11 @@ class Stepper:
         """
         if gate_start not in get_args(GateStart):
             raise ConfigError(f"unknown gate start {gate_start!r}: {suggest(gate_start, get_args(GateStart))}")
-        a = self.arrays
+        a, w = self.arrays, self.n_worms
         gate = np.empty((a.n_slow, a.channel_neuron.size))
         for slot, row in enumerate(a.gates[: a.n_slow]):
             starts = [one.steady if gate_start == "steady" else one.toolbox_start for one in row]
             gate[slot] = [start(a.initial_mV[neuron]) for start, neuron in zip(starts, a.channel_neuron, strict=True)]
-        w = self.n_worms
         return NetworkState(
             potential=np.tile(a.initial_mV, (w, 1)),
             gate=np.tile(gate, (w, 1, 1)),
@@ -235,8 +212,8 @@ class Stepper:
         self._inputs[...] = 0.0 if inputs_nA is None else inputs_nA
         now.potential[...] = state.potential
         now.gate[...] = state.gate
-        fires = state.fired.size
-        if fires:
+        spiking = state.fired.size
+        if spiking:
             now.threshold[...] = state.threshold
             now.release[...] = state.release
         for _ in range(n_steps):
@@ -244,7 +221,7 @@ class Stepper:
                 operation()
         state.potential[...] = now.potential
         state.gate[...] = now.gate
-        if fires:
+        if spiking:
             state.threshold[...] = now.threshold
             state.release[...] = now.release
             state.fired[...] = now.fired
@@ -271,22 +248,21 @@ class Stepper:
             trace[i + 1] = state.potential
         return trace
 
-    def _lay_down_step(self) -> Operations:
+    def _listed_step(self) -> Operations:
         """Lists the operations that take the present state one step on."""
         now, spiking = self._motion, self._now
-        step, middle, end = (_Motion.empty(self.arrays, self.n_worms) for _ in range(3))
+        step, middle, end = (_Motion(self.arrays, self.n_worms) for _ in range(3))
         take_step = partial(np.add, now.all, step.all, now.all)
-        look, gates, potentials = self._euler_step(now, step)
-        operations = [*look, *gates, *potentials]
+        operations = self._look(now.potential) + self._gate_step(now, step)
         if self.scheme == "toolbox":
-            take_gate_step = partial(np.add, now.gate, step.gate, now.gate)
-            operations = [*look, *gates, take_gate_step, *potentials]
+            operations.append(partial(np.add, now.gate, step.gate, now.gate))
             take_step = partial(np.add, now.potential, step.potential, now.potential)
-        elif self.scheme == "heun":
+        operations += self._potential_step(now, step)
+        if self.scheme == "heun":
             # The mean of the Euler steps at the beginning and at the end that they lead to.
             operations.append(partial(np.add, now.all, step.all, middle.all))
-            for part in self._euler_step(middle, end):
-                operations += part
+            operations += [*self._look(middle.potential), *self._gate_step(middle, end)]
+            operations += self._potential_step(middle, end)
             operations.append(partial(np.add, step.all, end.all, step.all))
             operations.append(partial(np.multiply, step.all, _HALF, step.all))
         if not spiking.fired.size:
@@ -294,17 +270,9 @@ class Stepper:
         release = partial(np.copyto, self._release, spiking.release)
         return [release, *operations, self._adapt_thresholds, take_step, self._fire]
 
-    def _euler_step(self, state: _Motion, step: _Motion) -> tuple[Operations, Operations, Operations]:
-        """Writes the Euler step at a state: what depends on potentials alone, then the gates', then the potentials'."""
-        return (
-            self._look(state.potential),
-            self._gate_step(state.gate, step.gate),
-            self._potential_step(state.potential, state.gate, step.potential),
-        )
-
     def _look(self, potential: Array) -> Operations:
         """Finds all that depends on the potentials alone: terminals, exponentials of gates, modulation."""
-        affine, opened, q = self._affine, self._open, self._q
+        affine, opened, q, factors = self._affine, self._open, self._q, self._modulation
         if not affine.size:
             return []
         operations: Operations = [
@@ -320,34 +288,33 @@ class Stepper:
             operations.append(partial(np.exp, self._exponent, self._exponent))
             operations.append(partial(np.square, self._y, q))
             operations.append(partial(np.add, q, _ONE, q))
-        if self._modulation.size:
-            factors = self._modulation
+        if factors.size:
             each_open, each_factor = opened[:, np.newaxis], factors[:, np.newaxis]
             operations.append(partial(np.matmul, each_open, self.arrays.log_modulation, each_factor))
             operations.append(partial(np.exp, factors, factors))
         return operations
 
-    def _gate_step(self, gate: Array, step: Array) -> Operations:
+    def _gate_step(self, state: _Motion, step: _Motion) -> Operations:
         """Writes the slow gates' Euler step at the potential last looked at."""
-        if not step.size:
+        change, pace, n_slow = step.gate, np.empty(step.gate.shape), self.arrays.n_slow
+        if not change.size:
             return []
-        pace = self._gate_scratch
         operations: Operations = [
-            partial(np.multiply, self._q_slow, gate, step),
-            partial(np.subtract, _ONE, step, step),
-            partial(np.divide, self._gate_rate, self._y_slow, pace),
-            partial(np.multiply, step, pace, step),
+            partial(np.multiply, self._q[:n_slow], state.gate, change),
+            partial(np.subtract, _ONE, change, change),
+            partial(np.divide, self._gate_rate, self._y[:n_slow], pace),
+            partial(np.multiply, change, pace, change),
         ]
         if self._gate_factor[0].size:
-            operations.append(partial(self._slow_down, step, *self._gate_factor))
+            operations.append(partial(self._slow_down, change, *self._gate_factor))
         return operations
 
-    def _potential_step(self, potential: Array, gate: Array, step: Array) -> Operations:
-        """Writes the potentials' Euler step; `potential` is what was last looked at."""
-        a = self.arrays
-        operations = self._open_channels(gate) if self._channel_open.size else []
-        if self._rectified.size:
-            difference, target = self._rectified, self._rectified_target
+    def _potential_step(self, state: _Motion, step: _Motion) -> Operations:
+        """Writes the potentials' Euler step at the potential last looked at."""
+        a, potential, change, difference = self.arrays, state.potential, step.potential, self._rectified
+        operations = self._open_channels(state.gate) if self._channel_open.size else []
+        if difference.size:
+            target = np.empty(difference.shape)
             operations += [
                 partial(potential.take, a.rectified_source, 1, difference, "clip"),
                 partial(potential.take, a.rectified_target, 1, target, "clip"),
@@ -356,32 +323,26 @@ class Stepper:
             ]
         if self._potentials.size:
             operations.append(partial(np.copyto, self._potentials, potential))
-        operations.append(self._sum_currents())
-        if self._leak_factor[0].size:
-            operations.append(partial(self._modulate_leaks, *self._leak_factor))
-        operations.append(partial(np.multiply, self._conductance, potential, step))
-        operations.append(partial(np.subtract, self._current, step, step))
-        if self._membrane_factor[0].size:
-            operations.append(partial(self._slow_down, step, *self._membrane_factor))
-        return operations
-
-    def _sum_currents(self) -> Callable[[], object]:
-        """Writes conductances and currents: for every copy the same product of a vector and the weights."""
         if self.n_worms == 1:
             # Calls the same routine of BLAS with less ado.
-            return partial(self._drive[0, 0].dot, self._weights, self._total[0, 0])
-        return partial(np.matmul, self._drive, self._weights, self._total)
+            operations.append(partial(self._drive[0, 0].dot, self._weights, self._total[0, 0]))
+        else:
+            operations.append(partial(np.matmul, self._drive, self._weights, self._total))
+        if self._leak_factor[0].size:
+            operations.append(partial(self._modulate_leaks, *self._leak_factor))
+        operations.append(partial(np.multiply, self._conductance, potential, change))
+        operations.append(partial(np.subtract, self._current, change, change))
+        if self._membrane_factor[0].size:
+            operations.append(partial(self._slow_down, change, *self._membrane_factor))
+        return operations
 
     def _open_channels(self, gate: Array) -> Operations:
         """Multiplies the powers of all gates of each channel."""
-        n_slow, z = self.arrays.n_slow, self._z
+        n_slow, z, q = self.arrays.n_slow, self._z, self._q
         if self._power is None and len(z) == 2 and n_slow == 1:
-            operations: Operations = [partial(np.divide, gate[0], self._q[1], self._channel_open)]
+            operations: Operations = [partial(np.divide, gate[0], q[1], self._channel_open)]
         else:
-            operations = [
-                partial(np.copyto, z[:n_slow], gate),
-                partial(np.reciprocal, self._q_instant, z[n_slow:]),
-            ]
+            operations = [partial(np.copyto, z[:n_slow], gate), partial(np.reciprocal, q[n_slow:], z[n_slow:])]
             if self._power is not None:
                 operations.append(partial(np.power, z, self._power, z))
             operations.append(partial(np.multiply.reduce, z, axis=0, out=self._channel_open))

@@ -7,14 +7,10 @@ to walking with a salamander robot driven by a spinal cord model", Science 315, 
     d2r_i/dt2 = a (a/4 (R_i - r_i) - dr_i/dt)
     x_i = r_i (1 + cos theta_i)
 
-Intrinsic frequency nu and amplitude R are linear in the drive d within an oscillator's range and 0 outside, where it is
-said to saturate (their Table S1): nu = 0.2 d + 0.3 Hz and R = 0.065 d + 0.196 for 1 <= d <= 5 in the body,
-nu = 0.2 d Hz and R = 0.131 d + 0.131 for 1 <= d <= 3 in the limbs; a = 20/s, w = 10/s within the body, 30/s from limbs
-to body. With d rising the animal rests, walks (from 1: limbs force their slow rhythm and a standing wave on the body),
-swims (from 3: limbs saturate, the body is left with its own faster travelling wave), and falls silent (from 5).
-
-The salamander has two such chains in antiphase. As phi = pi between them, their coupling vanishes in that state, and
-one side is enough for a worm, whose muscles are rings.
+Intrinsic frequency nu and amplitude R are linear in the drive d within an oscillator's range and 0 outside. With d
+rising the animal rests, walks (from 1: limbs force their slow rhythm and a standing wave on the body), swims (from 3:
+limbs saturate, the body is left with its own faster travelling wave), and falls silent (from 5). The salamander has two
+such chains in antiphase, where their coupling vanishes; one side is enough for a worm, whose muscles are rings.
 
 Locked chain. In a chain with neighbours coupled both ways, phi_{k+1,k} = -phi_{k,k+1} = lag, and equal amplitudes R,
 the couplings cancel in the sum over all: the common frequency is the mean of the intrinsic ones. Balance of the first k
@@ -22,20 +18,19 @@ oscillators gives the phase by which k+1 follows k:
 
     theta_k - theta_{k+1} = lag + arcsin(2 pi sum_{i<=k} (nu_i - mean nu) / (w R)),
 
-and there is no locked state where an argument leaves [-1, 1]. Two oscillators follow at
-lag + arcsin(pi (nu_1 - nu_2) / (w R)).
+and there is no locked state where an argument leaves [-1, 1].
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.errors import ConfigError, require_at_least
-
-Array = NDArray[np.float64]
+from annelid.nervous.neurons import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +104,14 @@ class PhaseNetwork:
 
     def frequency_Hz(self, drive: ArrayLike) -> Array:
         """Returns the intrinsic frequencies, Hz, ``(*drive.shape, n)``."""
-        of_kind = {response: response.frequency_Hz(drive) for response in set(self.responses)}
-        return np.stack([of_kind[response] for response in self.responses], axis=-1)
+        return self._of_each(lambda response: response.frequency_Hz(drive))
 
     def amplitude(self, drive: ArrayLike) -> Array:
         """Returns the intrinsic amplitudes, ``(*drive.shape, n)``."""
-        of_kind = {response: response.amplitude(drive) for response in set(self.responses)}
+        return self._of_each(lambda response: response.amplitude(drive))
+
+    def _of_each(self, answer: Callable[[DriveResponse], Array]) -> Array:
+        of_kind = {response: answer(response) for response in set(self.responses)}
         return np.stack([of_kind[response] for response in self.responses], axis=-1)
 
 
@@ -154,7 +151,7 @@ def phase_chain(
 
 
 def steady_lags(frequency_Hz: ArrayLike, amplitude: float, coupling_per_s: float, lag_rad: float) -> Array:
-    """Phases by which neighbours of a locked chain follow one another; the module's docstring derives them.
+    """Returns the phases by which neighbours of a locked chain follow one another.
 
     Args:
         frequency_Hz: Intrinsic frequencies along the chain, Hz, ``(.., n)``.

@@ -14,17 +14,17 @@ from annelid.config import check_config, load_config
 from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import SnsController, TimedController
 from annelid.control.sns import Sns
-from annelid.control.steering import (
+from annelid.control.turning import (
     ConstantTurning,
     CourseTurning,
     HeadingTurning,
     TouchTurning,
+    TurningController,
     TurningKind,
     half_scales,
     heading_angle,
     wrapped,
 )
-from annelid.control.turning import TurningController
 from annelid.control.waves import TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched

@@ -11,7 +11,8 @@ from annelid.control.neural import require_step_within
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network, adaptive_peristalsis_network, drive_conductance_uS
-from annelid.protocols import Plant, Sensation, Values
+from annelid.nervous.peristalsis import DRIVE_NEURON
+from annelid.protocols import Array, Plant, Sensation, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
@@ -23,9 +24,9 @@ DRIVE_HINT = "Descending drive: more of it makes the wave faster."
 class AdaptiveSns(ControllerKind):
     """The synthetic nervous system with a descending neuron, whose activity sets the rate of all half-centres.
 
-    The activity that is asked for is ``drive + drive_slope_per_s time + stretch_gain_per_m stretch``, kept in 0 .. 1,
-    with the mean lengthening of all segments as stretch: a manual, a timed and a sensory drive. The descending neuron
-    follows it with its time constant.
+    The wanted activity is ``drive + drive_slope_per_s time + stretch_gain_per_m stretch``, clipped to 0 .. 1, with the
+    mean lengthening of all segments as stretch: a manual, a timed and a sensory drive. The descending neuron follows it
+    with its time constant.
     """
 
     sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
@@ -52,9 +53,8 @@ class AdaptiveSns(ControllerKind):
 
     def build(self, config: RunConfig, plant: Plant) -> AdaptiveController:
         """Builds the controller, as `ControllerKind.build`."""
-        return AdaptiveController(
-            self, config.sensor, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s
-        )
+        size = plant.n_segments, plant.n_muscles
+        return AdaptiveController(self, config.sensor, *size, config.clock.control_timestep_s)
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns what the network rests on, and its drive."""
@@ -80,15 +80,15 @@ class AdaptiveController(PeristalsisController[AdaptiveSns]):
         self._every_step_differs = config.drive_slope_per_s != 0.0
         return adaptive_peristalsis_network(n_segments, self._parameters, 1e3 * config.drive_time_constant_s)
 
-    def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
-        manual = self._config.drive + self._config.drive_slope_per_s * self._n_steps * self._timestep_s
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        manual = self._config.drive + self._config.drive_slope_per_s * n_taken * self._timestep_s
         longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         drive = manual + self._config.stretch_gain_per_m * float(longer_m.mean())
         leak, reach = self._parameters.leak_conductance_uS, self._parameters.range_mV
-        self._inputs_nA[-1] = min(max(drive, 0.0), 1.0) * leak * reach
+        inputs_nA[...] = min(max(drive, 0.0), 1.0) * leak * reach
 
     def _values(self) -> Values:
-        return {**super()._values(), "drive": self._activity(-1)}
+        return {**super()._values(), "drive": self._activity(DRIVE_NEURON)}
 
-    def _attrs(self) -> dict[str, float]:
+    def _attrs(self) -> dict[str, float | int | str]:
         return {"conductance_drive_uS": drive_conductance_uS(self._parameters)}

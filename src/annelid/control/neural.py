@@ -1,23 +1,42 @@
-"""Controllers of a network with a half-centre a segment: how they stride, record and drive the muscles."""
+"""Controllers of a network with a half-centre per segment: how they step, record and drive the muscles."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
-from annelid.config.sections import Section
+from annelid.config.kinds import ControllerKind
+from annelid.config.sections import Positive, Section
 from annelid.control.base import SegmentController
 from annelid.errors import ConfigError
-from annelid.nervous import Network
+from annelid.nervous import Network, NetworkState, Scheme
 from annelid.nervous.half_centre import HalfCentre
-from annelid.nervous.stepper import Scheme
-from annelid.protocols import Array, Sensation, State, Values
+from annelid.protocols import Array, Sensation, Values
 
 Design = TypeVar("Design", bound=HalfCentre)
+
+
+class HalfCentreKind(ControllerKind):
+    """The fields of a network's half-centres, `annelid.nervous.HalfCentre`; the defaults are those of the papers."""
+
+    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C of the fast neurons")
+    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
+    range_mV: Positive = Field(default=20.0, description="operating range R")
+    bifurcation_mV: float = Field(default=0.01, description="delta: how far past the bifurcation the half-centre sits")
+    offset_mV: Positive = Field(default=0.1, description="how far beyond the range a suppressed half-centre lies")
+    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
+    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
+    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
+    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
+        default=0.05, description="slope S of the sodium gates"
+    )
+    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; sets the period of the paper's network: 300, 200 or 100")
 
 
 def design_of(kind: type[Design], section: Section) -> Design:
@@ -76,7 +95,7 @@ class NeuralController(SegmentController):
             network: Its neurons are those of one segment after another, then any others.
             roles: Names of a segment's neurons, in order; ``"contraction"`` and ``"expansion"`` are among them.
             n_segments: Segments.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
+            n_muscles: As `SegmentController`.
             control_timestep_s: Step of the network, s.
             scheme: How it steps.
             slope_per_mV: Slope of the sigmoid.
@@ -85,10 +104,15 @@ class NeuralController(SegmentController):
         super().__init__(n_segments, n_muscles)
         self._timestep_s = control_timestep_s
         self._stepper = network.compile(1e3 * control_timestep_s, scheme)
-        self._state = self._stepper.initial_state()
         self._of_role = {role: slice(place, n_segments * len(roles), len(roles)) for place, role in enumerate(roles)}
         self._slope_per_mV = slope_per_mV
         self._linear_range_mV = linear_range_mV
+        self.reset(0)
+
+    def _start_at(self, state: NetworkState, **others: NDArray) -> None:
+        """Begins with a state of the network, and other arrays that the next step depends on."""
+        self._state = state
+        self._now = {"potential": state.potential, "gate": state.gate, **others}
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `stride`."""
@@ -96,10 +120,10 @@ class NeuralController(SegmentController):
 
     @abstractmethod
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps that feel the same but for their times; bit for bit as so many calls of `step`.
+        """Advances by control steps with the same sensation but for its time; bit for bit as so many of `step`.
 
         Args:
-            sensation: What the body feels at the beginning of the first step; its time is a multiple of the
+            sensation: What the body senses at the beginning of the first step; its time is a multiple of the
                 control step, and goes on.
             n_steps: Control steps, at least 1.
 
@@ -117,9 +141,10 @@ class NeuralController(SegmentController):
             activation = 1.0 / (1.0 + np.exp(-self._slope_per_mV * difference))
         return activation if self._muscles_per_segment == 1 else activation.repeat(self._muscles_per_segment, axis=-1)
 
-    def _activity(self, neuron: int) -> float:
-        """Activity of a neuron by its place: its potential over the range, in [0, 1]."""
-        return min(max(float(self._state.potential[0, neuron]) / self._range_mV, 0.0), 1.0)
+    def _activity(self, name: str) -> float:
+        """Activity of a neuron: its potential over the range, in [0, 1]."""
+        potential = self._state.potential[0, self._stepper.arrays.neurons.index(name)]
+        return min(max(float(potential) / self._range_mV, 0.0), 1.0)
 
     def _values(self) -> Values:
         arrays = self._stepper.arrays
@@ -129,12 +154,3 @@ class NeuralController(SegmentController):
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         return {"neuron": list(self._stepper.arrays.neurons), "segment": list(range(1, self._n_segments + 1))}
-
-    def get_state(self) -> State:
-        """Returns copies of potentials (mV) and gates."""
-        return {"potential": self._state.potential.copy(), "gate": self._state.gate.copy()}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._state.potential[...] = state["potential"]
-        self._state.gate[...] = state["gate"]

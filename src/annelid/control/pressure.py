@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 class PressureSns(ControllerKind):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
 
-    A segment that bears load holds itself expanded until the one before it is extended, and one that begins to contract
-    ends the contraction two segments before. Lengths and loads are those of the six-segment robot, of 0.16 m radius and
-    19 N.
+    A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
+    the contraction two segments before. Lengths and loads are those of the six-segment robot, of 0.16 m radius and 19 N.
     """
 
     sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
@@ -74,7 +73,7 @@ class PressureSns(ControllerKind):
         return self
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that the body has a skin that feels pressure."""
+        """Checks that the body has a skin that senses pressure."""
         if not config.body.has_skin:
             raise ValueError(
                 f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {config.body.kind!r} "
@@ -83,9 +82,8 @@ class PressureSns(ControllerKind):
 
     def build(self, config: RunConfig, plant: Plant) -> PressureController:
         """Builds the controller, as `ControllerKind.build`."""
-        return PressureController(
-            self, config.sensor, plant.n_segments, plant.n_muscles, config.clock.control_timestep_s
-        )
+        size = plant.n_segments, plant.n_muscles
+        return PressureController(self, config.sensor, *size, config.clock.control_timestep_s)
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns what the network rests on, and the feedback."""
@@ -93,10 +91,10 @@ class PressureSns(ControllerKind):
 
 
 class PressureController(PeristalsisController[PressureSns]):
-    """Drives a worm by `annelid.nervous.peristalsis`.
+    """Drives a worm by `annelid.nervous.peristalsis.pressure_network`.
 
     A segment's load is the sum of the normal forces on its four sides, its length the mean of its stretch sensors, both
-    rising linearly from nothing to R. As long as segment 1's stretch sensor is held off at the start, so is its load.
+    rising linearly from nothing to R. As long as segment 1's stretch sensor is kept off at the start, so is its load.
     The rest, errors too, is as for `annelid.control.SnsController`.
     """
 
@@ -115,14 +113,14 @@ class PressureController(PeristalsisController[PressureSns]):
             pressure_ms=1e3 * config.pressure_time_constant_s,
         )
 
-    def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
-        config, further = self._config, self._inputs_nA[self._n_segments + 1 :]
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        config = self._config
         load_N = sensation.touch_N.sum(axis=1)
         longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
-        further[::2] = self._full_nA * _rise(load_N, config.light_N, config.full_N)
-        further[1::2] = self._full_nA * _rise(longer_m, config.extending_m, config.extended_m)
+        inputs_nA[::2] = self._full_nA * _rise(load_N, config.light_N, config.full_N)
+        inputs_nA[1::2] = self._full_nA * _rise(longer_m, config.extending_m, config.extended_m)
         if self._sensor.held_at(time_s):
-            further[0] = 0.0
+            inputs_nA[0] = 0.0
 
 
 def _rise(values: Array, low: float, high: float) -> Array:

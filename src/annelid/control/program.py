@@ -1,4 +1,4 @@
-"""Open loop: contractions at times laid down beforehand."""
+"""Open loop: contractions at times that are given beforehand."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Contraction(Section):
 
 
 class Program(ControllerKind):
-    """Open loop: contractions at times laid down beforehand, whatever the sensors read.
+    """Open loop: contractions at times that are given beforehand, whatever the sensors read.
 
     Where contractions of one segment overlap, the larger activation wins.
     """
@@ -68,10 +68,10 @@ class Program(ControllerKind):
 
 
 class ProgramController(OpenLoopController[Program]):
-    """Contracts segments at times laid down beforehand.
+    """Contracts segments at times that are given beforehand.
 
     Raises:
-        ConfigError: Muscles that are neither one nor two a segment, or a contraction of a segment that the
+        ConfigError: Muscles that are neither one nor two per segment, or a contraction of a segment that the
             worm does not have.
     """
 
@@ -84,35 +84,28 @@ class ProgramController(OpenLoopController[Program]):
             raise ConfigError(f"a contraction is of segment {last}, but the worm has segments 1 .. {n_segments}")
         super().__init__(pattern, n_segments, n_muscles)
 
-    def activation(self, time_s: float) -> Array:
-        """Returns `program_activation` at a time."""
-        return program_activation(self._pattern, self._n_segments, time_s)
+    def activation(self, time_s: ArrayLike) -> Array:
+        """Returns the activation at times.
 
+        A contraction's activation rises from its start on and falls from its stop on, both at its level per ``ramp_s``;
+        one that is shorter than the ramp falls from what it has reached. Without a ramp it is at its level from start
+        to stop, start included, stop not. Where contractions overlap, the larger wins.
 
-def program_activation(program: Program, n_segments: int, time_s: ArrayLike) -> Array:
-    """Returns the activation that a program lays down.
+        Args:
+            time_s: Simulated times, s, any shape.
 
-    A contraction's activation rises from its start on and falls from its stop on, both at its level per
-    ``ramp_s``; one that is shorter than the ramp falls from what it has reached. Without a ramp it is at its
-    level from start to stop, start included, stop not. Where contractions overlap, the larger wins.
-
-    Args:
-        program: The contractions.
-        n_segments: Segments of the worm.
-        time_s: Simulated times, s, any shape.
-
-    Returns:
-        Activation of each segment in [0, 1], shape ``(*time_s.shape, n_segments)``.
-    """
-    times = np.asarray(time_s, dtype=float)
-    activation = np.zeros((*times.shape, n_segments))
-    for contraction in program.contractions:
-        of_segment = activation[..., contraction.segment - 1]
-        since_start, since_stop = times - contraction.start_s, times - contraction.stop_s
-        if program.ramp_s > 0:
-            reached = min(1.0, (contraction.stop_s - contraction.start_s) / program.ramp_s)
-            share = np.clip(np.minimum(since_start, reached * program.ramp_s - since_stop) / program.ramp_s, 0.0, 1.0)
-        else:
-            share = (since_start >= -SLACK_S) & (since_stop < -SLACK_S)
-        np.maximum(of_segment, contraction.activation * share, out=of_segment)
-    return activation
+        Returns:
+            Activation of each segment in [0, 1], shape ``(*time_s.shape, n_segments)``.
+        """
+        times, ramp = np.asarray(time_s, dtype=float), self._pattern.ramp_s
+        activation = np.zeros((*times.shape, self._n_segments))
+        for contraction in self._pattern.contractions:
+            of_segment = activation[..., contraction.segment - 1]
+            since_start, since_stop = times - contraction.start_s, times - contraction.stop_s
+            if ramp > 0:
+                reached = min(1.0, (contraction.stop_s - contraction.start_s) / ramp)
+                share = np.clip(np.minimum(since_start, reached * ramp - since_stop) / ramp, 0.0, 1.0)
+            else:
+                share = (since_start >= -SLACK_S) & (since_stop < -SLACK_S)
+            np.maximum(of_segment, contraction.activation * share, out=of_segment)
+        return activation

@@ -1,4 +1,4 @@
-"""The stretch sensor: tells which segments are back at rest length."""
+"""The stretch sensor: which segments are back at rest length."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class StretchSensor:
     """A threshold on each segment's mean length, on while it is at most the tolerance beyond rest.
 
     With hysteresis a sensor that is on stays on until the segment is that much longer still. Segment 1's
-    sensor is held off at the start: its network starts contracted, and its body does not. Riddle et al. 2023.
+    sensor is kept off at the start: its network starts contracted, and its body does not. Riddle et al. 2023.
 
     Attributes:
         on: Which segments' sensors are on, shape ``(n_segments,)``; all off before the first reading.
@@ -41,9 +41,7 @@ class StretchSensor:
     def __init__(self, settings: StretchSettings, n_segments: int) -> None:
         """Makes a sensor for ``n_segments`` segments from its section of the configuration."""
         require_at_least(1, n_segments=n_segments)
-        self._tolerance_m = settings.tolerance_m
-        self._hysteresis_m = settings.hysteresis_m
-        self._hold_until_s = settings.startup_hold_s - SLACK_S
+        self._settings = settings
         self.on: NDArray[np.bool_] = np.zeros(n_segments, dtype=bool)
 
     def reset(self) -> None:
@@ -74,7 +72,7 @@ class StretchSensor:
         tolerance_m: float | Array | None = None,
         hysteresis_m: float | Array | None = None,
     ) -> NDArray[np.bool_]:
-        """Tells what `read` reads from lengths, without remembering it; any number of worms at once.
+        """Returns what `read` reads from lengths, without remembering it; any number of worms at once.
 
         Args:
             before: Which sensors were on at the reading before, ``(.., n_segments)``.
@@ -88,16 +86,13 @@ class StretchSensor:
         Returns:
             Shape ``(.., n_segments)``.
         """
-        tolerance = self._tolerance_m if tolerance_m is None else tolerance_m
-        hysteresis = self._hysteresis_m if hysteresis_m is None else hysteresis_m
+        tolerance = self._settings.tolerance_m if tolerance_m is None else tolerance_m
+        hysteresis = self._settings.hysteresis_m if hysteresis_m is None else hysteresis_m
         on = lengthening_m(stretch_m, rest_stretch_m) <= tolerance + hysteresis * before
         if self.held_at(time_s):
             on[..., 0] = False
         return on
 
     def held_at(self, time_s: float) -> bool:
-        """Tells whether segment 1's sensor is held off at a time, s.
-
-        While this and the lengths stay the same, a second reading gives what the first one gave.
-        """
-        return time_s < self._hold_until_s
+        """Whether segment 1's sensor is kept off at a time, s; while this and the lengths stay, so does the reading."""
+        return time_s < self._settings.startup_hold_s - SLACK_S

@@ -1,4 +1,4 @@
-"""Open-loop waves: a sine, and segments that take turns by the clock. Pure functions of time, which feel nothing."""
+"""Open-loop waves: a sine, and segments that take turns by the clock. Pure functions of time, which sense nothing."""
 
 from __future__ import annotations
 
@@ -38,8 +38,33 @@ class SineWave(ControllerKind):
         return SineController(self, plant.n_segments, plant.n_muscles)
 
 
+class SineController(OpenLoopController[SineWave]):
+    """A sinusoidal wave, open loop: the classical controller that oscillators with feedback are compared with.
+
+    Raises:
+        ConfigError: Muscles that are neither one nor two per segment.
+    """
+
+    name = "sine wave"
+
+    def activation(self, time_s: ArrayLike) -> Array:
+        """Returns the activation at times.
+
+        Args:
+            time_s: Simulated times, s, any shape.
+
+        Returns:
+            ``level (1 + cos(2 pi (t / period - waves i / N))) / 2`` of segment i = 0 .. N-1, in [0, level], shape
+            ``(*time_s.shape, n_segments)``.
+        """
+        wave, n = self._pattern, self._n_segments
+        turns = np.asarray(time_s, dtype=float)[..., np.newaxis] / wave.period_s
+        lag = wave.waves * np.arange(n) / n
+        return 0.5 * wave.level * (1.0 + np.cos(2.0 * np.pi * (turns - lag)))
+
+
 class TimedWave(ControllerKind):
-    """Open loop: each segment contracts by a ramp, holds, and lets go by a ramp, one after another.
+    """Open loop: each segment contracts by a ramp, stays so, and relaxes by a ramp, one after another.
 
     The authors' patterns: "3x1" is 1 s up, 1 s hold, 1 s down, the next segment 1 s later (the defaults); "2x2" is the
     same with the next segment 2 s later and two waves at once (``interval_s = 2``, ``waves = 2``). Six segments repeat
@@ -56,7 +81,7 @@ class TimedWave(ControllerKind):
     kind: Literal["timed"] = "timed"
     rise_s: NonNegative = Field(default=1.0, description="time to contract; 0 for a step")
     hold_s: NonNegative = Field(default=1.0, description="time contracted")
-    fall_s: NonNegative = Field(default=1.0, description="time to let go; 0 for a step")
+    fall_s: NonNegative = Field(default=1.0, description="time to relax; 0 for a step")
     interval_s: Positive = Field(default=1.0, description="the next segment begins this much later")
     waves: Annotated[int, Field(ge=1, le=100)] = Field(
         default=1, description="waves on the body at once: the cycle is n_segments times interval_s over this"
@@ -74,73 +99,15 @@ class TimedWave(ControllerKind):
         return TimedController(self, plant.n_segments, plant.n_muscles)
 
 
-def sine_activation(wave: SineWave, n_segments: int, time_s: ArrayLike) -> Array:
-    """Returns the activation of a sinusoidal wave.
-
-    Args:
-        wave: Its section of the configuration.
-        n_segments: Segments N of the worm.
-        time_s: Simulated times, s, any shape.
-
-    Returns:
-        ``level (1 + cos(2 pi (t / period - waves i / N))) / 2`` of segment i = 0 .. N-1, in [0, level], shape
-        ``(*time_s.shape, n_segments)``.
-    """
-    turns = np.asarray(time_s, dtype=float)[..., np.newaxis] / wave.period_s
-    lag = wave.waves * np.arange(n_segments) / n_segments
-    return 0.5 * wave.level * (1.0 + np.cos(2.0 * np.pi * (turns - lag)))
-
-
-def timed_cycle_s(wave: TimedWave, n_segments: int) -> float:
-    """Returns the time after which a timed pattern repeats, s."""
-    return n_segments * wave.interval_s / wave.waves
-
-
-def timed_activation(wave: TimedWave, n_segments: int, time_s: ArrayLike) -> Array:
-    """Returns the activation of a timed pattern: up, hold, down, and the next segment ``interval_s`` later.
-
-    Segment i begins first at ``i interval_s`` modulo the cycle, `timed_cycle_s`, and once a cycle from then on; it is
-    at rest before.
-
-    Args:
-        wave: Its section of the configuration.
-        n_segments: Segments of the worm.
-        time_s: Simulated times, s, any shape.
-
-    Returns:
-        Activation of each segment in [0, level], ``(*time_s.shape, n_segments)``.
-    """
-    cycle = timed_cycle_s(wave, n_segments)
-    start = np.array([segment * wave.interval_s % cycle for segment in range(n_segments)])
-    start[cycle - start < SLACK_S] = 0.0
-    since_first = np.asarray(time_s, dtype=float)[..., np.newaxis] - start + SLACK_S
-    since = np.where(since_first >= 0, since_first % cycle, np.inf) - SLACK_S
-    release = wave.rise_s + wave.hold_s
-    up = since / wave.rise_s if wave.rise_s else (since >= -SLACK_S).astype(float)
-    down = 1.0 - (since - release) / wave.fall_s if wave.fall_s else (since < release - SLACK_S).astype(float)
-    return wave.level * np.clip(np.minimum(up, down), 0.0, 1.0)
-
-
-class SineController(OpenLoopController[SineWave]):
-    """A sinusoidal wave, open loop: the classical controller that oscillators with feedback are compared with.
-
-    Raises:
-        ConfigError: Muscles that are neither one nor two a segment.
-    """
-
-    name = "sine wave"
-
-    def activation(self, time_s: float) -> Array:
-        """Returns `sine_activation` at a time."""
-        return sine_activation(self._pattern, self._n_segments, time_s)
-
-
 class TimedController(OpenLoopController[TimedWave]):
     """Segments that take turns by the clock, open loop.
 
+    Attributes:
+        cycle_s: Time after which the pattern repeats, s.
+
     Raises:
-        ConfigError: Muscles that are neither one nor two a segment, or a segment that would have to begin again
-            before it has let go.
+        ConfigError: Muscles that are neither one nor two per segment, or a segment that would have to begin again
+            before it has relaxed.
     """
 
     name = "timed wave"
@@ -148,13 +115,32 @@ class TimedController(OpenLoopController[TimedWave]):
     def __init__(self, pattern: TimedWave, n_segments: int, n_muscles: int) -> None:
         """Builds the controller from the same as `OpenLoopController`."""
         super().__init__(pattern, n_segments, n_muscles)
-        turn, cycle = pattern.rise_s + pattern.hold_s + pattern.fall_s, timed_cycle_s(pattern, n_segments)
-        if turn > cycle + SLACK_S:
+        self.cycle_s = n_segments * pattern.interval_s / pattern.waves
+        turn = pattern.rise_s + pattern.hold_s + pattern.fall_s
+        if turn > self.cycle_s + SLACK_S:
             raise ConfigError(
-                f"controller.rise_s + hold_s + fall_s = {turn:g}: must be at most {cycle:g} s, the cycle of "
+                f"controller.rise_s + hold_s + fall_s = {turn:g}: must be at most {self.cycle_s:g} s, the cycle of "
                 f"{n_segments} segments with interval_s = {pattern.interval_s:g} and waves = {pattern.waves}"
             )
 
-    def activation(self, time_s: float) -> Array:
-        """Returns `timed_activation` at a time."""
-        return timed_activation(self._pattern, self._n_segments, time_s)
+    def activation(self, time_s: ArrayLike) -> Array:
+        """Returns the activation at times.
+
+        Segment i begins first at ``i interval_s`` modulo the cycle, and once per cycle from then on; it is at rest
+        before.
+
+        Args:
+            time_s: Simulated times, s, any shape.
+
+        Returns:
+            Activation of each segment in [0, level], ``(*time_s.shape, n_segments)``.
+        """
+        wave, cycle = self._pattern, self.cycle_s
+        start = np.array([segment * wave.interval_s % cycle for segment in range(self._n_segments)])
+        start[cycle - start < SLACK_S] = 0.0
+        since_first = np.asarray(time_s, dtype=float)[..., np.newaxis] - start + SLACK_S
+        since = np.where(since_first >= 0, since_first % cycle, np.inf) - SLACK_S
+        release = wave.rise_s + wave.hold_s
+        up = since / wave.rise_s if wave.rise_s else (since >= -SLACK_S).astype(float)
+        down = 1.0 - (since - release) / wave.fall_s if wave.fall_s else (since < release - SLACK_S).astype(float)
+        return wave.level * np.clip(np.minimum(up, down), 0.0, 1.0)

@@ -17,8 +17,8 @@ the segments push them apart; there is neither gravity nor ground, so the centre
 `annelid.planar.linkage` states forces and mass matrix in general, and `annelid.planar.midpoint` the stepper.
 
 Source: Boxerbaum, Shaw, Chiel and Quinn 2012, Continuous wave peristaltic motion in a robot, Int. J. Robot. Res. 31,
-302-318, as described by Riddle et al. 2023, section 2.1. The constants are this package's own
-(`Boxerbaum2012Body`), as are the force-height law of the muscles and the dampers.
+302-318, as described by Riddle et al. 2023, section 2.1. The constants are this package's own, as are the force-height
+law of the muscles and the dampers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from annelid.planar.linkage import Linkage
 from annelid.planar.sections import DynamicPlanarWorm
 
 if TYPE_CHECKING:
-    from annelid.config.run import Clock, RunConfig
+    from annelid.config.run import RunConfig
 
 
 class Boxerbaum2012Body(DynamicPlanarWorm):
@@ -50,19 +50,6 @@ class Boxerbaum2012Body(DynamicPlanarWorm):
     def build(self, config: RunConfig) -> Boxerbaum2012Plant:
         """Builds the worm, as `BodyKind.build`."""
         return Boxerbaum2012Plant(self, config.clock)
-
-
-class Boxerbaum2012Plant(DynamicPlanarPlant):
-    """The worm of Boxerbaum et al. 2012 as a plant; the module states its equations."""
-
-    def __init__(self, body: Boxerbaum2012Body, clock: Clock) -> None:
-        """Lays the worm down at rest.
-
-        Args:
-            body: Section of the body.
-            clock: Section of the time steps.
-        """
-        super().__init__(boxerbaum_linkage(body), clock, "planar worm of Boxerbaum et al. 2012")
 
 
 def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
@@ -101,3 +88,10 @@ def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
         torsion_stiffness_Nm_per_rad=body.torsion_stiffness_Nm_per_rad,
         torsion_damping_Nms_per_rad=body.torsion_damping_Nms_per_rad,
     )
+
+
+class Boxerbaum2012Plant(DynamicPlanarPlant):
+    """The worm of Boxerbaum et al. 2012 as a plant; the module states its equations."""
+
+    description = "planar worm of Boxerbaum et al. 2012"
+    linkage = staticmethod(boxerbaum_linkage)

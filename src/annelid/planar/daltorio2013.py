@@ -18,8 +18,8 @@ in m, kg, s, N, rad and J. `annelid.planar.linkage` states forces and mass matri
 
 Source: Daltorio, Boxerbaum, Horchler, Shaw, Chiel and Quinn 2013, Efficient worm-like locomotion: slip and control of
 soft-bodied peristaltic robots, Bioinspir. Biomim. 8, 035003, as described by Riddle et al. 2023, section 2.1. The
-constants are this package's own (`annelid.config.Daltorio2013Body`), as are the force-height law of the muscles, the
-linear walls, and the dampers beside the muscles.
+constants are this package's own, as are the force-height law of the muscles, the linear walls, and the dampers beside
+the muscles.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from annelid.planar.linkage import Linkage
 from annelid.planar.sections import DynamicPlanarWorm
 
 if TYPE_CHECKING:
-    from annelid.config.run import Clock, RunConfig
+    from annelid.config.run import RunConfig
 
 
 class Daltorio2013Body(DynamicPlanarWorm):
@@ -70,19 +70,6 @@ class Daltorio2013Body(DynamicPlanarWorm):
         return Daltorio2013Plant(self, config.clock)
 
 
-class Daltorio2013Plant(DynamicPlanarPlant):
-    """The worm of Daltorio et al. 2013 as a plant; the module states its equations."""
-
-    def __init__(self, body: Daltorio2013Body, clock: Clock) -> None:
-        """Lays the worm down at rest in its pipe.
-
-        Args:
-            body: Section of the body and its pipe.
-            clock: Section of the time steps.
-        """
-        super().__init__(daltorio_linkage(body), clock, "planar worm of Daltorio et al. 2013 in a pipe")
-
-
 def daltorio_linkage(body: Daltorio2013Body) -> Linkage:
     """Returns the mechanics of the worm: one link a segment, which stands for its four equal sides."""
     n = body.n_segments
@@ -109,3 +96,10 @@ def daltorio_linkage(body: Daltorio2013Body) -> Linkage:
         wall_stiffness_N_per_m=body.wall_stiffness_N_per_m,
         friction=body.wall_friction,
     )
+
+
+class Daltorio2013Plant(DynamicPlanarPlant):
+    """The worm of Daltorio et al. 2013 as a plant; the module states its equations."""
+
+    description = "planar worm of Daltorio et al. 2013 in a pipe"
+    linkage = staticmethod(daltorio_linkage)

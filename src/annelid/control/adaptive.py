@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
@@ -38,17 +38,15 @@ class AdaptiveSns(ControllerKind):
     )
     kind: Literal["adaptive"] = "adaptive"
     network: Sns = Sns()
-    drive: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.0, description="0: the slow rhythm of the half-centres alone; 1: about three times as fast"
+    drive: float = Field(
+        default=0.0, ge=0, le=1, description="0: the half-centres' own slow rhythm; 1: about three times as fast"
     )
-    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
-        default=0.0, description="change of the manual drive"
+    drive_slope_per_s: float = Field(default=0.0, ge=-100, le=100, description="change of the manual drive")
+    stretch_gain_per_m: float = Field(
+        default=0.0, ge=-1000, le=1000, description="drive per mean lengthening of the segments"
     )
-    stretch_gain_per_m: Annotated[float, Field(ge=-1000, le=1000)] = Field(
-        default=0.0, description="drive per mean lengthening of the segments"
-    )
-    drive_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.05, description="time constant of the descending neuron"
+    drive_time_constant_s: float = Field(
+        default=0.05, ge=1e-3, le=1e4, description="time constant of the descending neuron"
     )
 
     def build(self, config: RunConfig, plant: Plant) -> AdaptiveController:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Annotated, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +30,13 @@ class HalfCentreKind(ControllerKind):
     range_mV: Positive = Field(default=20.0, description="operating range R")
     bifurcation_mV: float = Field(default=0.01, description="delta: how far past the bifurcation the half-centre sits")
     offset_mV: Positive = Field(default=0.1, description="how far beyond the range a suppressed half-centre lies")
-    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
+    inhibitory_reversal_mV: float = Field(default=-40.0, lt=0, description="relative to rest")
     excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
     sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
-    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
-        default=0.05, description="slope S of the sodium gates"
+    gate_slope_per_mV: float = Field(default=0.05, gt=0, le=10, description="slope S of the sodium gates")
+    gate_time_constant_ms: Positive = Field(
+        default=300.0, description="tau_h,max; sets the period of the paper's network: 300, 200 or 100"
     )
-    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; sets the period of the paper's network: 300, 200 or 100")
 
 
 def design_of(kind: type[Design], section: Section) -> Design:
@@ -65,16 +65,11 @@ class NeuralController(SegmentController):
     ``0.5 + clip(U1 - U2, -R, R) / (2 R)`` (Riddle et al. 2022).
     """
 
+    _GATE = "inactivation gate h of the persistent sodium channel; NaN for neurons without one"
     recorded = (
         ("potential", ("neuron",), "mV", "membrane potential relative to rest"),
-        (
-            "sodium_gate",
-            ("neuron",),
-            "1",
-            "inactivation gate h of the persistent sodium channel; NaN for neurons without one",
-        ),
+        ("sodium_gate", ("neuron",), "1", _GATE),
     )
-
     _range_mV: float
 
     def __init__(
@@ -89,17 +84,9 @@ class NeuralController(SegmentController):
         slope_per_mV: float,
         linear_range_mV: float | None = None,
     ) -> None:
-        """Compiles the network.
+        """Compiles the network, whose neurons are those of one segment after another by ``roles``, then any others.
 
-        Args:
-            network: Its neurons are those of one segment after another, then any others.
-            roles: Names of a segment's neurons, in order; ``"contraction"`` and ``"expansion"`` are among them.
-            n_segments: Segments.
-            n_muscles: As `SegmentController`.
-            control_timestep_s: Step of the network, s.
-            scheme: How it steps.
-            slope_per_mV: Slope of the sigmoid.
-            linear_range_mV: R of the linear activation, which then takes the sigmoid's place.
+        ``linear_range_mV`` is the R of the linear activation, which then takes the sigmoid's place.
         """
         super().__init__(n_segments, n_muscles)
         self._timestep_s = control_timestep_s
@@ -120,16 +107,7 @@ class NeuralController(SegmentController):
 
     @abstractmethod
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps with the same sensation but for its time; bit for bit as so many of `step`.
-
-        Args:
-            sensation: What the body senses at the beginning of the first step; its time is a multiple of the
-                control step, and goes on.
-            n_steps: Control steps, at least 1.
-
-        Returns:
-            Activation of every muscle in [0, 1] after the last step, shape ``(n_muscles,)``.
-        """
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
 
     def _activation(self, potential: Array) -> Array:
         """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -13,8 +13,15 @@ from annelid.control.adaptive import DRIVE_HINT
 from annelid.control.base import SegmentController
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous import HeteroclinicRing, HeteroclinicStepper, PhaseState, PhaseStepper, handover_input
-from annelid.nervous import largest_gain_per_s, phase_chain
+from annelid.nervous import (
+    HeteroclinicRing,
+    HeteroclinicStepper,
+    PhaseState,
+    PhaseStepper,
+    handover_input,
+    largest_gain_per_s,
+    phase_chain,
+)
 from annelid.nervous.phase_chain import BODY
 from annelid.protocols import Array, Plant, Sensation, Values
 
@@ -43,29 +50,32 @@ class HeteroclinicChannel(ControllerKind):
         "controller.stretch_cue_m=0.005:0.08:log",
     )
     kind: Literal["shc"] = "shc"
-    growth_rate_per_s: Annotated[float, Field(gt=0, le=500)] = Field(
-        default=20.0, description="rate at which activities settle and decay; at most 0.5 over the control timestep"
+    growth_rate_per_s: float = Field(
+        default=20.0,
+        gt=0,
+        le=500,
+        description="rate at which activities settle and decay; at most 0.5 over the control timestep",
     )
-    saddle_value: Annotated[float, Field(gt=1, le=100)] = Field(
-        default=2.0, description="that rate over the rate at which a node is left"
+    saddle_value: float = Field(
+        default=2.0, gt=1, le=100, description="that rate over the rate at which a node is left"
     )
-    noise: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=1e-6, description="standard deviation of the noise, per square root of a second"
+    noise: float = Field(
+        default=1e-6, ge=0, le=1, description="standard deviation of the noise, per square root of a second"
     )
-    bias_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
-        default=5e-4, description="constant input to every node; a larger one shortens the dwell"
+    bias_per_s: float = Field(
+        default=5e-4, ge=0, le=100, description="constant input to every node; a larger one shortens the dwell"
     )
     feedback: Literal["none", "stretch", "contact"] = Field(
         default="stretch",
         description="what excites a node's successor: nothing, the present segment having lengthened by "
         "stretch_cue_m, or the segment before it bearing contact_cue_N",
     )
-    feedback_gain_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
-        default=0.1, description="input to the successor of an active node whose cue is on"
+    feedback_gain_per_s: float = Field(
+        default=0.1, ge=0, le=100, description="input to the successor of an active node whose cue is on"
     )
     stretch_cue_m: NonNegative = Field(default=0.02, description="lengthening at which a segment has its shape")
     contact_cue_N: NonNegative = Field(
-        default=0.2, description="size of the force of the ground with which a segment holds fast"
+        default=0.2, description="size of the force of the ground on an anchored segment"
     )
 
     @model_validator(mode="after")
@@ -103,17 +113,13 @@ class PhaseChain(ControllerKind):
         "controller.drive=3:5",
     )
     kind: Literal["phase-chain"] = "phase-chain"
-    drive: Annotated[float, Field(ge=0, le=10)] = Field(
-        default=4.0, description="descending drive at the start: the body swims in 3 .. 5, is silent outside 1 .. 5"
+    drive: float = Field(
+        default=4.0, ge=0, le=10, description="descending drive at the start: swims in 3 .. 5, silent outside 1 .. 5"
     )
-    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
-        default=0.0, description="change of the drive, which stays in 0 .. 10"
-    )
-    limbs: bool = Field(
-        default=False, description="true: limb oscillators force a standing wave below drive 3 (walking)"
-    )
-    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
-        default=1.0, description="waves on the body at once, by the phase bias; the salamander's swimming has 1"
+    drive_slope_per_s: float = Field(default=0.0, ge=-100, le=100, description="change of the drive, within 0 .. 10")
+    limbs: bool = Field(default=False, description="limb oscillators force a standing wave below drive 3 (walking)")
+    waves: float = Field(
+        default=1.0, ge=-100, le=100, description="waves on the body at once; the salamander's swimming has 1"
     )
     coupling_per_s: Positive = Field(default=10.0, description="coupling of neighbours")
     slowing: Positive = Field(default=1.0, description="times slower than the salamander, in all of its rates")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -24,7 +24,7 @@ class PressureSns(ControllerKind):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
 
     A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
-    the contraction two segments before. Lengths and loads are those of the six-segment robot, of 0.16 m radius and 19 N.
+    the contraction two segments before. Lengths and loads are those of the six-segment robot (0.16 m radius, 19 N).
     """
 
     sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
@@ -42,24 +42,29 @@ class PressureSns(ControllerKind):
     full_N: Positive = Field(default=9.0, description="load that drives it to R")
     extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
     extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
-    hold: Annotated[float, Field(ge=0, le=5)] = Field(
-        default=1.0, description="potential, over R, that full pressure alone gives the sensory neuron; 0 for none"
+    hold: float = Field(
+        default=1.0, ge=0, le=5, description="potential over R that full pressure gives its sensory neuron; 0 for none"
     )
-    release: Annotated[float, Field(ge=0, le=20)] = Field(
-        default=1.8, description="stretch sensors' currents that a full extension neuron cancels; 0 for none"
+    release: float = Field(
+        default=1.8,
+        ge=0,
+        le=20,
+        description="stretch sensors' currents that a full extension neuron cancels; 0 for none",
     )
-    landing: Annotated[float, Field(ge=0, le=5)] = Field(
+    landing: float = Field(
         default=0.1,
-        description="potential, over R, that full pressure alone gives the sensory neuron of the segment before; 0 for "
-        "none",
+        ge=0,
+        le=5,
+        description="potential over R that full pressure gives the sensory neuron before; 0 for none",
     )
-    exchange: Annotated[float, Field(ge=0, le=5)] = Field(
+    exchange: float = Field(
         default=0.8,
-        description="potential, over R, that a full contraction neuron alone gives the sensory neuron two segments "
-        "before; 0 for none, which three segments have in any case",
+        ge=0,
+        le=5,
+        description="potential over R that a contraction gives the sensory neuron two before; 0 for none",
     )
-    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=10)] = Field(
-        default=0.03, description="time constant of the pressure neurons"
+    pressure_time_constant_s: float = Field(
+        default=0.03, ge=1e-3, le=10, description="time constant of the pressure neurons"
     )
 
     @model_validator(mode="after")

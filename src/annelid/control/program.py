@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 class Contraction(Section):
     """One contraction of one segment's ring."""
 
-    segment: Annotated[int, Field(ge=1, le=200)] = Field(description="counted from 1 at the front")
+    segment: int = Field(ge=1, le=200, description="counted from 1 at the front")
     start_s: NonNegative = Field(description="when the activation begins to rise")
     stop_s: Positive = Field(description="when it begins to fall")
-    activation: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="level that it rises to")
+    activation: float = Field(default=1.0, gt=0, le=1, description="level that it rises to")
 
     @model_validator(mode="after")
     def _starts_before_it_stops(self) -> Self:

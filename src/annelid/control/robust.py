@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -26,24 +26,24 @@ BACK = SIDES.index("back")
 class DescendingDrive(Section):
     """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe."""
 
-    lift: Annotated[float, Field(ge=0, lt=0.5)] = Field(
+    lift: float = Field(
         default=0.0,
+        ge=0,
+        lt=0.5,
         description="share of the range to which full drive lifts resting relays; 0: there is no such neuron; 0.45: "
-        "full drive makes six segments' wave 3.9 times as fast",
+        "six segments' wave becomes 3.9 times as fast",
     )
-    drive: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="manual drive, to which pressure adds")
-    per_segment: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.5, description="drive that one segment gives whose back is pressed fully"
+    drive: float = Field(default=0.0, ge=0, le=1, description="manual drive, to which pressure adds")
+    per_segment: float = Field(
+        default=0.5, ge=0, le=1, description="drive that one segment gives whose back is pressed fully"
     )
     full_pressure_N: Positive = Field(
         default=3.0, description="force on a segment's back that presses it fully; about a segment's weight"
     )
-    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant of the pressure neurons"
+    pressure_time_constant_s: float = Field(
+        default=0.2, ge=1e-3, le=1e4, description="time constant of the pressure neurons"
     )
-    time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant of the descending neuron"
-    )
+    time_constant_s: float = Field(default=0.2, ge=1e-3, le=1e4, description="time constant of the descending neuron")
 
 
 class RobustSns(HalfCentreKind):
@@ -64,15 +64,18 @@ class RobustSns(HalfCentreKind):
         "controller.activation_slope_per_mV=0.1:2:log",
     )
     kind: Literal["sns-robust"] = "sns-robust"
-    bifurcation_mV: Annotated[float, Field(lt=0)] = Field(
-        default=-1.0, description="delta: below 0, so that the half-centre stays in either state"
+    bifurcation_mV: float = Field(
+        default=-1.0, lt=0, description="delta: below 0, so that the half-centre stays in either state"
     )
     turn_ms: Positive = Field(default=875.0, description="time from one segment's contraction to the next one's")
     push_nA: Positive = Field(
         default=6.0, description="current of a full relay into the next contraction neuron at rest"
     )
-    entrainment: Annotated[float, Field(ge=0, le=0.03)] = Field(
-        default=0.02, description="share of the relay's drive that the sensor may add or take; 0 for none"
+    entrainment: float = Field(
+        default=0.02,
+        ge=0,
+        le=0.03,
+        description="share of the relay's drive that the sensor may add or take; 0 for none",
     )
     habit_ms: Positive = Field(default=10000.0, description="time constant with which the sensor adapts")
     full_stretch_m: Positive = Field(default=0.08, description="mean lengthening that drives a stretch neuron to R")
@@ -82,8 +85,10 @@ class RobustSns(HalfCentreKind):
         default="design",
         description="state of the network at the start: segment 1 contracted, all neurons at rest, or drawn by seed",
     )
-    let_go_s: Annotated[float, Field(ge=0, le=100)] = Field(
+    let_go_s: float = Field(
         default=0.0,
+        ge=0,
+        le=100,
         description="time constant with which motor neurons let go, so that several segments share the wave; 0: there "
         "are none, and contraction and expansion neurons drive the muscles",
     )
@@ -183,7 +188,7 @@ class RobustController(NeuralController):
         self._start_at(state)
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps, as `NeuralController.stride`."""
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
         drive = self._config.descending
         longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         inputs = np.clip(longer_m / self._config.full_stretch_m, 0.0, 1.0)

@@ -84,18 +84,11 @@ class SlipDetector:
 
 
 def ground_speed(lengthening_m_per_s: Array, load_N: Array) -> Array:
-    """Estimates the speed of every segment over the ground, by the balance of Coulomb's friction.
+    """Estimates the speed of every segment over the ground, m/s, by the balance of Coulomb's friction.
 
     Neighbours part at the mean of the rates at which both lengthen; the first and the last segment touch with the tip,
     which is half a segment farther out. The ground moves at the weighted median of the segments' speeds: friction on
     the faster ones balances that on the slower ones.
-
-    Args:
-        lengthening_m_per_s: Rate at which each segment lengthens, m/s, ``(n_segments,)``.
-        load_N: What each bears, N, same shape.
-
-    Returns:
-        Speeds towards the front, m/s, ``(n_segments,)``; those against the mean where nothing bears load.
     """
     parting = 0.5 * (lengthening_m_per_s[1:] + lengthening_m_per_s[:-1])
     speed = np.append(parting[::-1].cumsum()[::-1], 0.0)
@@ -105,12 +98,7 @@ def ground_speed(lengthening_m_per_s: Array, load_N: Array) -> Array:
 
 
 def weighted_median(values: Array, weights: Array) -> float:
-    """Returns the value below and above which there is at most half of the weight; the mean if there is none.
-
-    Args:
-        values: Shape ``(n,)``.
-        weights: At least 0, same shape.
-    """
+    """Returns the value below and above which there is at most half of the weight; the mean if there is none."""
     total = weights.sum()
     if not total > 0.0:
         return float(values.mean())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Self, TypeVar
 
@@ -108,24 +109,12 @@ class PeristalsisController(NeuralController, Generic[Config]):
             which a design rule has no solution, or a control step beyond a neuron's time constant.
     """
 
-    recorded = (
-        *NeuralController.recorded,
-        (
-            "sensor_on",
-            ("segment",),
-            "1",
-            "stretch sensor during the last control step: 1 while the segment is at rest length",
-        ),
-    )
+    _SENSOR_ON = "stretch sensor during the last control step: 1 while the segment is at rest length"
+    recorded = (*NeuralController.recorded, ("sensor_on", ("segment",), "1", _SENSOR_ON))
     _every_step_differs = False
 
     def __init__(
-        self,
-        config: Config,
-        sensor: StretchSensor,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
+        self, config: Config, sensor: StretchSensor, n_segments: int, n_muscles: int, control_timestep_s: float
     ) -> None:
         """Builds the controller in its initial state.
 
@@ -167,7 +156,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
         self._start_at(self._stepper.initial_state(self._sns.gate_start), sensor_on=off, n_steps=np.array(0))
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps, as `NeuralController.stride`."""
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
         for n, inputs_nA in self._inputs(self._now, sensation, n_steps, self.own):
             self._stepper.advance(self._state, inputs_nA, n)
         return self._activation(self._state.potential[0])
@@ -193,8 +182,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
     def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
         """Cuts steps under one sensation where the inputs change: after the kick, and when segment 1 is released.
 
-        Returns:
-            For every piece its number of steps and the time at its beginning, s.
+        Returns the number of steps of every piece, and the time at its beginning, s.
         """
         held = self._sensor.held_at(time_s)
         if n_steps == 1 or (n_taken > 0 and not held and not self._every_step_differs):
@@ -218,32 +206,21 @@ class SnsController(PeristalsisController[Sns]):
     A segment's activation is that of `annelid.control.neural.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023,
     ``"linear"`` as in Riddle et al. 2022. Many copies of it can be advanced at once.
 
-    Attributes:
-        alike: Equal for controllers that can be advanced together as copies.
-        own: What may differ between those.
-
     Raises:
         ConfigError: As `PeristalsisController`.
     """
 
     name = "synthetic nervous system"
 
-    def __init__(
-        self,
-        config: Sns,
-        sensor: StretchSensor,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
-    ) -> None:
-        """Builds the controller in its initial state, as `PeristalsisController`."""
-        super().__init__(config, sensor, n_segments, n_muscles, control_timestep_s)
+    @cached_property
+    def alike(self) -> Hashable:
+        """Equal for controllers that can be advanced together as copies, which may differ in `own`."""
         differing = {"sensor_current_nA", "kick_nA"}
-        self.alike: Hashable = config.model_dump_json(exclude=differing), sensor.startup_hold_s
-        drive = (config.sensor_current_nA + config.kick_nA) / config.leak_conductance_uS
-        reversals = config.excitatory_reversal_mV, config.sodium_reversal_mV
-        self._explicable_mV = config.inhibitory_reversal_mV - drive, max(reversals) + drive
-        self._batches: dict[int, tuple[Stepper, NetworkState]] = {}
+        return self._config.model_dump_json(exclude=differing), self._sensor.settings.startup_hold_s
+
+    @cached_property
+    def _batches(self) -> dict[int, tuple[Stepper, NetworkState]]:
+        return {}
 
     def _network(self, n_segments: int, control_timestep_s: float) -> Network:
         return peristalsis_network(n_segments, self._parameters)
@@ -307,8 +284,10 @@ class SnsController(PeristalsisController[Sns]):
 
     def alarm(self) -> str | None:
         """Returns a sentence if a potential has left the range that currents and reversals can explain."""
-        low, high = self._explicable_mV
-        potential = self._state.potential[0]
+        sns, potential = self._sns, self._state.potential[0]
+        drive = (sns.sensor_current_nA + sns.kick_nA) / sns.leak_conductance_uS
+        low = sns.inhibitory_reversal_mV - drive
+        high = max(sns.excitatory_reversal_mV, sns.sodium_reversal_mV) + drive
         # Written so that NaN fails it.
         if np.minimum.reduce(potential) >= low and np.maximum.reduce(potential) <= high:
             return None

@@ -47,11 +47,7 @@ LEFT, RIGHT = SIDES.index("left"), SIDES.index("right")
 
 
 def heading_angle(heading: Array) -> float:
-    """Returns the direction of a heading on the floor, rad: 0 towards -x, positive to the worm's left, towards -y.
-
-    Args:
-        heading: A vector, ``(3,)``, as `Sensation.heading`.
-    """
+    """Returns the direction of a heading on the floor, rad: 0 towards -x, positive to the worm's left, towards -y."""
     return math.atan2(-float(heading[1]), -float(heading[0]))
 
 
@@ -61,14 +57,7 @@ def wrapped(angle_rad: float) -> float:
 
 
 def half_scales(modulation: ArrayLike) -> Array:
-    """Returns what modulations m in [-1, 1] leave of the left and the right activation.
-
-    Args:
-        modulation: Any shape; positive ones bend a segment to the left.
-
-    Returns:
-        ``1 - max(m, 0)`` and ``1 - max(-m, 0)``, shape ``(.., 2)``.
-    """
+    """Returns what modulations m in [-1, 1] leave of the left and the right activation, shape ``(.., 2)``."""
     m = np.asarray(modulation, dtype=float)
     return np.stack([1.0 - np.maximum(m, 0.0), 1.0 - np.maximum(-m, 0.0)], axis=-1)
 
@@ -81,20 +70,16 @@ class SteeringKind(TurningKind):
         return Steering(self, n_segments, control_timestep_s)
 
     @abstractmethod
-    def at_start(self) -> Now:
-        """Returns the state with which both sides are whole."""
+    def _at_start(self) -> Now:
+        """The state with which both sides are whole."""
 
     @abstractmethod
-    def advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
-        """Takes one control step, in place.
-
-        Raises:
-            ConfigError: A body that cannot sense what the rule needs.
-        """
+    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+        """Takes one control step, in place; refuses a body that cannot sense what the rule needs."""
 
     @abstractmethod
-    def scales(self, now: Now, n_segments: int) -> Array:
-        """Returns what is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
+    def _scales(self, now: Now, n_segments: int) -> Array:
+        """What is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
 
 
 class Descending(SteeringKind):
@@ -110,8 +95,8 @@ class Descending(SteeringKind):
         description="share of the modulation that each segment takes, front to rear; negative ones bend it the other "
         "way; default 1 each",
     )
-    descending_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant with which the descending neurons follow the wanted modulation"
+    descending_time_constant_s: float = Field(
+        default=0.2, ge=1e-3, le=1e4, description="time constant of the descending neurons behind the wanted modulation"
     )
 
     def check_with(self, config: RunConfig) -> None:
@@ -122,21 +107,18 @@ class Descending(SteeringKind):
             raise ValueError(f"turning.shares has {len(self.shares)} entries: must have {n_segments}, one a segment")
 
     @abstractmethod
-    def wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
-        """Returns the modulation that is wanted during a control step, in [-1, 1]; may change the state."""
+    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+        """The modulation that is wanted during a control step, in [-1, 1]; may change the state."""
 
-    def at_start(self) -> Now:
-        """Returns silent descending neurons."""
+    def _at_start(self) -> Now:
         return {"modulation": np.array(0.0)}
 
-    def advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
-        """Moves the descending neurons towards the wanted modulation."""
-        wanted = self.wanted(now, sensation, timestep_s)
+    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+        wanted = self._wanted(now, sensation, timestep_s)
         keeps = math.exp(-timestep_s / self.descending_time_constant_s)
         now["modulation"][...] = wanted + (float(now["modulation"]) - wanted) * keeps
 
-    def scales(self, now: Now, n_segments: int) -> Array:
-        """Returns what the present activity leaves of every half, in proportion to the segment's share."""
+    def _scales(self, now: Now, n_segments: int) -> Array:
         return half_scales(float(now["modulation"]) * np.array(self.shares or [1.0] * n_segments))
 
 
@@ -146,8 +128,7 @@ class ConstantTurning(Descending):
     kind: Literal["constant"] = "constant"
     modulation: Modulation = Field(default=0.0, description="wanted modulation: 1 silences the left side, -1 the right")
 
-    def wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
-        """Returns the modulation."""
+    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
         return self.modulation
 
 
@@ -163,20 +144,19 @@ class Steered(Descending):
     rate_time_constant_s: Positive = Field(
         default=2.0, description="time constant of the filter that gives the rate of the heading; about one cycle"
     )
-    largest_modulation: Annotated[float, Field(gt=0, le=1)] = Field(
-        default=0.9, description="size of the modulation that is never exceeded"
+    largest_modulation: float = Field(
+        default=0.9, gt=0, le=1, description="size of the modulation that is never exceeded"
     )
 
     @abstractmethod
-    def target(self, now: Now, sensation: Sensation) -> float | None:
-        """Returns the wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
+    def _target(self, now: Now, sensation: Sensation) -> float | None:
+        """The wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
 
-    def at_start(self) -> Now:
-        """Returns silent neurons, and no headings: at the start, at the latest step, and filtered."""
-        return super().at_start() | {"headings": np.full(3, np.nan)}
+    def _at_start(self) -> Now:
+        # The headings at the start, at the latest step, and filtered.
+        return super()._at_start() | {"headings": np.full(3, np.nan)}
 
-    def wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
-        """Returns the output of the control."""
+    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
         heading = heading_angle(sensation.heading)
         if math.isnan(heading):
             raise ConfigError("steering needs a body that senses its heading, and this one does not")
@@ -188,7 +168,7 @@ class Steered(Descending):
         rate = (angle - smooth) / self.rate_time_constant_s
         smooth += -math.expm1(-timestep_s / self.rate_time_constant_s) * (angle - smooth)
         now["headings"][:] = first, angle, smooth
-        target = self.target(now, sensation)
+        target = self._target(now, sensation)
         if target is None:
             return 0.0
         modulation = self.gain_per_rad * wrapped(target - angle) - self.rate_gain_s * rate
@@ -199,12 +179,11 @@ class HeadingTurning(Steered):
     """Steering to a heading: the direction from the last ring to the foremost."""
 
     kind: Literal["heading"] = "heading"
-    heading_deg: Annotated[float, Field(ge=-180, le=180)] = Field(
-        default=0.0, description="relative to that at the start, positive to the left"
+    heading_deg: float = Field(
+        default=0.0, ge=-180, le=180, description="relative to that at the start, positive to the left"
     )
 
-    def target(self, now: Now, sensation: Sensation) -> float:
-        """Returns the heading relative to that of the first sensation."""
+    def _target(self, now: Now, sensation: Sensation) -> float:
         return float(now["headings"][0]) + math.radians(self.heading_deg)
 
 
@@ -212,9 +191,10 @@ class CourseTurning(Steered):
     """Steering to one waypoint after another; behind the last one the worm crawls on unsteered."""
 
     kind: Literal["course"] = "course"
-    waypoints: Annotated[tuple[Waypoint, ...], Field(min_length=1)] = Field(
+    waypoints: tuple[Waypoint, ...] = Field(
+        min_length=1,
         description="x and y of each, m, in the coordinates of the run file: a worm with body.heading_deg = 0 starts "
-        "along 0 <= x <= its length, leads towards -x, and its left is -y"
+        "along 0 <= x <= its length, leads towards -x, and its left is -y",
     )
     reach_m: Positive = Field(default=0.3, description="a waypoint counts once the foremost ring is this near to it")
 
@@ -223,12 +203,10 @@ class CourseTurning(Steered):
         """The waypoints."""
         return Goals(self.waypoints, self.reach_m)
 
-    def at_start(self) -> Now:
-        """Returns the state before the first waypoint."""
-        return super().at_start() | {"n_reached": np.array(0)}
+    def _at_start(self) -> Now:
+        return super()._at_start() | {"n_reached": np.array(0)}
 
-    def target(self, now: Now, sensation: Sensation) -> float | None:
-        """Returns the direction from the foremost ring to the next waypoint."""
+    def _target(self, now: Now, sensation: Sensation) -> float | None:
         for x, y in self.waypoints[max(int(now["n_reached"]), 0) :]:
             away = np.array([x - sensation.front_m[0], y - sensation.front_m[1], 0.0])
             if math.hypot(*away) > self.reach_m:
@@ -254,12 +232,10 @@ class TouchTurning(SteeringKind):
     full_N: Positive = Field(default=15.0, description="difference at which a side is silenced")
     rate_per_s: Positive = Field(default=10.0, description="fastest change of a scale")
 
-    def at_start(self) -> Now:
-        """Returns a timer that does not run, s, and the latched and the present scales."""
+    def _at_start(self) -> Now:
         return {"timer": np.array(0.0), "latched": np.ones(2), "scales": np.ones(2)}
 
-    def advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
-        """Takes one control step by the authors' rule."""
+    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
         if not len(sensation.touch_N):
             raise ConfigError("turning.kind = 'touch' needs a body that senses touch on the sides of its segments")
         difference_N = float(sensation.touch_N[0, RIGHT] - sensation.touch_N[0, LEFT])
@@ -275,8 +251,7 @@ class TouchTurning(SteeringKind):
         reach = self.rate_per_s * timestep_s
         now["scales"] += np.clip(latched - now["scales"], -reach, reach)
 
-    def scales(self, now: Now, n_segments: int) -> Array:
-        """Returns the present scales, those of a side alike."""
+    def _scales(self, now: Now, n_segments: int) -> Array:
         return np.tile(now["scales"], (n_segments, 1))
 
 
@@ -284,29 +259,23 @@ class Steering(SavedAndRecorded):
     """What is left of the activation of the two halves of every ring, at every control step."""
 
     def __init__(self, rule: SteeringKind, n_segments: int, control_timestep_s: float) -> None:
-        """Begins with all halves whole.
-
-        Args:
-            rule: Section of the configuration.
-            n_segments: Segments.
-            control_timestep_s: Control step, s.
-        """
+        """Begins with all halves whole, by the rule of its section of the configuration."""
         self._rule, self._n_segments, self._timestep_s = rule, n_segments, control_timestep_s
         self.reset()
 
     def reset(self) -> None:
         """Returns to the initial state: all halves whole."""
-        self._now = self._rule.at_start()
+        self._now = self._rule._at_start()
 
     def advance(self, sensation: Sensation, n_steps: int) -> Array:
         """Takes control steps with the same sensation but for its time, and returns `scales`."""
         for _ in range(n_steps):
-            self._rule.advance(self._now, sensation, self._timestep_s)
+            self._rule._advance(self._now, sensation, self._timestep_s)
         return self.scales()
 
     def scales(self) -> Array:
         """Returns the scales after the latest step, in [0, 1], ``(n_segments, 2)``: left and right half."""
-        return self._rule.scales(self._now, self._n_segments)
+        return self._rule._scales(self._now, self._n_segments)
 
 
 class TurningController(SegmentController):
@@ -319,12 +288,7 @@ class TurningController(SegmentController):
     """
 
     def __init__(
-        self,
-        pattern: Controller,
-        section: TurningKind,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
+        self, pattern: Controller, section: TurningKind, n_segments: int, n_muscles: int, control_timestep_s: float
     ) -> None:
         """Wraps a pattern.
 
@@ -356,15 +320,7 @@ class TurningController(SegmentController):
         return self.stride(sensation, 1)
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps with the same sensation but for its time; the same bits as so many of `step`.
-
-        Args:
-            sensation: What the body senses at the beginning of the first step.
-            n_steps: Control steps, at least 1.
-
-        Returns:
-            Activation of every muscle in [0, 1] after the last step, ``(n_muscles,)``.
-        """
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
         scales = self._steering.advance(sensation, n_steps)
         if isinstance(self._pattern, StridingController):
             activation = self._pattern.stride(sensation, n_steps)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,10 +28,10 @@ class SineWave(ControllerKind):
     )
     kind: Literal["sine"] = "sine"
     period_s: Positive = Field(default=2.625, description="time of one cycle; the paper's three segments take 2.625")
-    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
-        default=1.0, description="waves on the body at once; negative ones run forwards, 0 is no wave"
+    waves: float = Field(
+        default=1.0, ge=-100, le=100, description="waves on the body at once; negative ones run forwards, 0 is no wave"
     )
-    level: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="largest activation")
+    level: float = Field(default=1.0, gt=0, le=1, description="largest activation")
 
     def build(self, config: RunConfig, plant: Plant) -> SineController:
         """Builds the controller, as `ControllerKind.build`."""
@@ -83,10 +83,10 @@ class TimedWave(ControllerKind):
     hold_s: NonNegative = Field(default=1.0, description="time contracted")
     fall_s: NonNegative = Field(default=1.0, description="time to relax; 0 for a step")
     interval_s: Positive = Field(default=1.0, description="the next segment begins this much later")
-    waves: Annotated[int, Field(ge=1, le=100)] = Field(
-        default=1, description="waves on the body at once: the cycle is n_segments times interval_s over this"
+    waves: int = Field(
+        default=1, ge=1, le=100, description="waves on the body at once; the cycle is n_segments interval_s over this"
     )
-    level: Annotated[float, Field(gt=0, le=1)] = Field(default=1.0, description="activation while contracted")
+    level: float = Field(default=1.0, gt=0, le=1, description="activation while contracted")
 
     @model_validator(mode="after")
     def _it_contracts(self) -> Self:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from annelid.nervous.network import Network
     from annelid.nervous.neurons import Neuron
 
+# What Graphviz draws for each effect.
 _EDGES = {
     "excitatory": "arrowhead=empty",
     "inhibitory": "arrowhead=dot",
@@ -25,11 +26,10 @@ _EDGES = {
     "gap junction": "arrowhead=none, style=dashed",
     "rectified gap junction": "arrowhead=diamond, style=dashed",
 }
-"""What Graphviz draws for each effect."""
+# Connections beside which there is room for words.
 _MOST_LABELLED = 40
-"""Connections beside which there is room for words."""
+# Pixels from a neuron to the next.
 _PX = 130.0
-"""Pixels from a neuron to the next; an inch has 96."""
 _PX_PER_PT = 96.0 / 72.0
 
 
@@ -67,12 +67,6 @@ def draw_diagram(network: Network) -> Diagram:
 
     Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
     rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim.
-
-    Args:
-        network: Any network.
-
-    Returns:
-        Its Graphviz source and its SVG.
     """
     labels = {name: name for name in network.neurons}
     shapes = network_shapes(network, labels, strengths=len(network.connections) <= _MOST_LABELLED)
@@ -80,10 +74,7 @@ def draw_diagram(network: Network) -> Diagram:
 
 
 def markdown_tables(network: Network) -> str:
-    """Returns neurons, connections, inputs and outputs as Markdown tables.
-
-    Units stand in the headings; the properties that differ from the default are named in the last column.
-    """
+    """Returns neurons, connections, inputs and outputs as Markdown tables."""
     neurons = []
     for name, n in network.neurons.items():
         numbers = n.capacitance_nF, n.leak_conductance_uS, n.rest_mV, n.bias_nA, network.initial_mV[name]
@@ -137,7 +128,6 @@ def _cell(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A DOT string of one line; a control character would end the statement or be unreadable."""
     return json.dumps(_line(text), ensure_ascii=False)
 
 

@@ -32,16 +32,7 @@ _ARROW = "#4d4d4d"
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line through points; with a fill it is closed.
-
-    Attributes:
-        points: As `annelid.nervous.layout` has them, shape ``(n,)``.
-        color: Of the line.
-        width_pt: Its width, points.
-        fill: Colour of what it encloses; empty for an open line.
-        dashed: Whether the line is dashed.
-        key: Names the part of the network; empty for a part of another shape.
-    """
+    """A line through points of the layout; with a ``fill`` it is closed. The ``key`` names a part of the network."""
 
     points: Points
     color: str
@@ -53,16 +44,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """Plain text at a place.
-
-    Attributes:
-        text: The words.
-        place: A point as `annelid.nervous.layout` has it.
-        size_pt: Size of the letters, points.
-        across: Which end of the words is at the place.
-        along: Whether the words stand on the place, around it, or below it.
-        halo: Whether to clear what lies under the words.
-    """
+    """Plain text at a point of the layout, with that end or the middle there; a ``halo`` clears what lies under it."""
 
     text: str
     place: complex
@@ -96,16 +78,9 @@ def strength_of(connection: Connection) -> str:
 def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bool) -> list[Shape]:
     """Draws each neuron, connection, input and output of a network once.
 
-    Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i the place among the network's connections,
-    ``input-<name>-<neuron>`` and ``output-<name>``.
-
-    Args:
-        network: The network.
-        labels: What stands in each neuron, by its name.
-        strengths: Whether to write on each connection how strong it is.
-
-    Returns:
-        The shapes, from back to front.
+    The shapes are in order from back to front. Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i
+    the place among the network's connections, ``input-<name>-<neuron>`` and ``output-<name>``. In each neuron stands
+    its label, and on each connection how strong it is if ``strengths``.
     """
     layout = lay_out(network)
     columns, paths, marks, numbers, front = [], [], [], [], []
@@ -151,7 +126,11 @@ def connection_shapes(route: Points, effect: Effect, key: str = "") -> list[Shap
             return [path]
         tip, back = points_at(route, 0.9 * along[-1] - np.array([0.0, 0.1]))
         across = 0.55j * (tip - back)
-        return [path, _triangle(tip, back, across, color, 1.0, color), Line(np.array([tip + across, tip - across]), color)]
+        return [
+            path,
+            _triangle(tip, back, across, color, 1.0, color),
+            Line(np.array([tip + across, tip - across]), color),
+        ]
     length = _TRIANGLE if effect == "excitatory" else 2.0 * _DOT
     end = along[-1] - length
     body = points_at(route, np.append(along[along < end], end))

@@ -38,14 +38,9 @@ class Stub(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where everything of a network is drawn.
+    """Centres of the neurons, paths of the connections in the network's order, and stubs of the inputs and outputs.
 
-    Attributes:
-        places: Centre of every neuron.
-        routes: Path of every connection from neuron to neuron, in the network's order.
-        inputs: One stub for each neuron that an input drives.
-        outputs: One stub for each output.
-        columns: Names of the neurons of each segment, by its number; empty in a circular layout.
+    ``columns`` has the names of the neurons of each segment; it is empty in a circular layout.
     """
 
     places: dict[str, complex]

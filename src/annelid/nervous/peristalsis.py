@@ -232,11 +232,11 @@ def pressure_network(
 ) -> Network:
     """Builds the peristalsis network with pressure feedback against slip; the design is our own.
 
-    The paper's network senses lengths only. On a body with weight a contracting segment stretches its neighbour, whose
-    stretch sensor then switches off too early: several segments contract at once, and the front drags along the ground.
-    Four kinds of synapse onto sensory neurons, which keep a segment expanded and end its contraction, even the wave out,
-    so that no segment leaves the ground before the one ahead has its length (the aim of the contact feedback of Daltorio
-    et al. 2013). Before the first segment comes the last.
+    On a body with weight a contracting segment stretches its neighbour, whose stretch sensor then switches off too
+    early: several segments contract at once, and the front drags along the ground. Four kinds of synapse onto sensory
+    neurons, which keep a segment expanded and end its contraction, even the wave out, so that no segment leaves the
+    ground before the one ahead has its length (the aim of Daltorio et al. 2013). Before the first segment comes the
+    last.
 
     Args:
         n_segments: Number of segments, at least 3.

@@ -1,33 +1,22 @@
 """A peristalsis network whose rhythm goes on whatever the sensors say: the paper's neurons, joined differently.
 
-Each segment keeps the half-centre of the paper, contraction against expansion neuron, its hold and its relay. In the
-paper's network the stretch sensors keep segments expanded, so that a sensor that is always on, or off too early, decides
-the order; with all of them on nothing contracts again. The changes:
+Each segment has the half-centre of the paper, a hold and a relay. In the paper's network stretch sensors keep segments
+expanded, so that a sensor that is always on, or off too early, decides the order. Here, by our own design:
 
 1. *Others suppress, not the sensor.* The hold of a segment is excited by the contraction neurons of all other segments,
    with synapses onto the half-centre that saturate, so that suppression is the same for any number of segments.
-2. *A tonic neuron* excites the contraction neuron of segment 1, so silence is unstable. With a tonic drive to all
-   segments they could contract and suppress each other in unison.
-3. *The half-centre is bistable* (delta < 0): it remembers whose turn it is. With the paper's delta > 0 the turn ends by
-   the escape of the expansion neuron, after a time that depends on how long the segment had rested.
+2. *A tonic neuron* excites the contraction neuron of segment 1 alone, so silence is unstable.
+3. *The half-centre is bistable* (delta < 0): it remembers whose turn it is, however long the segment had rested.
 4. *The relay counts the turn.* Its own segment's contraction neuron charges it slowly. At half of its range it ends the
    hold of the next segment and excites its contraction neuron; that contraction suppresses the present segment, and
    discharges the relay through a shunt, so that every turn begins alike.
 5. *The sensor entrains.* A stretch neuron and its slow copy, the habit, push the relay with opposite sign through
    saturating synapses: a segment that is longer than it is used to hands over earlier, a shorter one later.
 
-**The turn.** A charging relay follows ``U(t) = R (1 - exp(-t / tau))``, ``tau = C / (Gm + g)`` with the conductance g of
-its charge. The hold yields at the relay's potential U* (`yield_mV`), so ``tau = turn / ln(R / (R - U*))``. What the
-half-centre takes to flip comes on top, up to 2 % of the paper's 875 ms.
-
-**The bounds.** With entrainment e the relay's drive stays within ``(1 +- e) R`` and so does where it starts, within
-``+- e R``; since U* is about R / 2, a turn changes by at most about ``2 e / ln 2`` of itself: 6 % with e = 0.02.
-
-**The drive** (`driven_robust_network`). A descending neuron with activity a excites all relays with a conductance
-``a g_d``, which lifts a resting one to ``a g_d E_ex / (Gm + a g_d)``. With drive 1 that is the share ``lift`` of R, below
-the half at which relays act: the drive alone never makes a segment contract, but charged relays count their turns
-faster. In every segment a pressure neuron, which low-passes the pressure on the back, excites the descending neuron:
-pressure on belly and back at once there is only in a pipe as narrow as the worm. All of this is our own design.
+A charging relay follows ``U(t) = R (1 - exp(-t / tau))``, ``tau = C / (Gm + g)`` with the conductance g of its charge.
+The hold yields at the relay's potential U* (`yield_mV`), so ``tau = turn / ln(R / (R - U*))``; what the half-centre
+takes to flip comes on top, up to 2 % of the paper's 875 ms. Entrainment e keeps the relay's drive within
+``(1 +- e) R``, and so a turn within about ``2 e / ln 2`` of itself: 6 % with e = 0.02.
 """
 
 from __future__ import annotations
@@ -46,20 +35,15 @@ from annelid.nervous.synapses import Synapse
 ROLES = ("contraction", "expansion", "hold", "relay", "stretch", "habit")
 """The six neurons of a segment, in order."""
 TONIC_NEURON = "tonic"
-"""The neuron that excites the first contraction neuron."""
-MOTOR = "motor"
-"""What the names of the motor neurons begin with."""
-
+# The relay ends the next segment's hold between this share of R and one window above.
 THRESHOLD = 0.5
-"""The relay begins to end the next segment's hold at this share of R."""
 _WINDOW = 0.05
-"""It ends it altogether this share of R above."""
+# The next contraction multiplies the relay's conductance by one more than this.
 DISCHARGE = 4.0
-"""The next contraction multiplies the relay's conductance by one more than this."""
+# Conductance that charges a motor neuron, over its leak: it rises ten times as fast as it falls, and rests at this share
+# of R while its segment's contraction neuron is at R or above.
 _MOTOR_CHARGE = 9.0
-"""Conductance that charges a motor neuron, over its leak: it rises ten times as fast as it falls."""
 MOTOR_SHARE = _MOTOR_CHARGE / (1.0 + _MOTOR_CHARGE)
-"""Share of R at which a motor neuron rests while its segment's contraction neuron is at R or above."""
 
 
 @dataclass(frozen=True)
@@ -142,15 +126,9 @@ def yield_mV(p: RobustParameters) -> float:
 def robust_network(n_segments: int, parameters: RobustParameters | None = None) -> Network:
     """Builds the robust peristalsis network in its initial state: segment 1 contracted, all others expanded.
 
-    Inputs are ``stretch_1`` .. ``stretch_N``, currents into the stretch neurons and their habits; ``Gm R`` nA drives
-    them to R. Outputs are ``contraction_s`` and ``expansion_s`` of every segment.
-
-    Args:
-        n_segments: Number of segments, at least 3.
-        parameters: What to design it from; default: the paper's half-centres and interval.
-
-    Returns:
-        A network of ``6 n_segments + 1`` neurons: those of every segment by `ROLES`, then the tonic neuron.
+    Its neurons are those of every segment by `ROLES`, then the tonic neuron. Inputs are ``stretch_1`` .. ``stretch_N``,
+    currents into the stretch neurons and their habits; ``Gm R`` nA drives them to R. Outputs are ``contraction_s`` and
+    ``expansion_s`` of every segment.
 
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
@@ -212,6 +190,14 @@ def driven_robust_network(
 ) -> Network:
     """Builds the robust network with a descending neuron and a pressure neuron in every segment.
 
+    With activity a, the drive, the descending neuron excites all relays with a conductance ``a g_d``, which lifts a
+    resting one to ``a g_d E_ex / (Gm + a g_d)``, below the half of R at which relays act: the drive alone never makes a
+    segment contract, but charged relays count their turns faster. Pressure neurons, which low-pass the pressure on the
+    backs, excite the descending one: belly and back are pressed at once only in a pipe as narrow as the worm.
+
+    The neurons ``descending``, ``pressure_1`` .. ``pressure_N`` and the inputs ``drive``, ``pressure_1`` ..
+    ``pressure_N`` come behind those of `robust_network`. ``Gm R`` nA keeps such a neuron at R.
+
     Args:
         n_segments: Number of segments, at least 3.
         parameters: Of the network.
@@ -219,10 +205,6 @@ def driven_robust_network(
         per_segment: Drive that one segment gives whose pressure neuron is at R.
         drive_ms: Time constant of the descending neuron, ms.
         pressure_ms: Time constant of the pressure neurons, ms.
-
-    Returns:
-        `robust_network` with the neurons ``descending``, ``pressure_1`` .. ``pressure_N`` and the inputs ``drive``,
-        ``pressure_1`` .. ``pressure_N`` behind its own. ``Gm R`` nA keeps such a neuron at R.
 
     Raises:
         ConfigError: As `robust_network`, or a lift outside 0 .. 1/2.
@@ -251,5 +233,5 @@ def add_motor_neurons(network: Network, n_segments: int, p: RobustParameters, le
     leak = p.leak_conductance_uS
     charge = Synapse(_MOTOR_CHARGE * leak, p.range_mV, 0.0, p.range_mV)
     for segment in range(1, n_segments + 1):
-        network.add_neuron(f"{MOTOR}_{segment}", Neuron(let_go_ms * leak, leak))
-        network.add_synapse(f"contraction_{segment}", f"{MOTOR}_{segment}", charge)
+        network.add_neuron(f"motor_{segment}", Neuron(let_go_ms * leak, leak))
+        network.add_synapse(f"contraction_{segment}", f"motor_{segment}", charge)

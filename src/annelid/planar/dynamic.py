@@ -45,7 +45,12 @@ class DynamicPlanarPlant(SavedAndRecorded):
     description: ClassVar[str]
     linkage: ClassVar[Callable[[Any], Linkage]]
     recorded = (
-        ("contact_force", ("segment", "axis"), "N", "force of the walls along x on a segment, and of the lower wall along z"),
+        (
+            "contact_force",
+            ("segment", "axis"),
+            "N",
+            "force of the walls along x on a segment, and of the lower wall along z",
+        ),
         ("slip_loss", ("segment",), "J", "work of a segment lost to friction so far"),
         ("stretch_length", ("segment", "sensor"), "m", "length of a segment"),
         ("ring_length", ("muscle",), "m", "height of a rhombus"),

@@ -18,11 +18,9 @@ from annelid.config import load_config
 from annelid.draw.figures import network_diagram
 from annelid.errors import ConfigError
 from annelid.nervous import Network
-from annelid.nervous.drawing import effect_of
-from annelid.nervous.layout import lay_out
-from annelid.nervous.neurons import Neuron, persistent_sodium
+from annelid.nervous.drawing import effect_of, lay_out
+from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
-from annelid.nervous.synapses import GapJunction, ModulatorySynapse, Synapse
 from annelid_studies.riddle2023.figures import muscle_surface, planar_models, robot_lengths
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from annelid.nervous.layout import by_segment, role_of
+from annelid.nervous.drawing import by_segment, role_of
 
 MOST_SEGMENTS = 4
 """With more than these the expansion neurons are left out of the first plot."""

@@ -22,7 +22,18 @@ from annelid.nervous.half_centre import (
     oscillation_periods,
 )
 from annelid.nervous.network import Connection, Network
-from annelid.nervous.neurons import Channel, Firing, Gate, Neuron, persistent_sodium
+from annelid.nervous.neurons import (
+    Channel,
+    ConnectionKind,
+    Firing,
+    GapJunction,
+    Gate,
+    ModulatorySynapse,
+    Neuron,
+    SpikingSynapse,
+    Synapse,
+    persistent_sodium,
+)
 from annelid.nervous.peristalsis import (
     Conductances,
     PeristalsisParameters,
@@ -49,7 +60,6 @@ from annelid.nervous.shc import (
     noise_dwell_s,
 )
 from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
-from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.nervous.toolbox import export_network, import_network
 
 __all__ = [

@@ -17,8 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.errors import ConfigError
-from annelid.nervous.neurons import Array, Channel, Gate
-from annelid.nervous.synapses import GapJunction, Modulated, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous.neurons import (
+    Array,
+    Channel,
+    GapJunction,
+    Gate,
+    Modulated,
+    ModulatorySynapse,
+    SpikingSynapse,
+    Synapse,
+)
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from annelid.errors import ConfigError
 from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
-from annelid.nervous.synapses import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous.neurons import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.text import printable
 
 if TYPE_CHECKING:

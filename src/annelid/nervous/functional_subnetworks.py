@@ -22,8 +22,7 @@ from dataclasses import dataclass
 
 from annelid.errors import ConfigError, require_negative, require_positive
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Neuron
-from annelid.nervous.synapses import Synapse
+from annelid.nervous.neurons import Neuron, Synapse
 
 Link = tuple[str, str, Synapse]
 

@@ -24,8 +24,7 @@ import numpy as np
 from annelid.errors import ConfigError, require_negative, require_positive, suggest
 from annelid.nervous.functional_subnetworks import Signals
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Array, Channel, Neuron, persistent_sodium
-from annelid.nervous.synapses import Synapse
+from annelid.nervous.neurons import Array, Channel, Neuron, Synapse, persistent_sodium
 
 _TIMESTEP_MS = 1.0
 _CANDIDATES = 9

@@ -10,9 +10,8 @@ import numpy as np
 from annelid.errors import ConfigError, require_finite, shown, suggest
 from annelid.nervous.arrays import NetworkArrays, build_arrays
 from annelid.nervous.diagram import Diagram, draw_diagram, markdown_tables
-from annelid.nervous.neurons import Neuron
+from annelid.nervous.neurons import ConnectionKind, GapJunction, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.stepper import Scheme, Stepper
-from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.nervous.toml import read_network, write_network
 
 

@@ -28,9 +28,8 @@ from annelid.errors import ConfigError, require_at_least, require_negative, requ
 from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Neuron
+from annelid.nervous.neurons import Neuron, Synapse
 from annelid.nervous.peristalsis import DRIVE_NEURON, add_drive
-from annelid.nervous.synapses import Synapse
 
 ROLES = ("contraction", "expansion", "hold", "relay", "stretch", "habit")
 """The six neurons of a segment, in order."""

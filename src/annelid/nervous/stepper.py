@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 from annelid.nervous.arrays import NetworkArrays
-from annelid.nervous.neurons import Array
-from annelid.nervous.synapses import Modulated
+from annelid.nervous.neurons import Array, Modulated
 
 Scheme = Literal["euler", "toolbox", "heun"]
 GateStart = Literal["steady", "toolbox"]

@@ -12,8 +12,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import ConfigError, require_finite, shown, suggest
-from annelid.nervous.neurons import Channel, Firing, Gate, Neuron
-from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous.neurons import (
+    Channel,
+    ConnectionKind,
+    Firing,
+    GapJunction,
+    Gate,
+    ModulatorySynapse,
+    Neuron,
+    SpikingSynapse,
+    Synapse,
+)
 from annelid.textfiles import parse_toml, toml_text
 
 if TYPE_CHECKING:

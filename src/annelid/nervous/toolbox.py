@@ -18,8 +18,7 @@ import numpy as np
 
 from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Channel, Gate, Neuron
-from annelid.nervous.synapses import GapJunction, Synapse
+from annelid.nervous.neurons import Channel, GapJunction, Gate, Neuron, Synapse
 
 if TYPE_CHECKING:
     from types import ModuleType

@@ -22,8 +22,8 @@ from annelid.nervous.drawing import (
     frame_of,
     network_shapes,
     neuron_shapes,
+    role_of,
 )
-from annelid.nervous.layout import role_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

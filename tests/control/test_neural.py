@@ -11,7 +11,7 @@ import pytest
 from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import AdaptiveController, SnsController
 from annelid.control.adaptive import AdaptiveSns
-from annelid.control.neural import design_of
+from annelid.control.base import design_of
 from annelid.control.robust import RobustController, RobustSns
 from annelid.control.sns import Sns
 from annelid.nervous import PeristalsisParameters

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from annelid.analysis.paper import published
 from annelid.config import RunConfig, load_config, parse_assignments
 from annelid.control import ProgramController
-from annelid.control.program import Contraction, Program
+from annelid.control.open_loop import Contraction, Program
 from annelid.control.sns import Sns
 from annelid.draw.table import field_lines
 from annelid.errors import ConfigError
@@ -44,7 +44,9 @@ def test_is_a_controller_that_records_and_restores() -> None:
 
 
 def test_without_a_ramp_activation_steps_at_start_and_stop() -> None:
-    activation = ProgramController(program((2, 0.3, 0.6, 0.8)), 3, 3).activation([0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0])
+    activation = ProgramController(program((2, 0.3, 0.6, 0.8)), 3, 3).activation(
+        [0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0]
+    )
     np.testing.assert_array_equal(activation[:, 1], [0, 0, 0.8, 0.8, 0.8, 0, 0])
     assert not activation[:, [0, 2]].any()
 

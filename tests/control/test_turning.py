@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from annelid.config import check_config, load_config
 from annelid.config.sensor import StretchSensor as SensorSection
 from annelid.control import SnsController, TimedController
+from annelid.control.open_loop import TimedWave
 from annelid.control.sns import Sns
 from annelid.control.turning import (
     ConstantTurning,
@@ -25,7 +26,6 @@ from annelid.control.turning import (
     heading_angle,
     wrapped,
 )
-from annelid.control.waves import TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched
 

@@ -62,7 +62,7 @@ _MODULE = {name: f"annelid.config.{module}" for module, names in _HOME.items() f
 _MODULE["toml_value"] = "annelid.textfiles"
 
 _MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
-    "Contraction": "annelid.control.program",
+    "Contraction": "annelid.control.open_loop",
     "DescendingDrive": "annelid.control.robust",
 }
 """Sections that are no kinds, which the first edition had here."""

@@ -23,7 +23,7 @@ from annelid.registry import Registry
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
-    from annelid.control.program import Contraction
+    from annelid.control.open_loop import Contraction
     from annelid.control.turning import Steering
     from annelid.protocols import Controller, Plant
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import Field
 
 from annelid.config.kinds import ControllerKind, Knob
-from annelid.control.neural import require_step_within
+from annelid.control.base import require_step_within
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network, adaptive_peristalsis_network, drive_conductance_uS

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from annelid.config.kinds import ControllerKind
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.neural import require_step_within
+from annelid.control.base import require_step_within
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network

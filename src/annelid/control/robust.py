@@ -10,7 +10,7 @@ from pydantic import Field
 from annelid.config.kinds import Knob
 from annelid.config.sections import Positive, Section
 from annelid.control.adaptive import DRIVE_HINT
-from annelid.control.neural import HalfCentreKind, NeuralController, design_of
+from annelid.control.base import HalfCentreKind, NeuralController, design_of
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import robust

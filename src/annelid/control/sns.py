@@ -16,7 +16,7 @@ from pydantic import Field
 from annelid.config.kinds import ControllerKind
 from annelid.config.sections import NonNegative, Positive
 from annelid.config.sensor import StretchSensor
-from annelid.control.neural import HalfCentreKind, NeuralController, design_of
+from annelid.control.base import HalfCentreKind, NeuralController, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
 from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis_network
 from annelid.nervous.peristalsis import ROLES
@@ -203,7 +203,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
 class SnsController(PeristalsisController[Sns]):
     """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023, as `PeristalsisController` does.
 
-    A segment's activation is that of `annelid.control.neural.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023,
+    A segment's activation is that of `annelid.control.base.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023,
     ``"linear"`` as in Riddle et al. 2022. Many copies of it can be advanced at once.
 
     Raises:

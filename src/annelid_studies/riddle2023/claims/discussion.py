@@ -11,7 +11,7 @@ from annelid.analysis.detector import detect, score
 from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
 from annelid.analysis.travel import way_ahead
-from annelid.control.program import Program
+from annelid.control.open_loop import Program
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     LABELS,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import Field
 
 from annelid.config.kinds import ControllerKind, Knob
-from annelid.control.base import require_step_within
+from annelid.control.base import Share, Slope, TimeConstant, require_step_within
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network, adaptive_peristalsis_network, drive_conductance_uS
@@ -38,16 +38,12 @@ class AdaptiveSns(ControllerKind):
     )
     kind: Literal["adaptive"] = "adaptive"
     network: Sns = Sns()
-    drive: float = Field(
-        default=0.0, ge=0, le=1, description="0: the half-centres' own slow rhythm; 1: about three times as fast"
-    )
-    drive_slope_per_s: float = Field(default=0.0, ge=-100, le=100, description="change of the manual drive")
+    drive: Share = Field(default=0.0, description="0: the half-centres' slow rhythm; 1: about three times as fast")
+    drive_slope_per_s: Slope = Field(default=0.0, description="change of the manual drive")
     stretch_gain_per_m: float = Field(
         default=0.0, ge=-1000, le=1000, description="drive per mean lengthening of the segments"
     )
-    drive_time_constant_s: float = Field(
-        default=0.05, ge=1e-3, le=1e4, description="time constant of the descending neuron"
-    )
+    drive_time_constant_s: TimeConstant = Field(default=0.05, description="of the descending neuron")
 
     def build(self, config: RunConfig, plant: Plant) -> AdaptiveController:
         """Builds the controller, as `ControllerKind.build`."""

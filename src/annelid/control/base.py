@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import ClassVar, Generic, TypeVar
+from typing import Annotated, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from annelid.nervous import Network, NetworkState, Scheme
 from annelid.nervous.half_centre import HalfCentre
 from annelid.protocols import Array, Recordable, SavedAndRecorded, Sensation, Values
 
+Share = Annotated[float, Field(ge=0, le=1)]
+Level = Annotated[float, Field(gt=0, le=1)]
+Slope = Annotated[float, Field(ge=-100, le=100)]
+TimeConstant = Annotated[float, Field(ge=1e-3, le=1e4)]
 Pattern = TypeVar("Pattern", bound=Section)
 Design = TypeVar("Design", bound=HalfCentre)
 

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from annelid.clock import SLACK_S
 from annelid.config.kinds import ControllerKind
 from annelid.config.sections import NonNegative, Positive, Section
-from annelid.control.base import OpenLoopController
+from annelid.control.base import Level, OpenLoopController, Slope
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Plant
 
@@ -31,10 +31,8 @@ class SineWave(ControllerKind):
     )
     kind: Literal["sine"] = "sine"
     period_s: Positive = Field(default=2.625, description="time of one cycle; the paper's three segments take 2.625")
-    waves: float = Field(
-        default=1.0, ge=-100, le=100, description="waves on the body at once; negative ones run forwards, 0 is no wave"
-    )
-    level: float = Field(default=1.0, gt=0, le=1, description="largest activation")
+    waves: Slope = Field(default=1.0, description="waves on the body at once; negative ones run forwards, 0 is no wave")
+    level: Level = Field(default=1.0, description="largest activation")
 
     def build(self, config: RunConfig, plant: Plant) -> SineController:
         """Builds the controller, as `ControllerKind.build`."""
@@ -89,7 +87,7 @@ class TimedWave(ControllerKind):
     waves: int = Field(
         default=1, ge=1, le=100, description="waves on the body at once; the cycle is n_segments interval_s over this"
     )
-    level: float = Field(default=1.0, gt=0, le=1, description="activation while contracted")
+    level: Level = Field(default=1.0, description="activation while contracted")
 
     @model_validator(mode="after")
     def _it_contracts(self) -> Self:
@@ -155,7 +153,7 @@ class Contraction(Section):
     segment: int = Field(ge=1, le=200, description="counted from 1 at the front")
     start_s: NonNegative = Field(description="when the activation begins to rise")
     stop_s: Positive = Field(description="when it begins to fall")
-    activation: float = Field(default=1.0, gt=0, le=1, description="level that it rises to")
+    activation: Level = Field(default=1.0, description="level that it rises to")
 
     @model_validator(mode="after")
     def _starts_before_it_stops(self) -> Self:

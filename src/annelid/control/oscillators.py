@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -10,27 +10,23 @@ from pydantic import Field, model_validator
 from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.sections import NonNegative, Positive
 from annelid.control.adaptive import DRIVE_HINT
-from annelid.control.base import SegmentController
+from annelid.control.base import SegmentController, Share, Slope
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous import (
-    HeteroclinicRing,
-    HeteroclinicStepper,
-    PhaseState,
-    PhaseStepper,
-    handover_input,
-    largest_gain_per_s,
-    phase_chain,
-)
-from annelid.nervous.phase_chain import BODY
+from annelid.nervous import HeteroclinicRing, HeteroclinicStepper, PhaseState, PhaseStepper
+from annelid.nervous.phase_chain import BODY, phase_chain
+from annelid.nervous.shc import handover_input, largest_gain_per_s
 from annelid.protocols import Array, Plant, Sensation, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 
+Gain = Annotated[float, Field(ge=0, le=100)]
+
+
 class HeteroclinicChannel(ControllerKind):
-    """A stable heteroclinic channel (Horchler 2015, Daltorio 2013): one saddle a segment, visited in order.
+    """A stable heteroclinic channel (Horchler 2015, Daltorio 2013): one saddle per segment, visited in order.
 
     A segment's activation is its node's activity. Alone it dwells at a node for about ``ln(1 / noise)`` or
     ``ln(1 / bias)`` over the leaving rate ``growth_rate_per_s / saddle_value``; feedback from the body ends the dwell.
@@ -51,32 +47,21 @@ class HeteroclinicChannel(ControllerKind):
     )
     kind: Literal["shc"] = "shc"
     growth_rate_per_s: float = Field(
-        default=20.0,
-        gt=0,
-        le=500,
-        description="rate at which activities settle and decay; at most 0.5 over the control timestep",
+        default=20.0, gt=0, le=500, description="rate at which activities settle and decay"
     )
-    saddle_value: float = Field(
-        default=2.0, gt=1, le=100, description="that rate over the rate at which a node is left"
-    )
-    noise: float = Field(
-        default=1e-6, ge=0, le=1, description="standard deviation of the noise, per square root of a second"
-    )
-    bias_per_s: float = Field(
-        default=5e-4, ge=0, le=100, description="constant input to every node; a larger one shortens the dwell"
-    )
+    saddle_value: float = Field(default=2.0, gt=1, le=100, description="that over the rate at which a node is left")
+    noise: Share = Field(default=1e-6, description="standard deviation of the noise, per square root of a second")
+    bias_per_s: Gain = Field(default=5e-4, description="constant input to every node; a larger one shortens the dwell")
     feedback: Literal["none", "stretch", "contact"] = Field(
         default="stretch",
         description="what excites a node's successor: nothing, the present segment having lengthened by "
         "stretch_cue_m, or the segment before it bearing contact_cue_N",
     )
-    feedback_gain_per_s: float = Field(
-        default=0.1, ge=0, le=100, description="input to the successor of an active node whose cue is on"
+    feedback_gain_per_s: Gain = Field(
+        default=0.1, description="input to the successor of an active node with its cue on"
     )
     stretch_cue_m: NonNegative = Field(default=0.02, description="lengthening at which a segment has its shape")
-    contact_cue_N: NonNegative = Field(
-        default=0.2, description="size of the force of the ground on an anchored segment"
-    )
+    contact_cue_N: NonNegative = Field(default=0.2, description="size of the force of the ground on an anchor")
 
     @model_validator(mode="after")
     def _it_leaves_its_first_node(self) -> Self:
@@ -114,13 +99,11 @@ class PhaseChain(ControllerKind):
     )
     kind: Literal["phase-chain"] = "phase-chain"
     drive: float = Field(
-        default=4.0, ge=0, le=10, description="descending drive at the start: swims in 3 .. 5, silent outside 1 .. 5"
+        default=4.0, ge=0, le=10, description="descending drive; the body swims in 3 .. 5, rests beyond 1 .. 5"
     )
-    drive_slope_per_s: float = Field(default=0.0, ge=-100, le=100, description="change of the drive, within 0 .. 10")
+    drive_slope_per_s: Slope = Field(default=0.0, description="change of the drive, within 0 .. 10")
     limbs: bool = Field(default=False, description="limb oscillators force a standing wave below drive 3 (walking)")
-    waves: float = Field(
-        default=1.0, ge=-100, le=100, description="waves on the body at once; the salamander's swimming has 1"
-    )
+    waves: Slope = Field(default=1.0, description="waves on the body at once; the salamander's swimming has 1")
     coupling_per_s: Positive = Field(default=10.0, description="coupling of neighbours")
     slowing: Positive = Field(default=1.0, description="times slower than the salamander, in all of its rates")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -20,11 +20,15 @@ if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 
+Strength = Annotated[float, Field(ge=0, le=5)]
+
+
 class PressureSns(ControllerKind):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
 
     A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
-    the contraction two segments before. Lengths and loads are those of the six-segment robot (0.16 m radius, 19 N).
+    the contraction two segments before; any of the four strengths may be 0. Lengths and loads are those of the
+    six-segment robot (0.16 m radius, 19 N).
     """
 
     sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
@@ -42,27 +46,12 @@ class PressureSns(ControllerKind):
     full_N: Positive = Field(default=9.0, description="load that drives it to R")
     extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
     extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
-    hold: float = Field(
-        default=1.0, ge=0, le=5, description="potential over R that full pressure gives its sensory neuron; 0 for none"
-    )
+    hold: Strength = Field(default=1.0, description="potential over R that full pressure gives its sensory neuron")
     release: float = Field(
-        default=1.8,
-        ge=0,
-        le=20,
-        description="stretch sensors' currents that a full extension neuron cancels; 0 for none",
+        default=1.8, ge=0, le=20, description="sensors' currents that a full extension neuron cancels"
     )
-    landing: float = Field(
-        default=0.1,
-        ge=0,
-        le=5,
-        description="potential over R that full pressure gives the sensory neuron before; 0 for none",
-    )
-    exchange: float = Field(
-        default=0.8,
-        ge=0,
-        le=5,
-        description="potential over R that a contraction gives the sensory neuron two before; 0 for none",
-    )
+    landing: Strength = Field(default=0.1, description="potential over R that it gives the sensory neuron before")
+    exchange: Strength = Field(default=0.8, description="potential over R that a contraction gives the one two before")
     pressure_time_constant_s: float = Field(
         default=0.03, ge=1e-3, le=10, description="time constant of the pressure neurons"
     )
@@ -108,26 +97,15 @@ class PressureController(PeristalsisController[PressureSns]):
     def _network(self, n_segments: int, control_timestep_s: float) -> Network:
         config = self._config
         require_step_within(control_timestep_s, pressure_time_constant_s=config.pressure_time_constant_s)
-        return pressure_network(
-            n_segments,
-            self._parameters,
-            hold=config.hold,
-            release=config.release,
-            landing=config.landing,
-            exchange=config.exchange,
-            pressure_ms=1e3 * config.pressure_time_constant_s,
-        )
+        strengths = config.model_dump(include={"hold", "release", "landing", "exchange"})
+        pressure_ms = 1e3 * config.pressure_time_constant_s
+        return pressure_network(n_segments, self._parameters, **strengths, pressure_ms=pressure_ms)
 
     def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
-        config = self._config
-        load_N = sensation.touch_N.sum(axis=1)
-        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
-        inputs_nA[::2] = self._full_nA * _rise(load_N, config.light_N, config.full_N)
-        inputs_nA[1::2] = self._full_nA * _rise(longer_m, config.extending_m, config.extended_m)
+        config, longer_m = self._config, lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        loads = (sensation.touch_N.sum(axis=1) - config.light_N) / (config.full_N - config.light_N)
+        extensions = (longer_m - config.extending_m) / (config.extended_m - config.extending_m)
+        inputs_nA[::2] = self._full_nA * np.clip(loads, 0.0, 1.0)
+        inputs_nA[1::2] = self._full_nA * np.clip(extensions, 0.0, 1.0)
         if self._sensor.held_at(time_s):
             inputs_nA[0] = 0.0
-
-
-def _rise(values: Array, low: float, high: float) -> Array:
-    """Values on a scale from ``low`` (0) to ``high`` (1), kept within."""
-    return np.clip((values - low) / (high - low), 0.0, 1.0)

@@ -17,7 +17,7 @@ from pydantic import Field
 from annelid.clock import SLACK_S
 from annelid.config.kinds import Goals, TurningKind
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.base import SegmentController
+from annelid.control.base import Level, SegmentController, TimeConstant
 from annelid.errors import ConfigError
 from annelid.protocols import (
     SIDES,
@@ -87,17 +87,14 @@ class Descending(SteeringKind):
 
     A modulation m in [-1, 1] scales a segment's left activation by ``1 - max(m, 0)`` and its right one by
     ``1 - max(-m, 0)``, so that it bends to the left where m is positive. Of two leaky neurons, one per side, the wanted
-    modulation drives one; m is their activity. A step is exact for a drive that is constant during it.
+    modulation drives one; m is their activity. A step is exact for a drive that is constant during it. A segment with a
+    negative share of m bends the other way.
     """
 
     shares: tuple[Modulation, ...] | None = Field(
-        default=None,
-        description="share of the modulation that each segment takes, front to rear; negative ones bend it the other "
-        "way; default 1 each",
+        default=None, description="of the modulation for each segment; default 1 each"
     )
-    descending_time_constant_s: float = Field(
-        default=0.2, ge=1e-3, le=1e4, description="time constant of the descending neurons behind the wanted modulation"
-    )
+    descending_time_constant_s: TimeConstant = Field(default=0.2, description="of the descending neurons")
 
     def check_with(self, config: RunConfig) -> None:
         """Checks that the body has two sides, and that each segment has its share."""
@@ -141,12 +138,8 @@ class Steered(Descending):
 
     gain_per_rad: NonNegative = Field(default=3.0, description="modulation per error of the heading")
     rate_gain_s: NonNegative = Field(default=1.0, description="modulation taken off per rate of the heading, s per rad")
-    rate_time_constant_s: Positive = Field(
-        default=2.0, description="time constant of the filter that gives the rate of the heading; about one cycle"
-    )
-    largest_modulation: float = Field(
-        default=0.9, gt=0, le=1, description="size of the modulation that is never exceeded"
-    )
+    rate_time_constant_s: Positive = Field(default=2.0, description="of the rate's filter; about one cycle")
+    largest_modulation: Level = Field(default=0.9, description="size of the modulation that is never exceeded")
 
     @abstractmethod
     def _target(self, now: Now, sensation: Sensation) -> float | None:

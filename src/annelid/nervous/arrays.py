@@ -1,16 +1,16 @@
 """The compiled form of a network: frozen arrays, such that one matrix product sums every current.
 
-The right-hand side of every neuron is ``C dU/dt = I - G U``, where both the total conductance ``G`` and the current ``I``
-at potential zero are linear in a *drive* vector: the open fractions of the presynaptic terminals, the releases of
-spiking synapses, the open fractions of the channels, the rectified differences and the plain potentials of gap
-junctions, the constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant matrix.
+The right-hand side of every neuron is ``C dU/dt = I - G U``, where both the total conductance G and the current I at
+potential zero are linear in a *drive* vector: the open fractions of the presynaptic terminals, the releases of spiking
+synapses, the open fractions of the channels, the rectified differences and the plain potentials of gap junctions, the
+constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant matrix.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, zip_longest
+from itertools import accumulate, pairwise, zip_longest
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -67,8 +67,7 @@ class NetworkArrays:
         log_modulation: Logarithm of each factor when a terminal is open, ``(n_terminals, n_modulated)``.
         rectified_source: Higher side of each rectified gap junction, ``(n_rectified,)``.
         rectified_target: Its other side, same shape.
-        drive: Where in the drive vector each kind of entry lies: ``"terminals"``, ``"releases"``, ``"channels"``,
-            ``"rectified"``, ``"potentials"`` (of all neurons if there are plain gap junctions), ``"one"``, ``"inputs"``.
+        drive: Where in the drive vector the entries of each kind lie.
         weights: Shape ``(n_drive, 2 n_neurons)``, conductances (uS) beside currents (nA).
     """
 
@@ -127,37 +126,25 @@ def build_arrays(network: Network) -> NetworkArrays:
     channels = [(i, channel) for i, neuron in enumerate(neurons) for channel in neuron.channels]
     gates, n_slow = _slots([channel for _, channel in channels])
 
-    lengths = {
-        "terminals": len(terminals),
-        "releases": len(releases),
-        "channels": len(channels),
-        "rectified": len(rectified),
-        "potentials": n if plain else 0,
-        "one": 1,
-        "inputs": len(network.inputs),
-    }
-    stops = list(accumulate(lengths.values()))
-    drive = {kind: slice(stop - lengths[kind], stop) for kind, stop in zip(lengths, stops, strict=True)}
-    weights = np.zeros((stops[-1], 2 * n))
+    kinds = ("terminals", "releases", "channels", "rectified", "potentials", "one", "inputs")
+    lengths = (len(terminals), len(releases), len(channels), len(rectified), n * bool(plain), 1, len(network.inputs))
+    ends = accumulate(lengths, initial=0)
+    drive = {kind: slice(start, end) for kind, (start, end) in zip(kinds, pairwise(ends), strict=True)}
+    weights = np.zeros((sum(lengths), 2 * n))
 
     def rows(kind: str) -> tuple[Array, Array]:
-        """Conductances and currents of one kind of entry, to write to."""
         return weights[drive[kind], :n], weights[drive[kind], n:]
 
-    conductance, current = rows("terminals")
-    for pre, post, s in synapses:
-        row = terminals[pre, s.threshold_mV, s.saturation_mV]
-        conductance[row, post] += s.conductance_uS
-        current[row, post] += s.conductance_uS * s.reversal_mV
-    conductance, current = rows("releases")
-    for pre, post, s in spiking:
-        row = releases[pre, s.time_constant_ms, s.increment]
-        conductance[row, post] += s.conductance_uS
-        current[row, post] += s.conductance_uS * s.reversal_mV
-    conductance, current = rows("channels")
-    for row, (neuron, channel) in enumerate(channels):
-        conductance[row, neuron] = channel.conductance_uS
-        current[row, neuron] = channel.conductance_uS * channel.reversal_mV
+    opened: dict[str, list[tuple[int, int, Synapse | SpikingSynapse | Channel]]] = {
+        "terminals": [(terminals[pre, s.threshold_mV, s.saturation_mV], post, s) for pre, post, s in synapses],
+        "releases": [(releases[pre, s.time_constant_ms, s.increment], post, s) for pre, post, s in spiking],
+        "channels": [(row, neuron, channel) for row, (neuron, channel) in enumerate(channels)],
+    }
+    for kind, parts in opened.items():
+        conductance, current = rows(kind)
+        for row, neuron, part in parts:
+            conductance[row, neuron] += part.conductance_uS
+            current[row, neuron] += part.conductance_uS * part.reversal_mV
     _, current = rows("rectified")
     for row, (source, target, junction) in enumerate(rectified):
         current[row, target] += junction.conductance_uS

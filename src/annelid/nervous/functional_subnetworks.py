@@ -7,12 +7,9 @@ control legged robot locomotion". A signal is a potential between 0 and R. An in
     U* = (sum_j g_j a_j E_j + I) / (Gm + sum_j g_j a_j),
 
 and each rule solves this for the conductances at one corner of the range, where the operation is then exact; its
-docstring gives U* everywhere else. In division and multiplication the shunts bear a factor ``1 + g_1 / Gm`` that is
-often left out (for example by the modulation synapse of SNS-Toolbox): it makes the corner exact. Shunts make membranes
-fast: ask `Network.stable_timestep_ms` before choosing a step (0.4 ms for the default product).
-
-Every function adds neurons to a given network, or makes one of its own, and returns it. Inputs and outputs have the
-names of the neurons that they belong to.
+docstring gives U* everywhere else. Shunts bear a factor ``1 + g_1 / Gm``, often left out, that makes the corner exact,
+and make membranes fast: `Network.stable_timestep_ms` is 0.4 ms for the default product. Every function adds neurons to
+a given network, or makes one of its own, and returns it. Inputs and outputs have the names of their neurons.
 """
 
 from __future__ import annotations
@@ -121,8 +118,7 @@ def subtraction(
 
     ``g_plus`` is a `transmission`; ``g_minus = -g_plus E_ex / E_inh`` makes equal signals cancel exactly.
     ``U* = g_plus E_ex (a_plus - a_minus) / (Gm + g_plus a_plus + g_minus a_minus)``: exact also at U_plus = R,
-    U_minus = 0, and else too small by up to the factor ``(1 + g_plus / Gm) / (1 + (g_plus + g_minus) / Gm)``, nearer to 1
-    the more negative E_inh. A negative difference hyperpolarises.
+    U_minus = 0, and else too small by up to the factor ``(1 + g_plus / Gm) / (1 + (g_plus + g_minus) / Gm)``.
 
     Args:
         gain: k.
@@ -143,11 +139,10 @@ def division(
 ) -> Network:
     """Builds ``U_quotient = U_dividend / (1 + (1 / c - 1) U_divisor / R)``: a divisor at R leaves the share c.
 
-    The dividend is transmitted with gain 1 (g_1). The divisor's synapse has its reversal potential at rest, so it
-    only adds conductance: ``g_2 = (1 / c - 1) (Gm + g_1)``, from ``U* = c R`` with both at R. Then
-    ``U* = U_dividend / ((1 + gamma a_1) / (1 + gamma) + (1 / c - 1) a_2)``, ``gamma = g_1 / Gm``: exact for a dividend
-    at R whatever the divisor, and too large by at most the share ``gamma`` for smaller ones. The neurons are
-    ``dividend``, ``divisor`` and ``quotient``.
+    The dividend is transmitted with gain 1 (g_1). The divisor's synapse reverses at rest, so it only adds conductance:
+    ``g_2 = (1 / c - 1) (Gm + g_1)``, from ``U* = c R`` with both at R. Then ``U* = U_dividend / ((1 + gamma a_1) /
+    (1 + gamma) + (1 / c - 1) a_2)``, ``gamma = g_1 / Gm``: exact for a dividend at R, and too large by at most the share
+    ``gamma`` for smaller ones. The neurons are ``dividend``, ``divisor`` and ``quotient``.
 
     Args:
         ratio: c, between 0 and 1.
@@ -174,10 +169,9 @@ def multiplication(
 
     An interneuron with a bias of ``Gm R`` shunts the product down to the residue r, where it would be 0; factor 2
     inhibits the interneuron. With ``gamma = R / r - 1`` the shunt is ``gamma (Gm + g_1)`` to rest, as in `division`,
-    and the inhibition ``gamma Gm`` to ``-R / gamma``. The interneuron rests at ``R (1 - a_2) / (1 + gamma a_2)``, which
-    makes the product linear in factor 2: ``U* = U_1 (1 + gamma a_2) / (1 + gamma)`` for factor 1 at R. Its error is
-    ``r a_1 (1 - a_2)``, beside that of the transmission of factor 1, at most the share ``g_1 / Gm``. The neurons are
-    ``factor_1``, ``factor_2``, ``product`` and ``interneuron``.
+    and the inhibition ``gamma Gm`` to ``-R / gamma``. The interneuron rests at ``R (1 - a_2) / (1 + gamma a_2)``, so
+    ``U* = U_1 (1 + gamma a_2) / (1 + gamma)`` for factor 1 at R, off by ``r a_1 (1 - a_2)`` beside the error of the
+    transmission of factor 1. The neurons are ``factor_1``, ``factor_2``, ``product`` and ``interneuron``.
 
     Args:
         residue_mV: r, what is left of R times 0.
@@ -215,10 +209,9 @@ def differentiation(
     """Builds ``U_rate = k_d dU/dt``: the difference of a fast and a slow copy of the signal.
 
     Both copies take the input current; their capacitances make them first-order lags of ``tau_fast`` and ``tau_slow =
-    tau_fast + k_d / k``. On a ramp they trail by their time constants, so ``U_fast - U_slow = (tau_slow - tau_fast)
-    dU/dt`` exactly; a `subtraction` of gain k follows, with its error. At the angular frequency w the difference is
-    ``w (tau_slow - tau_fast) / sqrt((1 + w^2 tau_fast^2) (1 + w^2 tau_slow^2))`` of the signal: a differentiator below
-    ``1 / tau_slow``, flat up to ``1 / tau_fast``. The input ``signal`` drives the neurons ``fast`` and ``slow``, the
+    tau_fast + k_d / k``. On a ramp ``U_fast - U_slow = (tau_slow - tau_fast) dU/dt`` exactly; a `subtraction` of gain k
+    follows, with its error. At the angular frequency w the difference is ``w (tau_slow - tau_fast) / sqrt((1 + w^2
+    tau_fast^2) (1 + w^2 tau_slow^2))`` of the signal. The input ``signal`` drives the neurons ``fast`` and ``slow``; the
     output is that of ``rate``.
 
     Args:
@@ -253,11 +246,10 @@ def integration(
         C dU_1/dt = Gm (R - U_1 - U_2) - g U_1 U_2 / R + I,  C dU_2/dt = Gm (R - U_1 - U_2) - g U_1 U_2 / R,
 
     so every point of the curve ``R - U_1 - U_2 = (g / Gm) U_1 U_2 / R`` is an equilibrium, and ``U_1 - U_2`` integrates
-    ``I / C`` without error or leak. As U_1 goes from 0 to R, the difference goes from -R to R: with ``C = 1 / (2 k_i)``
-    the rate of U_1 is k_i I on average over the range, and ``2 (1 + eta U_1 / R) / (2 + eta (U_1 + U_2) / R)`` of that
-    at a point, ``eta = g / Gm``. At the ends of the range the integral stays. A current shifts both potentials by up to
-    ``I / (2 Gm)`` from the curve, so it must be small beside ``Gm R``. The input ``signal`` (nA, of either sign) drives
-    the neuron ``integral``, which is 0 at first; the other one is ``opposite``.
+    ``I / C`` without error or leak, from -R to R. With ``C = 1 / (2 k_i)`` the rate of U_1 is k_i I on average, and
+    ``2 (1 + eta U_1 / R) / (2 + eta (U_1 + U_2) / R)`` of that at a point, ``eta = g / Gm``. A current shifts both
+    potentials by up to ``I / (2 Gm)``, so it must be small beside ``Gm R``. The input ``signal`` (nA, of either sign)
+    drives the neuron ``integral``, which is 0 at first; the other one is ``opposite``.
 
     Args:
         rate_mV_per_nA_ms: k_i.

@@ -1,11 +1,10 @@
 """Half-centres: two neurons that inhibit each other and take turns, designed for a wanted period.
 
 Each neuron bears a persistent sodium channel that keeps it at the operating range R once it is up, until the partner
-escapes from its inhibition. Whether it does is set by the bifurcation parameter delta (Szczecinski et al. 2017; Riddle
-et al. 2022), and how long it takes by the slow gate's time constant above all.
-
-Conductances follow from the design rules of functional subnetworks (Szczecinski, Hunt and Quinn 2017): choose where a
-neuron rests while its partners are in a given state, and solve the current balance there for the one unknown,
+escapes from its inhibition. Whether it does is set by the bifurcation parameter delta, and how long it takes by the slow
+gate's time constant above all (Szczecinski et al. 2017; Riddle et al. 2022). Conductances follow from the design rules
+of functional subnetworks (Szczecinski, Hunt and Quinn 2017): choose where a neuron rests while its partners are in a
+given state, and solve the current balance there for the one unknown,
 
     -Gm U + sum_j g_j a_j (E_j - U) + G_Na m(U) h(U) (E_Na - U) + I = 0.
 
@@ -113,10 +112,8 @@ class HalfCentre:
         """g31 with which another neuron at R inhibits a neuron as firmly as its partner at R + offset does.
 
         A neuron at -offset receives ``g_CPG (R + offset) / R (E_inh + offset) + Gm offset`` from it; g31 gives the same
-        current to one that has risen to +offset, ``g31 (E_inh - offset)``.
-
-        Riddle et al. 2022 applied this rule, read back from their number; the plain balance at -offset would ask for a
-        negative conductance, since there the partner alone already inhibits too much.
+        current to one that has risen to +offset, ``g31 (E_inh - offset)``. Riddle et al. 2022 applied this rule, read
+        back from their number; the plain balance at -offset would ask for a negative conductance.
         """
         reach, offset, inhibitory = self.range_mV, self.offset_mV, self.inhibitory_reversal_mV
         partner = self.inhibition_uS * (reach + offset) / reach * (inhibitory + offset)
@@ -128,22 +125,14 @@ class HalfCentre:
         Args:
             drive_uS: g_drive, the conductance that excites.
             driver_mV: Potential of the neuron that excites; its transmission ``a = U / R`` is not clipped.
-
-        Returns:
-            g, uS.
         """
         return -drive_uS * driver_mV / self.range_mV * self.excitatory_reversal_mV / self.inhibitory_reversal_mV
 
     @property
     def signals(self) -> Signals:
         """How neurons outside the half-centres carry signals."""
-        return Signals(
-            self.range_mV,
-            self.leak_conductance_uS,
-            self.capacitance_nF,
-            self.excitatory_reversal_mV,
-            self.inhibitory_reversal_mV,
-        )
+        membrane = self.range_mV, self.leak_conductance_uS, self.capacitance_nF
+        return Signals(*membrane, self.excitatory_reversal_mV, self.inhibitory_reversal_mV)
 
     @property
     def sodium_channel(self) -> Channel:
@@ -188,11 +177,10 @@ def add_half_centre(
         ConfigError: A name is taken, or the design gives a negative conductance.
     """
     p = half_centre or HalfCentre()
-    up, down = (p.range_mV, 0.0) if initial_mV is None else initial_mV
-    network.add_neuron(first, p.neuron, up)
-    network.add_neuron(second, p.neuron, down)
-    network.add_synapse(first, second, p.inhibitory(p.inhibition_uS))
-    network.add_synapse(second, first, p.inhibitory(p.inhibition_uS))
+    for name, potential_mV in zip((first, second), initial_mV or (p.range_mV, 0.0), strict=True):
+        network.add_neuron(name, p.neuron, potential_mV)
+    for source, target in ((first, second), (second, first)):
+        network.add_synapse(source, target, p.inhibitory(p.inhibition_uS))
 
 
 def add_hold(network: Network, holder: str, down: str, up: str, half_centre: HalfCentre | None = None) -> None:
@@ -258,12 +246,10 @@ def oscillation_periods(half_centres: Sequence[HalfCentre], duration_ms: float |
     for step in range(int(duration_ms / _TIMESTEP_MS)):
         stepper.advance(state)
         before, lead = lead, first - second
-        overtaken = (before < 0.0) & (lead >= 0.0)
-        if not overtaken.any():
-            continue
-        for i in np.flatnonzero(overtaken):
+        overtaken = np.flatnonzero((before < 0.0) & (lead >= 0.0))
+        for i in overtaken:
             instants[i].append(_TIMESTEP_MS * (step + before[i] / (before[i] - lead[i])))
-        if all(len(times) >= 3 for times in instants):
+        if overtaken.size and all(len(times) >= 3 for times in instants):
             break
     return np.array([times[-1] - times[-2] if len(times) >= 3 else np.inf for times in instants])
 
@@ -283,9 +269,6 @@ def half_centre_of_period(
         parameter: Which field of `HalfCentre` to vary.
         bounds: Least and greatest value to try; default: a tenth and ten times the present one.
         tolerance: Relative error of the period at which to stop.
-
-    Returns:
-        The design with that parameter.
 
     Raises:
         ConfigError: An unknown parameter, bounds that are not in order or of one sign, or a period that cannot be had
@@ -330,9 +313,6 @@ def find_period(
         bounds: Least and greatest value, both positive or both negative.
         tolerance: Relative error of the period at which to stop.
         parameter: What to call the parameter in an error.
-
-    Returns:
-        The value.
 
     Raises:
         ConfigError: Bounds that are not in order or of one sign, a period or tolerance that is not positive, or a

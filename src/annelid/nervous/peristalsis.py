@@ -236,28 +236,23 @@ def pressure_network(
     early: several segments contract at once, and the front drags along the ground. Four kinds of synapse onto sensory
     neurons, which keep a segment expanded and end its contraction, even the wave out, so that no segment leaves the
     ground before the one ahead has its length (the aim of Daltorio et al. 2013). Before the first segment comes the
-    last.
+    last. Neurons ``pressure_s`` and ``extension_s`` of every segment come behind those of `peristalsis_network`, with
+    inputs ``load_s`` and ``length_s`` of which ``Gm R`` nA is the full scale.
 
     Args:
         n_segments: Number of segments, at least 3.
-        parameters: Of the paper's network; default: those of the papers.
-        hold: Potential, over R, that a full pressure neuron alone gives its own segment's sensory neuron: a segment on
-            the ground stays expanded, stretched or not, and one that lands becomes an anchor.
-        release: How many times the current of a stretch sensor a full extension neuron, driven by the segment's length,
-            takes from the sensory neuron of the next segment, which leaves the ground once this one is extended.
+        parameters: Of the paper's network.
+        hold: Potential, over R, that full pressure gives its own segment's sensory neuron: one on the ground stays
+            expanded, stretched or not, and one that lands becomes an anchor.
+        release: Currents of a stretch sensor that a full extension neuron takes from the sensory neuron of the next
+            segment, which leaves the ground once this one is extended.
         landing: As ``hold``, for the segment before: it stays expanded while its follower stands on the ground.
-        exchange: Potential, over R, that a full contraction neuron alone gives the sensory neuron two segments before:
-            one segment shortens while another one lengthens, so neither anchor is pushed along. Three segments have
-            none: there the segment two before is the next one.
+        exchange: Potential, over R, that a contraction gives the sensory neuron two segments before, so that one
+            segment shortens while another one lengthens. Three segments have none: there it would be the next one.
         pressure_ms: Time constant of the pressure neurons, ms.
 
-    Returns:
-        `peristalsis_network` with the neurons ``pressure_s`` and ``extension_s`` of every segment and their inputs
-        ``load_s`` and ``length_s``, all behind its own. ``Gm R`` nA is the full scale of these inputs.
-
     Raises:
-        ConfigError: As `peristalsis_network`; a strength that is negative, or beyond what the excitatory reversal
-            potential can give.
+        ConfigError: As `peristalsis_network`; a strength below 0, or beyond what the excitatory reversal can give.
     """
     require_at_least(0, hold=hold, release=release, landing=landing, exchange=exchange)
     p = parameters or PeristalsisParameters()

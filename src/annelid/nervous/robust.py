@@ -39,8 +39,8 @@ THRESHOLD = 0.5
 _WINDOW = 0.05
 # The next contraction multiplies the relay's conductance by one more than this.
 DISCHARGE = 4.0
-# Conductance that charges a motor neuron, over its leak: it rises ten times as fast as it falls, and rests at this share
-# of R while its segment's contraction neuron is at R or above.
+# Conductance that charges a motor neuron, over its leak: it rises ten times as fast as it falls, and rests at this
+# share of R while its segment's contraction neuron is at R or above.
 _MOTOR_CHARGE = 9.0
 MOTOR_SHARE = _MOTOR_CHARGE / (1.0 + _MOTOR_CHARGE)
 

@@ -9,16 +9,10 @@ With rho_ii = alpha every x = e_i is a saddle, near which x_j grows at the rate 
 successor of i (its only unstable direction, lambda_u) and -alpha for all others (so lambda_s = alpha). The ring of
 saddles attracts for a saddle value nu = lambda_s / lambda_u above 1.
 
-Dwell time. Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0, starting from its value
-while it decayed at the rate lambda_s. Its exponentially growing part has, without noise, the amplitude
+Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0, starting from its value while it
+decayed at the rate lambda_s. Its exponentially growing part has, without noise, the amplitude
 mu (1/lambda_u + 1/lambda_s); without mu, it is the modulus of a Gaussian of variance
-epsilon^2 (1/lambda_u + 1/lambda_s) / 2. The time to reach a distance delta is then, for mu or epsilon small,
-
-    T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u
-    <T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u
-
-with Euler's gamma, as <ln|Z|> = -(gamma + ln 2) / 2 for a standard normal Z (Stone and Holmes 1990, "Random
-perturbations of heteroclinic attractors", eq. 2.28). Its standard deviation is pi / (sqrt(8) lambda_u).
+epsilon^2 (1/lambda_u + 1/lambda_s) / 2. From this follow the dwell times below.
 """
 
 from __future__ import annotations
@@ -71,16 +65,16 @@ class HeteroclinicRing:
 
 
 def noise_dwell_s(ring: HeteroclinicRing, noise: ArrayLike, distance: ArrayLike = 0.5) -> Array:
-    """Mean time that noise alone takes to leave a node, in the limit of small noise.
+    """Returns the mean time, s, that noise alone takes to leave a node, in the limit of small noise.
+
+    ``<T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u`` with
+    Euler's gamma, as ``<ln|Z|> = -(gamma + ln 2) / 2`` for a standard normal Z (Stone and Holmes 1990, "Random
+    perturbations of heteroclinic attractors", eq. 2.28). Its standard deviation is ``pi / (sqrt(8) lambda_u)``.
 
     Args:
         ring: The ring.
         noise: epsilon, 1/sqrt(s), any shape.
-        distance: delta, the successor's activity that counts as having left; small beside 1 for a good estimate,
-            as what the linear saddle leaves out is a constant time.
-
-    Returns:
-        Time, s, shape of the arguments. Stone and Holmes 1990, eq. 2.28.
+        distance: delta, the successor's activity that counts as having left, small beside 1.
     """
     leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
     constant = 0.5 * (np.euler_gamma + np.log(4.0 * leave * settle / (leave + settle)))
@@ -88,15 +82,14 @@ def noise_dwell_s(ring: HeteroclinicRing, noise: ArrayLike, distance: ArrayLike 
 
 
 def bias_dwell_s(ring: HeteroclinicRing, bias_per_s: ArrayLike, distance: ArrayLike = 0.5) -> Array:
-    """Time that a constant input alone takes to leave a node, in the limit of a small one.
+    """Returns the time, s, that a constant input alone takes to leave a node, in the limit of a small one.
+
+    ``T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u``.
 
     Args:
         ring: The ring.
         bias_per_s: mu, 1/s, any shape.
         distance: delta, as for `noise_dwell_s`.
-
-    Returns:
-        Time, s, shape of the arguments.
     """
     leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
     reach = np.asarray(distance) * leave * settle / (leave + settle)

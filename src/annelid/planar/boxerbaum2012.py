@@ -1,9 +1,9 @@
 """The planar worm of Boxerbaum et al. 2012: rhombi whose sides bend in their middle, touching no ground.
 
-Each side of a segment is two rigid halves of ``s / 2`` with a torsional spring between them, so the compliance lies
-within the segment. The sides of neighbouring segments are one strand that crosses the axis straight, as in a braided
-mesh: on hinges alone a side with no load between its ends would stay straight and its spring never act. Hence the
-inner halves on both sides of joint ``j`` have one slope, and with the joints' rises ``a_j`` as coordinates
+Each side of a segment is two rigid halves of ``s / 2`` with a torsional spring between them. The sides of neighbouring
+segments are one strand that crosses the axis straight, as in a braided mesh, since on hinges a side would stay straight
+and its spring never act. Hence the inner halves on both sides of joint ``j`` have one slope, and with the joints' rises
+``a_j`` as coordinates
 
     q = (x_0, h_1 .. h_N, a_0 .. a_N)
     r = (a_(i-1), h_i/2 - a_(i-1), h_i/2 - a_i, a_i)   of the four halves of segment i, front to rear
@@ -12,9 +12,8 @@ inner halves on both sides of joint ``j`` have one slope, and with the joints' r
     T = sum over joints m_j/2 (dX/dt)^2 + sum over vertices and middles of sides m/2 [(dX/dt)^2 + (dy/dt)^2]
     U = sum k_s/2 (l_i - l_0)^2 + sum over all sides k_t/2 (phi_outer - phi_inner)^2
 
-in m, kg, s, N, rad and J. Muscles pull the upper and the lower vertex of a segment together, return springs along
-the segments push them apart; there is neither gravity nor ground, so the centre of mass stays where it is.
-`annelid.planar.linkage` states forces and mass matrix in general, and `annelid.planar.midpoint` the stepper.
+Muscles pull the upper and the lower vertex of a segment together, return springs along the segments push them apart;
+there is neither gravity nor ground, so the centre of mass stays where it is.
 
 Source: Boxerbaum, Shaw, Chiel and Quinn 2012, Continuous wave peristaltic motion in a robot, Int. J. Robot. Res. 31,
 302-318, as described by Riddle et al. 2023, section 2.1. The constants are this package's own, as are the force-height

@@ -2,10 +2,9 @@
 
 Each segment is a rhombus of sides ``s``: with the height ``h`` its length is ``l = sqrt(4 s^2 - h^2)`` (the paper's
 ``l^2 + w^2 = 4 l_s^2``). A muscle pulls the upper and the lower vertex together, a return spring along the segment
-pushes them apart again, and torsional springs resist that the sides of neighbouring segments differ in their angle,
-``k_t/2 sum (phi_(i+1) - phi_i)^2`` with ``sin phi = h / 2s``. There is no gravity. The vertices press against the
-walls of a straight pipe, the same all round, so the worm stays symmetric about the pipe's axis and each segment has
-one coordinate; the front tip's place ``x_0`` completes them:
+pushes them apart again, and torsional springs resist that the sides of neighbouring segments differ in their angle phi,
+``sin phi = h / 2s``. There is no gravity. The vertices press against the walls of a straight pipe, so the worm stays
+symmetric about the pipe's axis and each segment has one coordinate; the front tip's place ``x_0`` completes them:
 
     q = (x_0, h_1 .. h_N),   r_i = h_i / 2,   c_i = sqrt(s^2 - r_i^2),   l_i = 2 c_i
     d/dt dT/d(dq/dt) - dT/dq = -dU/dq - C dq/dt - F + J^T f
@@ -13,8 +12,7 @@ one coordinate; the front tip's place ``x_0`` completes them:
     U = sum k_s/2 (l_i - l_0)^2 + sum k_t/2 (phi_(i+1) - phi_i)^2 + sum k_w (h_i/2 - D/2)_+^2
     N_i = k_w (h_i/2 - D/2)_+,   |f_i| <= 2 mu N_i,   f_i = -2 mu N_i sign(dX_i/dt) where the vertices slide
 
-in m, kg, s, N, rad and J. `annelid.planar.linkage` states forces and mass matrix in general, and
-`annelid.planar.midpoint` the stepper. Slip loss is the work that friction takes from vertices that slide.
+Slip loss is the work that friction takes from vertices that slide.
 
 Source: Daltorio, Boxerbaum, Horchler, Shaw, Chiel and Quinn 2013, Efficient worm-like locomotion: slip and control of
 soft-bodied peristaltic robots, Bioinspir. Biomim. 8, 035003, as described by Riddle et al. 2023, section 2.1. The

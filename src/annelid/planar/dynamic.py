@@ -29,17 +29,12 @@ class DynamicPlanarPlant(SavedAndRecorded):
 
     Segment 1 is at the front, which points to -x. A segment's one stretch sensor is its length, at rest when the worm
     lies unactuated. ``contact_force`` is the force of the walls along x on both vertices, and along z that of the lower
-    wall; the upper one presses with the same force the other way. The centre of mass stays on the axis.
-
-    Energies add up: kinetic + elastic = muscle work - damping loss - slip loss + the start's energy, up to the error of
-    the integrator (`annelid.planar.midpoint`).
+    wall. Energies add up: kinetic + elastic = muscle work - damping loss - slip loss + the start's energy, up to the
+    error of the integrator (`annelid.planar.midpoint`).
 
     Attributes:
         description: What it is, for the run file.
         linkage: Makes its mechanics from its section of the configuration.
-        worm: Its mechanics.
-        n_segments: Segments.
-        n_muscles: As many.
     """
 
     description: ClassVar[str]
@@ -92,13 +87,7 @@ class DynamicPlanarPlant(SavedAndRecorded):
         return self._sense()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step.
-
-        Args:
-            activation: Shape ``(n_segments,)``, in [0, 1].
-
-        Returns:
-            The sensation at its end.
+        """Advances by one control step, as `annelid.Plant.step`.
 
         Raises:
             SimulationStopped: The step has no unique solution.
@@ -191,11 +180,7 @@ class DynamicPlanarPlant(SavedAndRecorded):
 
 
 def _resting_posture(worm: Linkage) -> Array:
-    """Returns the coordinates of the straight worm in equilibrium without activation, m.
-
-    All segments are equally high and all sides straight, so that hinges carry no load; the height is where return
-    springs and walls balance, found by bisection.
-    """
+    """Returns the coordinates of the straight worm, m, at the height where return springs and walls balance."""
     high = worm.body.height_relaxed_m
     low = min(high, 2.0 * worm.wall_radius_m)
     for _ in range(_HALVINGS):

@@ -50,14 +50,14 @@ class Linkage:
         body: Springs k_s, dampers d_h, muscles (F_0, h_0, h_s) and number of segments N; the first N coordinates behind
             ``x_0`` are their heights.
         rises: G without the column of ``x_0``, shape ``(n_links, n_coordinates)``.
-        link_length_m: L, shape ``(n_links,)``.
+        link_length_m: L.
         lump_runs: H, shape ``(n_lumps, n_links)``.
         lump_heights: R without the column of ``x_0``, shape ``(n_lumps, n_coordinates)``.
-        lump_mass_kg: m, shape ``(n_lumps,)``; a lump off the axis is counted with its mirror image.
-        vertices: The lump of every segment's upper and lower vertex, shape ``(n_segments,)``.
+        lump_mass_kg: m; a lump off the axis is counted with its mirror image.
+        vertices: The lump of every segment's upper and lower vertex.
         outline: The lumps along the upper half, from the front tip to the rear one.
         segment_runs: E, shape ``(n_segments, n_links)``.
-        straight: Coordinates per height of the worm with straight sides and equal heights, ``(1 + n_coordinates,)``.
+        straight: Coordinates, with ``x_0``, per height of the worm with straight sides and equal heights.
         hinges: B, shape ``(n_hinges, n_links)``.
         torsion_stiffness_Nm_per_rad: k_t.
         torsion_damping_Nms_per_rad: d_t.
@@ -123,10 +123,7 @@ class Linkage:
         return q[1 : 1 + self.n_segments]
 
     def posture(self, q: Array) -> Posture:
-        """Computes all that depends on the coordinates ``q``, shape ``(n_coordinates,)``, alone.
-
-        A link that would have to be longer than it is has the run NaN.
-        """
+        """Computes all that depends on the coordinates alone; a link that would have to stretch has the run NaN."""
         rise = self.rises @ q[1:]
         with np.errstate(invalid="ignore", divide="ignore"):
             run = np.sqrt(self.link_length_m**2 - rise * rise)
@@ -154,10 +151,9 @@ class Linkage:
         return self.wall_stiffness_N_per_m * np.maximum(self.heights(q) / 2.0 - self.wall_radius_m, 0.0)
 
     def mean_wall_force(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Averages the walls' force from coordinates ``start`` to ``end``, so that its work is what they store.
+        """Returns the walls' force averaged such that its work is what they store, and its derivative by the end.
 
-        Returns:
-            Mean force on each vertex, N, and its derivative by the height at the end, N/m; ``(n_segments,)`` each.
+        They are of each vertex, in N and N per m of the height at the end, from coordinates ``start`` to ``end``.
         """
         if not self.wall_stiffness_N_per_m:
             return np.zeros(self.n_segments), np.zeros(self.n_segments)

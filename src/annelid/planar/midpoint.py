@@ -12,8 +12,8 @@ walls, dampers, friction and muscles the rule is symplectic and of second order 
 energy's error stays bounded, and the momentum along the body is kept. ``u`` is found by Newton's method with the
 friction's complementarity problem solved in each iteration.
 
-Vertices that stick do not move at all during the step. An impulse at its end takes away the velocity that they had
-at its beginning; what that costs is work lost to friction, and so is ``-f J u dt`` of the sliding ones.
+Vertices that stick do not move during the step. An impulse at its end takes away the velocity that they had at its
+beginning; what that costs is work lost to friction, and so is ``-f J u dt`` of the sliding ones.
 """
 
 from __future__ import annotations
@@ -35,18 +35,11 @@ _FRICTION_SWEEPS = 2000
 def midpoint_step(
     worm: Linkage, now: dict[str, NDArray[Any]], activation: Array, timestep_s: float
 ) -> tuple[dict[str, Array], bool]:
-    """Advances a worm by one step.
+    """Returns the state of a worm one step on, and whether Newton's method has converged.
 
-    Args:
-        worm: The worm.
-        now: Coordinates ``q``, m, and momenta ``p``, kg m/s, ``(n_coordinates,)``; energies so far, J.
-        activation: Activation of the muscles in [0, 1], shape ``(n_segments,)``.
-        timestep_s: Length of the step, s.
-
-    Returns:
-        ``q`` and ``p`` at its end, NaN where a link would have had to stretch; ``muscle_force`` and ``friction`` (on
-        both vertices of a segment together, along x) in its middle, N; the energies ``muscle_work``, ``positive_work``,
-        ``slip_loss`` of every segment and ``damping_loss``, J. And whether Newton's method has converged.
+    The state is: coordinates ``q``, m, and momenta ``p``, kg m/s, NaN where a link would have had to stretch;
+    ``muscle_force`` and ``friction`` (on both vertices of a segment together, along x) in the middle of the last step,
+    N; the energies so far ``muscle_work``, ``positive_work`` and ``slip_loss`` of every segment, and ``damping_loss``, J.
     """
     q, p = now["q"], now["p"]
     half = 0.5 * timestep_s
@@ -123,12 +116,7 @@ def coulomb(mobility: Array, free_slip: Array, limit: Array) -> Array:
     With the slip ``v = free_slip + mobility f`` each contact has ``v = 0`` and ``|f| <= limit`` (it sticks), or
     ``f = -limit sign(v)`` (it slides). For a positive definite mobility there is exactly one solution. Contacts are
     guessed to stick or slide and the guess is corrected until it is right; where the corrections go round in a circle,
-    projected Gauss-Seidel takes over.
-
-    Args:
-        mobility: Slip per force, symmetric and positive definite, shape ``(n, n)``.
-        free_slip: Slip without friction, shape ``(n,)``.
-        limit: Largest force of each contact, not negative, shape ``(n,)``.
+    projected Gauss-Seidel takes over. Mobility is slip per force, and the free slip that without friction.
     """
     slides = np.where(limit > 0.0, 0.0, -1.0)
     own = np.eye(len(limit))

@@ -112,14 +112,7 @@ class Riddle2022Plant(SavedAndRecorded):
         return self.sense()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step.
-
-        Args:
-            activation: Shape ``(n_segments,)``, in [0, 1]; 1 commands the smallest height.
-
-        Returns:
-            The sensation at its end.
-        """
+        """Advances by one control step, as `annelid.Plant.step`; activation 1 commands the smallest height."""
         self._now = self.step_copies(self._now, activation)
         return self.sense()
 

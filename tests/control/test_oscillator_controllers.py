@@ -20,9 +20,9 @@ from annelid.control import (
     SineController,
     TimedController,
 )
-from annelid.control.adaptive import AdaptiveSns as AdaptiveSection
 from annelid.control.open_loop import SineWave, TimedWave
 from annelid.control.oscillators import HeteroclinicChannel, PhaseChain
+from annelid.control.sns import AdaptiveSns as AdaptiveSection
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
 from annelid.simulation import Run, simulate

@@ -9,8 +9,8 @@ from pydantic import Field, model_validator
 
 from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.adaptive import DRIVE_HINT
 from annelid.control.base import SegmentController, Share, Slope
+from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import HeteroclinicRing, HeteroclinicStepper, PhaseState, PhaseStepper

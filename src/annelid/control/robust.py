@@ -9,8 +9,8 @@ from pydantic import Field
 
 from annelid.config.kinds import Knob
 from annelid.config.sections import Positive, Section
-from annelid.control.adaptive import DRIVE_HINT
 from annelid.control.base import HalfCentreKind, NeuralController, Share, TimeConstant, design_of
+from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import robust

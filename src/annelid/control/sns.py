@@ -1,4 +1,4 @@
-"""The paper's controller: stretch sensors, the peristalsis network, and the muscles' activation."""
+"""The paper's controller, and two that extend its network: by a descending drive, and by feedback from pressure."""
 
 from __future__ import annotations
 
@@ -7,25 +7,35 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from annelid.config.kinds import ControllerKind
+from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.sections import NonNegative, Positive
 from annelid.config.sensor import StretchSensor
-from annelid.control.base import HalfCentreKind, NeuralController, design_of
+from annelid.control.base import (
+    HalfCentreKind,
+    NeuralController,
+    Share,
+    Slope,
+    TimeConstant,
+    design_of,
+    require_step_within,
+)
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
-from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis_network
-from annelid.nervous.peristalsis import ROLES
+from annelid.control.stretch_sensor import lengthening_m
+from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis
 from annelid.protocols import Array, Plant, Sensation, State, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 Config = TypeVar("Config", bound=ControllerKind)
+Strength = Annotated[float, Field(ge=0, le=5)]
+DRIVE_HINT = "Descending drive: more of it makes the wave faster."
 
 
 class Sns(HalfCentreKind):
@@ -134,7 +144,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
         self.own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, sns.sensor_current_nA, sns.kick_nA)
         super().__init__(
             self._network(n_segments, control_timestep_s),
-            ROLES,
+            peristalsis.ROLES,
             n_segments,
             n_muscles,
             control_timestep_s,
@@ -223,7 +233,7 @@ class SnsController(PeristalsisController[Sns]):
         return {}
 
     def _network(self, n_segments: int, control_timestep_s: float) -> Network:
-        return peristalsis_network(n_segments, self._parameters)
+        return peristalsis.peristalsis_network(n_segments, self._parameters)
 
     def step_copies(
         self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
@@ -299,3 +309,160 @@ class SnsController(PeristalsisController[Sns]):
 
     def _attrs(self) -> dict[str, float | int | str]:
         return {f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()}
+
+
+class AdaptiveSns(ControllerKind):
+    """The synthetic nervous system with a descending neuron, whose activity sets the rate of all half-centres.
+
+    The wanted activity is ``drive + drive_slope_per_s time + stretch_gain_per_m stretch``, clipped to 0 .. 1, with the
+    mean lengthening of all segments as stretch: a manual, a timed and a sensory drive. The descending neuron follows it
+    with its time constant.
+    """
+
+    sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.drive=0:1",
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "sensor.tolerance_m=0.001:0.03:log",
+        "sensor.hysteresis_m=0:0.02",
+    )
+    kind: Literal["adaptive"] = "adaptive"
+    network: Sns = Sns()
+    drive: Share = Field(default=0.0, description="0: the half-centres' slow rhythm; 1: about three times as fast")
+    drive_slope_per_s: Slope = Field(default=0.0, description="change of the manual drive")
+    stretch_gain_per_m: float = Field(
+        default=0.0, ge=-1000, le=1000, description="drive per mean lengthening of the segments"
+    )
+    drive_time_constant_s: TimeConstant = Field(default=0.05, description="of the descending neuron")
+
+    def build(self, config: RunConfig, plant: Plant) -> AdaptiveController:
+        """Builds the controller, as `ControllerKind.build`."""
+        size = plant.n_segments, plant.n_muscles
+        return AdaptiveController(self, config.sensor, *size, config.clock.control_timestep_s)
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns what the network rests on, and its drive."""
+        return (*self.network.cited(), ("nourse", "the idea of half-centres that adapt their rate"))
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the manual drive."""
+        return (Knob("controller.drive", "drive", 1.0, 0.0, 1.0, 0.01, DRIVE_HINT),)
+
+
+class AdaptiveController(PeristalsisController[AdaptiveSns]):
+    """Drives a worm by the peristalsis network with a descending neuron that sets the rate of its half-centres.
+
+    It starts with that neuron silent. The rest, errors too, is as for `annelid.control.SnsController`.
+    """
+
+    name = "synthetic nervous system with a descending drive"
+    recorded = (*PeristalsisController.recorded, ("drive", (), "1", "activity of the descending neuron"))
+
+    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
+        config = self._config
+        require_step_within(control_timestep_s, drive_time_constant_s=config.drive_time_constant_s)
+        self._every_step_differs = config.drive_slope_per_s != 0.0
+        return peristalsis.adaptive_peristalsis_network(
+            n_segments, self._parameters, 1e3 * config.drive_time_constant_s
+        )
+
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        manual = self._config.drive + self._config.drive_slope_per_s * n_taken * self._timestep_s
+        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        drive = manual + self._config.stretch_gain_per_m * float(longer_m.mean())
+        leak, reach = self._parameters.leak_conductance_uS, self._parameters.range_mV
+        inputs_nA[...] = min(max(drive, 0.0), 1.0) * leak * reach
+
+    def _values(self) -> Values:
+        return {**super()._values(), "drive": self._activity(peristalsis.DRIVE_NEURON)}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        return {"conductance_drive_uS": peristalsis.drive_conductance_uS(self._parameters)}
+
+
+class PressureSns(ControllerKind):
+    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
+
+    A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
+    the contraction two segments before; any of the four strengths may be 0. Lengths and loads are those of the
+    six-segment robot (0.16 m radius, 19 N).
+    """
+
+    sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
+    tuned: ClassVar[tuple[str, ...]] = (
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "controller.hold=0:2",
+        "controller.release=0:6",
+        "controller.landing=0:0.2",
+        "controller.exchange=0:2",
+        "sensor.tolerance_m=0.001:0.03:log",
+    )
+    kind: Literal["sns-pressure"] = "sns-pressure"
+    network: Sns = Sns()
+    light_N: NonNegative = Field(default=2.5, description="load of a segment up to which its pressure neuron rests")
+    full_N: Positive = Field(default=9.0, description="load that drives it to R")
+    extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
+    extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
+    hold: Strength = Field(default=1.0, description="potential over R that full pressure gives its sensory neuron")
+    release: float = Field(
+        default=1.8, ge=0, le=20, description="sensors' currents that a full extension neuron cancels"
+    )
+    landing: Strength = Field(default=0.1, description="potential over R that it gives the sensory neuron before")
+    exchange: Strength = Field(default=0.8, description="potential over R that a contraction gives the one two before")
+    pressure_time_constant_s: float = Field(
+        default=0.03, ge=1e-3, le=10, description="time constant of the pressure neurons"
+    )
+
+    @model_validator(mode="after")
+    def _scales_rise(self) -> Self:
+        for low, high in (("light_N", "full_N"), ("extending_m", "extended_m")):
+            if not getattr(self, low) < getattr(self, high):
+                raise ValueError(
+                    f"controller.{low} = {getattr(self, low):g} must be less than controller.{high} = "
+                    f"{getattr(self, high):g}"
+                )
+        return self
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has a skin that senses pressure."""
+        if not config.body.has_skin:
+            raise ValueError(
+                f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {config.body.kind!r} "
+                "has not; only the 3D worm ('worm') has"
+            )
+
+    def build(self, config: RunConfig, plant: Plant) -> PressureController:
+        """Builds the controller, as `ControllerKind.build`."""
+        size = plant.n_segments, plant.n_muscles
+        return PressureController(self, config.sensor, *size, config.clock.control_timestep_s)
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns what the network rests on, and the feedback."""
+        return (*self.network.cited(), ("daltorio2013", "the aim of feedback from contact"))
+
+
+class PressureController(PeristalsisController[PressureSns]):
+    """Drives a worm by `annelid.nervous.peristalsis.pressure_network`.
+
+    A segment's load is the sum of the normal forces on its four sides, its length the mean of its stretch sensors, both
+    rising linearly from nothing to R. As long as segment 1's stretch sensor is kept off at the start, so is its load.
+    The rest, errors too, is as for `annelid.control.SnsController`.
+    """
+
+    name = "synthetic nervous system with pressure feedback"
+
+    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
+        config = self._config
+        require_step_within(control_timestep_s, pressure_time_constant_s=config.pressure_time_constant_s)
+        strengths = config.model_dump(include={"hold", "release", "landing", "exchange"})
+        pressure_ms = 1e3 * config.pressure_time_constant_s
+        return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=pressure_ms)
+
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        config, longer_m = self._config, lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        loads = (sensation.touch_N.sum(axis=1) - config.light_N) / (config.full_N - config.light_N)
+        extensions = (longer_m - config.extending_m) / (config.extended_m - config.extending_m)
+        inputs_nA[::2] = self._full_nA * np.clip(loads, 0.0, 1.0)
+        inputs_nA[1::2] = self._full_nA * np.clip(extensions, 0.0, 1.0)
+        if self._sensor.held_at(time_s):
+            inputs_nA[0] = 0.0

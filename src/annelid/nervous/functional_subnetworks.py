@@ -140,9 +140,9 @@ def division(
     """Builds ``U_quotient = U_dividend / (1 + (1 / c - 1) U_divisor / R)``: a divisor at R leaves the share c.
 
     The dividend is transmitted with gain 1 (g_1). The divisor's synapse reverses at rest, so it only adds conductance:
-    ``g_2 = (1 / c - 1) (Gm + g_1)``, from ``U* = c R`` with both at R. Then ``U* = U_dividend / ((1 + gamma a_1) /
-    (1 + gamma) + (1 / c - 1) a_2)``, ``gamma = g_1 / Gm``: exact for a dividend at R, and too large by at most the share
-    ``gamma`` for smaller ones. The neurons are ``dividend``, ``divisor`` and ``quotient``.
+    ``g_2 = (1 / c - 1) (Gm + g_1)``, from ``U* = c R`` with both at R. Then with ``gamma = g_1 / Gm``
+    ``U* = U_dividend / ((1 + gamma a_1) / (1 + gamma) + (1 / c - 1) a_2)``: exact for a dividend at R, and too large by
+    at most the share ``gamma`` for smaller ones. The neurons are ``dividend``, ``divisor`` and ``quotient``.
 
     Args:
         ratio: c, between 0 and 1.
@@ -211,8 +211,8 @@ def differentiation(
     Both copies take the input current; their capacitances make them first-order lags of ``tau_fast`` and ``tau_slow =
     tau_fast + k_d / k``. On a ramp ``U_fast - U_slow = (tau_slow - tau_fast) dU/dt`` exactly; a `subtraction` of gain k
     follows, with its error. At the angular frequency w the difference is ``w (tau_slow - tau_fast) / sqrt((1 + w^2
-    tau_fast^2) (1 + w^2 tau_slow^2))`` of the signal. The input ``signal`` drives the neurons ``fast`` and ``slow``; the
-    output is that of ``rate``.
+    tau_fast^2) (1 + w^2 tau_slow^2))`` of the signal. The input ``signal`` drives ``fast`` and ``slow``; the output is
+    that of ``rate``.
 
     Args:
         gain_ms: k_d.

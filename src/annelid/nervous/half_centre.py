@@ -1,8 +1,8 @@
 """Half-centres: two neurons that inhibit each other and take turns, designed for a wanted period.
 
 Each neuron bears a persistent sodium channel that keeps it at the operating range R once it is up, until the partner
-escapes from its inhibition. Whether it does is set by the bifurcation parameter delta, and how long it takes by the slow
-gate's time constant above all (Szczecinski et al. 2017; Riddle et al. 2022). Conductances follow from the design rules
+escapes from its inhibition. Whether it does is set by the bifurcation parameter delta, and how long it takes mostly by
+the slow gate's time constant (Szczecinski et al. 2017; Riddle et al. 2022). Conductances follow from the design rules
 of functional subnetworks (Szczecinski, Hunt and Quinn 2017): choose where a neuron rests while its partners are in a
 given state, and solve the current balance there for the one unknown,
 

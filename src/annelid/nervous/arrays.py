@@ -17,23 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.errors import ConfigError
-from annelid.nervous.neurons import (
-    Array,
-    Channel,
-    GapJunction,
-    Gate,
-    Modulated,
-    ModulatorySynapse,
-    SpikingSynapse,
-    Synapse,
-)
+from annelid.nervous import neurons as parts
+from annelid.nervous.neurons import Array
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
 
 Key = TypeVar("Key", bound=tuple)
 # Fills the slots of channels that have fewer gates than others: never moves, and counts as 1.
-_NO_GATE = Gate(slope_per_mV=0.0, power=0.0)
+_NO_GATE = parts.Gate(slope_per_mV=0.0, power=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +73,7 @@ class NetworkArrays:
     terminal_threshold_mV: Array
     terminal_slope_per_mV: Array
     channel_neuron: NDArray[np.intp]
-    gates: tuple[tuple[Gate, ...], ...]
+    gates: tuple[tuple[parts.Gate, ...], ...]
     n_slow: int
     firing_neuron: NDArray[np.intp]
     threshold_mV: Array
@@ -93,7 +85,7 @@ class NetworkArrays:
     release_source: NDArray[np.intp]
     release_time_constant_ms: Array
     release_increment: Array
-    modulated: tuple[tuple[Modulated, int], ...]
+    modulated: tuple[tuple[parts.Modulated, int], ...]
     log_modulation: Array
     rectified_source: NDArray[np.intp]
     rectified_target: NDArray[np.intp]
@@ -110,11 +102,11 @@ def build_arrays(network: Network) -> NetworkArrays:
     n = len(neurons)
 
     ends = [(index[c.source], index[c.target], c.kind) for c in network.connections]
-    synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, Synapse)]
-    spiking = [(pre, post, s) for pre, post, s in ends if isinstance(s, SpikingSynapse)]
-    modulatory = [(pre, post, s) for pre, post, s in ends if isinstance(s, ModulatorySynapse)]
-    rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, GapJunction) and s.rectified]
-    plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, GapJunction) and not s.rectified]
+    synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.Synapse)]
+    spiking = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.SpikingSynapse)]
+    modulatory = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.ModulatorySynapse)]
+    rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and s.rectified]
+    plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and not s.rectified]
     terminals = _numbered((pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory])
     releases = _numbered((pre, s.time_constant_ms, s.increment) for pre, _, s in spiking)
     modulated = _numbered((m.quantity, post) for _, post, m in modulatory)
@@ -135,14 +127,14 @@ def build_arrays(network: Network) -> NetworkArrays:
     def rows(kind: str) -> tuple[Array, Array]:
         return weights[drive[kind], :n], weights[drive[kind], n:]
 
-    opened: dict[str, list[tuple[int, int, Synapse | SpikingSynapse | Channel]]] = {
+    opened: dict[str, list[tuple[int, int, parts.Synapse | parts.SpikingSynapse | parts.Channel]]] = {
         "terminals": [(terminals[pre, s.threshold_mV, s.saturation_mV], post, s) for pre, post, s in synapses],
         "releases": [(releases[pre, s.time_constant_ms, s.increment], post, s) for pre, post, s in spiking],
         "channels": [(row, neuron, channel) for row, (neuron, channel) in enumerate(channels)],
     }
-    for kind, parts in opened.items():
+    for kind, entries in opened.items():
         conductance, current = rows(kind)
-        for row, neuron, part in parts:
+        for row, neuron, part in entries:
             conductance[row, neuron] += part.conductance_uS
             current[row, neuron] += part.conductance_uS * part.reversal_mV
     _, current = rows("rectified")
@@ -200,7 +192,7 @@ def _numbered(keys: Iterable[Key]) -> dict[Key, int]:
     return {key: place for place, key in enumerate(sorted(set(keys)))}
 
 
-def _slots(channels: Sequence[Channel]) -> tuple[tuple[tuple[Gate, ...], ...], int]:
+def _slots(channels: Sequence[parts.Channel]) -> tuple[tuple[tuple[parts.Gate, ...], ...], int]:
     """Arranges gates as (slot, channel), slow slots first, and returns the number of slow slots."""
     slow = zip_longest(*(channel.slow_gates for channel in channels), fillvalue=_NO_GATE)
     instant = zip_longest(*(channel.instant_gates for channel in channels), fillvalue=_NO_GATE)

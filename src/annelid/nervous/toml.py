@@ -12,27 +12,17 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import ConfigError, require_finite, shown, suggest
-from annelid.nervous.neurons import (
-    Channel,
-    ConnectionKind,
-    Firing,
-    GapJunction,
-    Gate,
-    ModulatorySynapse,
-    Neuron,
-    SpikingSynapse,
-    Synapse,
-)
+from annelid.nervous import neurons
 from annelid.textfiles import parse_toml, toml_text
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
 
-KINDS: dict[str, type[ConnectionKind]] = {
-    "synapse": Synapse,
-    "gap_junction": GapJunction,
-    "spiking_synapse": SpikingSynapse,
-    "modulatory_synapse": ModulatorySynapse,
+KINDS: dict[str, type[neurons.ConnectionKind]] = {
+    "synapse": neurons.Synapse,
+    "gap_junction": neurons.GapJunction,
+    "spiking_synapse": neurons.SpikingSynapse,
+    "modulatory_synapse": neurons.ModulatorySynapse,
 }
 """What a connection's ``kind`` is called in the text."""
 
@@ -65,7 +55,7 @@ def read_network(text: str, make: type[Network]) -> Network:
     for place, entry in _tables(document, "neuron"):
         [name] = _strings(entry, place, "name")
         initial = _number(entry["initial_mV"], f"{place}: initial_mV") if "initial_mV" in entry else None
-        network.add_neuron(name, _build(Neuron, {"name", "initial_mV"}, entry, place), initial)
+        network.add_neuron(name, _build(neurons.Neuron, {"name", "initial_mV"}, entry, place), initial)
     for place, entry in _tables(document, "connection"):
         source, target, kind = _strings(entry, place, "source", "target", "kind")
         if kind not in KINDS:
@@ -152,9 +142,9 @@ def _several(kind: type) -> Callable[[Any, str], Any]:
 
 
 _READERS: dict[str, Callable[[Any, str], Any]] = {
-    "channels": _several(Channel),
-    "gates": _several(Gate),
-    "firing": partial(_build, Firing, ()),
+    "channels": _several(neurons.Channel),
+    "gates": _several(neurons.Gate),
+    "firing": partial(_build, neurons.Firing, ()),
     "quantity": _string,
     "rectified": _of_type(bool, "true or false"),
 }

@@ -113,10 +113,15 @@ def export_network(network: Network) -> Any:
             a channel, spiking neurons, or spiking or modulatory synapses; the sentence names it.
     """
     toolbox = _toolbox()
-    _require_exportable(network)
+    if not network.neurons:
+        raise ConfigError(f"network {network.name!r} has no neurons to export")
     exported = toolbox.networks.Network(name=network.name)
     n_channels = max(len(neuron.channels) for neuron in network.neurons.values())
     for name, neuron in network.neurons.items():
+        if neuron.firing is not None:
+            raise ConfigError(f"neuron {name!r} spikes; only non-spiking networks can go over to SNS-Toolbox")
+        if neuron.leak_conductance_uS == 0:
+            raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
         membrane: dict[str, Any] = {
             "membrane_capacitance": neuron.capacitance_nF * neuron.leak_conductance_uS,
             "membrane_conductance": neuron.leak_conductance_uS,
@@ -126,21 +131,36 @@ def export_network(network: Network) -> Any:
         kind = toolbox.neurons.NonSpikingNeuron
         if neuron.channels:
             kind = toolbox.neurons.NonSpikingNeuronWithGatedChannels
-            membrane |= _channel_arguments(neuron.channels, n_channels)
+            membrane |= _channel_arguments(name, neuron.channels, n_channels)
         exported.add_neuron(kind(**membrane), name=name, initial_value=network.initial_mV[name])
+    pairs = Counter()
     for connection in network.connections:
-        kind = connection.kind
+        kind, source, target = connection.kind, connection.source, connection.target
         if isinstance(kind, Synapse):
-            synapse = toolbox.connections.NonSpikingSynapse(
-                max_conductance=kind.conductance_uS,
-                reversal_potential=kind.reversal_mV,
-                e_lo=kind.threshold_mV,
-                e_hi=kind.saturation_mV,
-            )
+            pair = "synapse", source, target
+            numbers = kind.conductance_uS, kind.reversal_mV, kind.threshold_mV, kind.saturation_mV
+            names = "max_conductance", "reversal_potential", "e_lo", "e_hi"
+            synapse = toolbox.connections.NonSpikingSynapse(**dict(zip(names, numbers, strict=True)))
         elif isinstance(kind, GapJunction):
+            pair = (kind.rectified, source, target) if kind.rectified else (False, *sorted((source, target)))
             synapse = toolbox.connections.ElectricalSynapse(kind.conductance_uS, rect=kind.rectified)
-        exported.add_connection(synapse, connection.source, connection.target)
+        else:
+            raise ConfigError(
+                f"{source!r} and {target!r} are joined by a {type(kind).__name__}; only graded synapses and gap "
+                "junctions can go over to SNS-Toolbox"
+            )
+        pairs[pair] += 1
+        exported.add_connection(synapse, source, target)
+    for (_, source, target), count in pairs.items():
+        if count > 1:
+            raise ConfigError(
+                f"{count} connections of one kind join {source!r} and {target!r}; SNS-Toolbox keeps only the last"
+            )
     for name, targets in network.inputs.items():
+        if len(targets) != 1:
+            raise ConfigError(
+                f"input {name!r} drives {len(targets)} neurons; an SNS-Toolbox input drives one, so split it"
+            )
         exported.add_input(targets[0], name=name)
     for name, source in network.outputs.items():
         exported.add_output(source, name=name)
@@ -174,11 +194,17 @@ def _channels(model: Any, neuron: int) -> tuple[Channel, ...]:
     return tuple(channels)
 
 
-def _channel_arguments(channels: Sequence[Channel], n_channels: int) -> dict[str, Any]:
+def _channel_arguments(name: str, channels: Sequence[Channel], n_channels: int) -> dict[str, Any]:
     """Keyword arguments of the toolbox's gated neuron, filled up with channels that conduct nothing.
 
     The toolbox needs the same number of channels in every gated neuron of a network, and plain lists.
     """
+    for channel in channels:
+        if len(channel.instant_gates) > 1 or len(channel.slow_gates) > 2:
+            raise ConfigError(
+                f"neuron {name!r} has a channel with {len(channel.instant_gates)} instantaneous and "
+                f"{len(channel.slow_gates)} slow gates; SNS-Toolbox has room for one and two"
+            )
     none = Gate(slope_per_mV=0.0, power=0.0, time_constant_ms=1.0)
     filled = [*channels, *[Channel(0.0, 0.0)] * (n_channels - len(channels))]
     arguments: dict[str, Any] = {
@@ -198,42 +224,6 @@ def _channel_arguments(channels: Sequence[Channel], n_channels: int) -> dict[str
         if letter != "a":
             arguments[f"tau_max_{letter}"] = [gate.time_constant_ms for gate in each]
     return arguments
-
-
-def _require_exportable(network: Network) -> None:
-    if not network.neurons:
-        raise ConfigError(f"network {network.name!r} has no neurons to export")
-    for name, neuron in network.neurons.items():
-        if neuron.firing is not None:
-            raise ConfigError(f"neuron {name!r} spikes; only non-spiking networks can go over to SNS-Toolbox")
-        if neuron.leak_conductance_uS == 0:
-            raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
-        for channel in neuron.channels:
-            if len(channel.instant_gates) > 1 or len(channel.slow_gates) > 2:
-                raise ConfigError(
-                    f"neuron {name!r} has a channel with {len(channel.instant_gates)} instantaneous and "
-                    f"{len(channel.slow_gates)} slow gates; SNS-Toolbox has room for one and two"
-                )
-    pairs = Counter()
-    for connection in network.connections:
-        kind, source, target = connection.kind, connection.source, connection.target
-        if not isinstance(kind, Synapse | GapJunction):
-            raise ConfigError(
-                f"{source!r} and {target!r} are joined by a {type(kind).__name__}; only graded synapses and gap "
-                "junctions can go over to SNS-Toolbox"
-            )
-        rectified = None if isinstance(kind, Synapse) else kind.rectified
-        pairs[rectified, *(sorted((source, target)) if rectified is False else (source, target))] += 1
-    for (_, source, target), count in pairs.items():
-        if count > 1:
-            raise ConfigError(
-                f"{count} connections of one kind join {source!r} and {target!r}; SNS-Toolbox keeps only the last"
-            )
-    for name, targets in network.inputs.items():
-        if len(targets) != 1:
-            raise ConfigError(
-                f"input {name!r} drives {len(targets)} neurons; an SNS-Toolbox input drives one, so split it"
-            )
 
 
 def _unique(names: Sequence[str]) -> list[str]:

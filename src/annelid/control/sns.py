@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,8 +136,7 @@ class PeristalsisController(NeuralController, Generic[Config]):
             control_timestep_s: Step of the network, s.
         """
         self._config = config
-        self._sns: Sns = getattr(config, "network", config)
-        sns = self._sns
+        self._sns = sns = cast(Sns, getattr(config, "network", config))
         self._parameters = design_of(PeristalsisParameters, sns)
         self._range_mV, self._full_nA = sns.range_mV, sns.leak_conductance_uS * sns.range_mV
         self._sensor = StretchThreshold(sensor, n_segments)
@@ -252,7 +251,8 @@ class SnsController(PeristalsisController[Sns]):
         """
         each = each or self.own
         per_segment = (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
-        each = CopySettings(*(np.asarray(value)[..., np.newaxis] for value in per_segment), each.kick_nA)
+        tolerance, hysteresis, current = (np.asarray(value)[..., np.newaxis] for value in per_segment)
+        each = CopySettings(tolerance, hysteresis, current, each.kick_nA)
         switches: dict[str, Any] = {"sensor_on": states["sensor_on"].astype(bool), "n_steps": states["n_steps"]}
         n_copies = len(switches["sensor_on"])
         # Few widths of buffers serve any number of copies.

@@ -109,7 +109,7 @@ def build_arrays(network: Network) -> NetworkArrays:
     plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and not s.rectified]
     terminals = _numbered((pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory])
     releases = _numbered((pre, s.time_constant_ms, s.increment) for pre, _, s in spiking)
-    modulated = _numbered((m.quantity, post) for _, post, m in modulatory)
+    modulated: dict[tuple[parts.Modulated, int], int] = _numbered((m.quantity, post) for _, post, m in modulatory)
     log_modulation = np.zeros((len(terminals), len(modulated)))
     for pre, post, m in modulatory:
         row = terminals[pre, m.threshold_mV, m.saturation_mV]

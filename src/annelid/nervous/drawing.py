@@ -20,7 +20,7 @@ from annelid.nervous.neurons import GapJunction, ModulatorySynapse
 if TYPE_CHECKING:
     from annelid.nervous.network import Connection, Network
 
-Points = NDArray[np.complex128]
+Points = NDArray[np.complexfloating]
 RADIUS = 0.27
 """Radius of a neuron."""
 STUB = 0.42
@@ -173,7 +173,7 @@ def arrow_shapes(tail: complex, head: complex, key: str = "") -> list[Shape]:
 
 def frame_of(shapes: Iterable[Shape], unit_in: float) -> tuple[float, float, float, float]:
     """Returns left, right, bottom and top of all shapes with a margin, if a unit is drawn ``unit_in`` inches long."""
-    corners = [np.zeros(1, dtype=complex)]
+    corners: list[Points] = [np.zeros(1, dtype=complex)]
     for shape in shapes:
         if isinstance(shape, Line):
             corners.append(shape.points)
@@ -182,7 +182,7 @@ def frame_of(shapes: Iterable[Shape], unit_in: float) -> tuple[float, float, flo
             width = 0.6 * height * len(shape.text)
             left = shape.place + {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
             corners.append(np.array([left - 1j * height, left + width + 1j * height]))
-    points = np.concatenate(corners)
+    points: Points = np.concatenate(corners)
     x, y = points.real, points.imag
     return float(x.min()) - 0.15, float(x.max()) + 0.15, float(y.min()) - 0.15, float(y.max()) + 0.15
 

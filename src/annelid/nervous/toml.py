@@ -67,7 +67,7 @@ def read_network(text: str, make: type[Network]) -> Network:
         _refuse_unknown(entry, {"name", "targets"}, place)
         targets = _of_type(list, "a list of names")(_required(entry, "targets", place), f"{place}: targets")
         names = [_string(target, f"{place}: targets") for target in targets]
-        network.add_input(*_strings(entry, place, "name"), names)
+        network.add_input(_strings(entry, place, "name")[0], names)
     for place, entry in _tables(document, "output"):
         _refuse_unknown(entry, {"name", "source"}, place)
         network.add_output(*_strings(entry, place, "name", "source"))

@@ -39,7 +39,7 @@ def midpoint_step(
 
     The state is: coordinates ``q``, m, and momenta ``p``, kg m/s, NaN where a link would have had to stretch;
     ``muscle_force`` and ``friction`` (on both vertices of a segment together, along x) in the middle of the last step,
-    N; the energies so far ``muscle_work``, ``positive_work`` and ``slip_loss`` of every segment, and ``damping_loss``, J.
+    N; the energies so far ``muscle_work``, ``positive_work`` and ``slip_loss`` of a segment, and ``damping_loss``, J.
     """
     q, p = now["q"], now["p"]
     half = 0.5 * timestep_s

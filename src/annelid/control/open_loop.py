@@ -5,7 +5,7 @@ They are pure functions of time, and sense nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 class SineWave(ControllerKind):
     """Open loop: a sinusoidal wave from front to rear, segment 1 contracted at the start."""
 
-    tuned: ClassVar[tuple[str, ...]] = (
-        "controller.period_s=0.8:10:log",
-        "controller.waves=1:3",
-    )
+    tuned = ("controller.period_s=0.8:10:log", "controller.waves=1:3")
     kind: Literal["sine"] = "sine"
     period_s: Positive = Field(default=2.625, description="time of one cycle; the paper's three segments take 2.625")
     waves: Slope = Field(default=1.0, description="waves on the body at once; negative ones run forwards, 0 is no wave")
@@ -72,8 +69,8 @@ class TimedWave(ControllerKind):
     either every 6 s.
     """
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "the timed wave"),)
-    tuned: ClassVar[tuple[str, ...]] = (
+    cites = (("riddle2025models", "the timed wave"),)
+    tuned = (
         "controller.rise_s=0.05:2:log",
         "controller.hold_s=0.05:2:log",
         "controller.fall_s=0.05:2:log",

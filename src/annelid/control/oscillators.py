@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -34,13 +34,13 @@ class HeteroclinicChannel(ControllerKind):
     interval from segment to segment.
     """
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (
+    cites = (
         ("daltorio2013", "a channel that waits for the body"),
         ("horchler2015", "the stable heteroclinic channel"),
         ("shaw2012", "limit cycles near a heteroclinic orbit"),
         ("stone1990", "the dwell time under noise"),
     )
-    tuned: ClassVar[tuple[str, ...]] = (
+    tuned = (
         "controller.growth_rate_per_s=5:100:log",
         "controller.bias_per_s=1e-5:0.1:log",
         "controller.stretch_cue_m=0.005:0.08:log",
@@ -91,12 +91,8 @@ class PhaseChain(ControllerKind):
     Activation is an oscillator's output over its largest, ``r (1 + cos theta) / (2 R(5))``.
     """
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("ijspeert2007", "the phase oscillators under a drive"),)
-    tuned: ClassVar[tuple[str, ...]] = (
-        "controller.slowing=0.3:10:log",
-        "controller.waves=0.5:3",
-        "controller.drive=3:5",
-    )
+    cites = (("ijspeert2007", "the phase oscillators under a drive"),)
+    tuned = ("controller.slowing=0.3:10:log", "controller.waves=0.5:3", "controller.drive=3:5")
     kind: Literal["phase-chain"] = "phase-chain"
     drive: float = Field(
         default=4.0, ge=0, le=10, description="descending drive; the body swims in 3 .. 5, rests beyond 1 .. 5"

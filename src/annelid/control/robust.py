@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field
@@ -50,15 +50,9 @@ class RobustSns(HalfCentreKind):
     them contraction and expansion neurons drive the muscles.
     """
 
-    sensor_fields: ClassVar[frozenset[str]] = frozenset({"noise_m"})
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (
-        ("riddle2022", "the neurons"),
-        ("szczecinski2017", "the rules by which synapses are designed"),
-    )
-    tuned: ClassVar[tuple[str, ...]] = (
-        "controller.turn_ms=150:1500:log",
-        "controller.activation_slope_per_mV=0.1:2:log",
-    )
+    sensor_fields = frozenset({"noise_m"})
+    cites = (("riddle2022", "the neurons"), ("szczecinski2017", "the rules by which synapses are designed"))
+    tuned = ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log")
     kind: Literal["sns-robust"] = "sns-robust"
     bifurcation_mV: float = Field(
         default=-1.0, lt=0, description="delta: below 0, so that the half-centre stays in either state"

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,8 +41,8 @@ DRIVE_HINT = "Descending drive: more of it makes the wave faster."
 class Sns(HalfCentreKind):
     """The paper's synthetic nervous system: one half-centre per segment, gated by its neighbour's stretch."""
 
-    sensor_fields: ClassVar[frozenset[str]] = frozenset({"tolerance_m", "noise_m"})
-    tuned: ClassVar[tuple[str, ...]] = (
+    sensor_fields = frozenset({"tolerance_m", "noise_m"})
+    tuned = (
         "controller.gate_time_constant_ms=80:900:log",
         "controller.activation_slope_per_mV=0.1:2:log",
         "sensor.tolerance_m=0.001:0.03:log",
@@ -319,8 +319,8 @@ class AdaptiveSns(ControllerKind):
     with its time constant.
     """
 
-    sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
-    tuned: ClassVar[tuple[str, ...]] = (
+    sensor_fields = Sns.sensor_fields
+    tuned = (
         "controller.drive=0:1",
         "controller.network.gate_time_constant_ms=80:900:log",
         "sensor.tolerance_m=0.001:0.03:log",
@@ -388,8 +388,8 @@ class PressureSns(ControllerKind):
     six-segment robot (0.16 m radius, 19 N).
     """
 
-    sensor_fields: ClassVar[frozenset[str]] = Sns.sensor_fields
-    tuned: ClassVar[tuple[str, ...]] = (
+    sensor_fields = Sns.sensor_fields
+    tuned = (
         "controller.network.gate_time_constant_ms=80:900:log",
         "controller.hold=0:2",
         "controller.release=0:6",

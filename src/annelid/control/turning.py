@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -217,7 +217,7 @@ class TouchTurning(SteeringKind):
     again, and only then can it start anew. A scale changes by at most ``rate_per_s``.
     """
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "turning away from contact"),)
+    cites = (("riddle2025models", "turning away from contact"),)
     kind: Literal["touch"] = "touch"
     arm_N: NonNegative = Field(default=2.0, description="difference of the front's touch that starts the timer")
     hold_s: Positive = Field(default=6.0, description="time of the timer")

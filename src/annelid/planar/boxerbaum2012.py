@@ -22,7 +22,7 @@ law of the muscles and the dampers.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 class Boxerbaum2012Body(DynamicPlanarWorm):
     """The planar worm of Boxerbaum 2012: rhombi whose sides bend in their middle, without ground."""
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("boxerbaum2012", "the planar worm"),)
-    touches_ground: ClassVar[bool] = False
+    cites = (("boxerbaum2012", "the planar worm"),)
+    touches_ground = False
     kind: Literal["boxerbaum2012"] = "boxerbaum2012"
     middle_mass_kg: Positive = Field(default=0.02, description="mass of the middle of a side")
     torsion_stiffness_Nm_per_rad: Positive = Field(default=0.2, description="torsional spring in the middle of a side")

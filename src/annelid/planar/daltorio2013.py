@@ -22,7 +22,7 @@ the muscles.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 class Daltorio2013Body(DynamicPlanarWorm):
     """The planar worm of Daltorio 2013: rigid-sided rhombi, torsional springs between them, and the walls of a pipe."""
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("daltorio2013", "the planar worm"),)
+    cites = (("daltorio2013", "the planar worm"),)
     kind: Literal["daltorio2013"] = "daltorio2013"
     torsion_stiffness_Nm_per_rad: NonNegative = Field(
         default=0.2, description="torsional springs between neighbouring segments"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from annelid.clock import StepRatio
 from annelid.config.sections import Positive
@@ -20,24 +20,15 @@ if TYPE_CHECKING:
 class PlanarBody(PlanarWorm):
     """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2022", "the planar worm"),)
-    touches_ground: ClassVar[bool] = False
+    cites = (("riddle2022", "the planar worm"),)
+    touches_ground = False
     kind: Literal["riddle2022"] = "riddle2022"
-    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    heights = ("height_min_m", "height_max_m")
     height_min_m: Positive = Field(default=0.065, description="height when contracted")
     height_max_m: Positive = Field(default=0.11, description="height when relaxed")
     gain: Positive = Field(
         default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
     )
-
-    @model_validator(mode="after")
-    def _heights_fit_the_rhombus(self) -> Self:
-        if not self.height_min_m < self.height_max_m < 2 * self.side_m:
-            raise ValueError(
-                f"body.height_min_m = {self.height_min_m:g} and body.height_max_m = {self.height_max_m:g} must satisfy "
-                f"height_min_m < height_max_m < 2 side_m = {2 * self.side_m:g}"
-            )
-        return self
 
     def published_period_s(self, config: RunConfig) -> float | None:
         """Returns the period that the authors' code gives for their time constants and gains, s."""

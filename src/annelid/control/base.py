@@ -117,21 +117,8 @@ class HalfCentreKind(ControllerKind):
 
 
 def design_of(kind: type[Design], section: Section) -> Design:
-    """Returns the design whose parameters a section of the configuration has under the same names.
-
-    Raises:
-        ConfigError: The design refuses them.
-    """
+    """Returns the design whose parameters a section of the configuration has under the same names."""
     return kind(**{field.name: getattr(section, field.name) for field in fields(kind)})
-
-
-def require_step_within(control_timestep_s: float, **longest_s: float) -> None:
-    """Refuses a control step that is longer than a time constant of the section ``controller``, given by its name."""
-    for name, value in longest_s.items():
-        if not control_timestep_s <= value:
-            raise ConfigError(
-                f"controller.{name} = {value:g}: must be at least {control_timestep_s:g}, the control timestep"
-            )
 
 
 class NeuralController(SegmentController):

@@ -89,10 +89,9 @@ class RobustSns(HalfCentreKind):
 class RobustController(NeuralController):
     """Drives a worm by `annelid.nervous.robust`.
 
-    One step, from t to t + dt: the segments' mean lengthening at t, graded and clipped, drives the stretch neurons
-    during the whole step; activation is ``1 / (1 + exp(-slope (U1 - U2)))`` of the contraction and expansion neurons at
-    t + dt, or that of the motor neurons, if there are any. The forces of the ground on the segments' backs drive the
-    pressure neurons likewise, if there are any. Nothing but potentials and gates is remembered.
+    One step, from t to t + dt: the segments' mean lengthening at t, and the forces of the ground on their backs, drive
+    stretch and pressure neurons during the whole step; activation at t + dt is that of `NeuralController`, or that of
+    the motor neurons, if there are any. The state is potentials and gates alone.
 
     Raises:
         ConfigError: Fewer than 3 segments, muscles that are neither one nor two per segment, network parameters for
@@ -107,14 +106,6 @@ class RobustController(NeuralController):
     )
 
     def __init__(self, config: RobustSns, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
-        """Builds the controller in its initial state.
-
-        Args:
-            config: Its section of the configuration.
-            n_segments: Segments, at least 3.
-            n_muscles: As `annelid.control.SegmentController`.
-            control_timestep_s: Step of the network, s.
-        """
         self._config, drive = config, config.descending
         self._parameters = parameters = design_of(robust.RobustParameters, config)
         self._range_mV, self._full_nA = config.range_mV, config.leak_conductance_uS * config.range_mV
@@ -152,9 +143,8 @@ class RobustController(NeuralController):
     def reset(self, seed: int) -> None:
         """Returns to the state that ``start`` names.
 
-        It is segment 1 contracted and the others expanded (``"design"``); all potentials at rest, gates steady there
-        (``"silent"``); or potentials drawn evenly from the inhibitory reversal to three ranges and gates from 0 to 1
-        (``"random"``).
+        ``"silent"`` is all potentials at rest with steady gates, ``"random"`` potentials drawn evenly from the
+        inhibitory reversal to three ranges and gates from 0 to 1.
         """
         state, config = self._stepper.initial_state(), self._config
         if config.start == "silent":

@@ -16,17 +16,10 @@ from pydantic import Field, model_validator
 from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.sections import NonNegative, Positive
 from annelid.config.sensor import StretchSensor
-from annelid.control.base import (
-    HalfCentreKind,
-    NeuralController,
-    Share,
-    Slope,
-    TimeConstant,
-    design_of,
-    require_step_within,
-)
+from annelid.control.base import HalfCentreKind, NeuralController, Share, Slope, TimeConstant, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
 from annelid.control.stretch_sensor import lengthening_m
+from annelid.errors import ConfigError
 from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis
 from annelid.protocols import Array, Plant, Sensation, State, Values
 
@@ -139,10 +132,11 @@ class PeristalsisController(NeuralController, Generic[Config]):
         self._sns = sns = cast(Sns, getattr(config, "network", config))
         self._parameters = design_of(PeristalsisParameters, sns)
         self._range_mV, self._full_nA = sns.range_mV, sns.leak_conductance_uS * sns.range_mV
+        self._timestep_s = control_timestep_s
         self._sensor = StretchThreshold(sensor, n_segments)
         self.own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, sns.sensor_current_nA, sns.kick_nA)
         super().__init__(
-            self._network(n_segments, control_timestep_s),
+            self._network(n_segments),
             peristalsis.ROLES,
             n_segments,
             n_muscles,
@@ -153,8 +147,17 @@ class PeristalsisController(NeuralController, Generic[Config]):
         )
 
     @abstractmethod
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
+    def _network(self, n_segments: int) -> Network:
         """Returns the paper's network, with any further neurons and inputs behind its own."""
+
+    def _time_constant_s(self, field: str) -> float:
+        """A time constant of the section, refused if it is shorter than the control step."""
+        value = float(getattr(self._config, field))
+        if not self._timestep_s <= value:
+            raise ConfigError(
+                f"controller.{field} = {value:g}: must be at least {self._timestep_s:g}, the control timestep"
+            )
+        return value
 
     def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
         """Writes the currents of the inputs behind those of the sensors and the kick, after so many steps."""
@@ -231,7 +234,7 @@ class SnsController(PeristalsisController[Sns]):
     def _batches(self) -> dict[int, tuple[Stepper, NetworkState]]:
         return {}
 
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
+    def _network(self, n_segments: int) -> Network:
         return peristalsis.peristalsis_network(n_segments, self._parameters)
 
     def step_copies(
@@ -358,13 +361,10 @@ class AdaptiveController(PeristalsisController[AdaptiveSns]):
     name = "synthetic nervous system with a descending drive"
     recorded = (*PeristalsisController.recorded, ("drive", (), "1", "activity of the descending neuron"))
 
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
-        config = self._config
-        require_step_within(control_timestep_s, drive_time_constant_s=config.drive_time_constant_s)
-        self._every_step_differs = config.drive_slope_per_s != 0.0
-        return peristalsis.adaptive_peristalsis_network(
-            n_segments, self._parameters, 1e3 * config.drive_time_constant_s
-        )
+    def _network(self, n_segments: int) -> Network:
+        self._every_step_differs = self._config.drive_slope_per_s != 0.0
+        tau_ms = 1e3 * self._time_constant_s("drive_time_constant_s")
+        return peristalsis.adaptive_peristalsis_network(n_segments, self._parameters, tau_ms)
 
     def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
         manual = self._config.drive + self._config.drive_slope_per_s * n_taken * self._timestep_s
@@ -451,12 +451,10 @@ class PressureController(PeristalsisController[PressureSns]):
 
     name = "synthetic nervous system with pressure feedback"
 
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
-        config = self._config
-        require_step_within(control_timestep_s, pressure_time_constant_s=config.pressure_time_constant_s)
-        strengths = config.model_dump(include={"hold", "release", "landing", "exchange"})
-        pressure_ms = 1e3 * config.pressure_time_constant_s
-        return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=pressure_ms)
+    def _network(self, n_segments: int) -> Network:
+        strengths = self._config.model_dump(include={"hold", "release", "landing", "exchange"})
+        tau_ms = 1e3 * self._time_constant_s("pressure_time_constant_s")
+        return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=tau_ms)
 
     def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
         config, longer_m = self._config, lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)

@@ -88,7 +88,7 @@ class Descending(SteeringKind):
     A modulation m in [-1, 1] scales a segment's left activation by ``1 - max(m, 0)`` and its right one by
     ``1 - max(-m, 0)``, so that it bends to the left where m is positive. Of two leaky neurons, one per side, the wanted
     modulation drives one; m is their activity. A step is exact for a drive that is constant during it. A segment with a
-    negative share of m bends the other way.
+    negative share of m bends in the opposite direction.
     """
 
     shares: tuple[Modulation, ...] | None = Field(
@@ -101,7 +101,7 @@ class Descending(SteeringKind):
         super().check_with(config)
         n_segments = config.body.n_segments
         if self.shares is not None and len(self.shares) != n_segments:
-            raise ValueError(f"turning.shares has {len(self.shares)} entries: must have {n_segments}, one a segment")
+            raise ValueError(f"turning.shares has {len(self.shares)} entries: must have {n_segments}, one per segment")
 
     @abstractmethod
     def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
@@ -283,15 +283,7 @@ class TurningController(SegmentController):
     def __init__(
         self, pattern: Controller, section: TurningKind, n_segments: int, n_muscles: int, control_timestep_s: float
     ) -> None:
-        """Wraps a pattern.
-
-        Args:
-            pattern: The controller that makes it, for ``n_muscles``.
-            section: How the worm turns.
-            n_segments: Segments.
-            n_muscles: Twice that: left, right, segment by segment.
-            control_timestep_s: Control step, s.
-        """
+        """Wraps the controller that makes the pattern for all ``n_muscles``."""
         super().__init__(n_segments, n_muscles)
         if self._muscles_per_segment != len(HALVES):
             raise ConfigError(f"turning needs half-rings: {2 * n_segments} muscles, not {n_muscles}")

@@ -69,7 +69,7 @@ class Gate:
         return 1.0 / (1.0 + self.factor * np.exp(self.slope_per_mV * (self.midpoint_mV - potential_mV)))
 
     def toolbox_start(self, potential_mV: Array | float) -> Array:
-        """Returns the value at which SNS-Toolbox 1.5.2 starts a gate: the slope's sign the other way round."""
+        """Returns the value at which SNS-Toolbox 1.5.2 starts a gate: with the slope's sign reversed."""
         return 1.0 / (1.0 + self.factor * np.exp(self.slope_per_mV * (potential_mV - self.midpoint_mV)))
 
 

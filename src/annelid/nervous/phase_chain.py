@@ -112,7 +112,7 @@ def phase_chain(
     """Builds one side of the salamander's network for any number of segments; Ijspeert et al. 2007, Fig. 1.
 
     Args:
-        n_body: Body oscillators in a chain, at least 2, coupled to their neighbours both ways.
+        n_body: Body oscillators in a chain, at least 2, coupled to their neighbours in both directions.
         lag_rad: Phase by which each follows the one before it, rad; default one wave on the body, 2 pi / n_body.
         coupling_per_s: w within the body and between the limbs, 1/s.
         limbs: Adds two limb oscillators at the end, the fore limb's and the hind limb's, in antiphase with each

@@ -1,4 +1,4 @@
-"""A peristalsis network whose rhythm goes on whatever the sensors say: the paper's neurons, joined differently.
+"""A peristalsis network whose rhythm goes on whatever the sensors report: the paper's neurons, joined differently.
 
 Each segment has the half-centre of the paper, a hold and a relay. In the paper's network stretch sensors keep segments
 expanded, so that a sensor that is always on, or off too early, decides the order. Here, by our own design:

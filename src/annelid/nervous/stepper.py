@@ -141,7 +141,7 @@ class Stepper:
 
         Args:
             gate_start: ``"steady"``: slow gates at their steady state at the initial potential;
-                ``"toolbox"``: as SNS-Toolbox 1.5.2 starts them, with the slope's sign the other way round.
+                ``"toolbox"``: as SNS-Toolbox 1.5.2 starts them, with the slope's sign reversed.
 
         Raises:
             ConfigError: An unknown start.

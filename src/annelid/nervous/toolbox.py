@@ -108,9 +108,9 @@ def export_network(network: Network) -> Any:
 
     Raises:
         MissingDependency: SNS-Toolbox or torch is not installed.
-        ConfigError: Something the toolbox cannot say: two synapses between the same two neurons, an input
-            into several neurons, a neuron without leak, or more than one instantaneous or two slow gates in
-            a channel, spiking neurons, or spiking or modulatory synapses; the sentence names it.
+        ConfigError: Something the toolbox cannot express: two synapses between the same two neurons, an input into
+            several neurons, a neuron without leak, more than one instantaneous or two slow gates in a channel, spiking
+            neurons, or spiking or modulatory synapses; the sentence names it.
     """
     toolbox = _toolbox()
     if not network.neurons:

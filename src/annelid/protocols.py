@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,3 +183,46 @@ class Watched(Protocol):
     def alarm(self) -> str | None:
         """Returns one sentence naming the quantity, its value and its limit, or None while all is well."""
         ...
+
+
+class SavedAndRecorded:
+    """Base of plants and controllers whose state is a dictionary of arrays and whose signals are listed in a table.
+
+    Attributes:
+        recorded: Name, dimensions, unit and meaning of what it may record; signals without a value are left out.
+    """
+
+    recorded: ClassVar[tuple[tuple[str, tuple[str, ...], str, str], ...]] = ()
+    _now: dict[str, NDArray[Any]]
+
+    def recordable(self) -> Recordable:
+        """Names the signals that `read` returns."""
+        values = self._values()
+        listed = (row for row in self.recorded if row[0] in values)
+        signals = (Signal(name, dims, np.shape(values[name]), units, meaning) for name, dims, units, meaning in listed)
+        return Recordable(tuple(signals), self._coords(), self._attrs())
+
+    def read(self, frame: bool) -> Values:
+        """Reads the signals that `recordable` names; there are none at frame rate."""
+        return {} if frame else self._values()
+
+    def get_state(self) -> State:
+        """Returns copies of all that the next step depends on."""
+        return {name: array.copy() for name, array in self._now.items()}
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        for name, array in self._now.items():
+            array[...] = state[name]
+
+    def _values(self) -> Values:
+        """Present values of all that is recorded."""
+        return {}
+
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        """Labels of the signals' dimensions."""
+        return {}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        """Constants worth an attribute of the run file."""
+        return {}

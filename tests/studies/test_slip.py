@@ -10,8 +10,7 @@ import pytest
 from annelid.analysis.detector import DetectionScore
 from annelid.analysis.gait import SlipCost
 from annelid.config import load_config
-from annelid.control.pressure import PressureSns
-from annelid.control.sns import Sns
+from annelid.control.sns import PressureSns, Sns
 from annelid.errors import ConfigError
 from annelid.experiment.store import Store
 from annelid_studies.slip.detection import CASES, write_scores

@@ -33,7 +33,7 @@ from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 
 _MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
-    "Contraction": "annelid.control.program",
+    "Contraction": "annelid.control.open_loop",
     "DescendingDrive": "annelid.control.robust",
 }
 """Sections that are no kinds, which the first edition had here."""

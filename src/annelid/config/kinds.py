@@ -22,8 +22,8 @@ from annelid.registry import Registry
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
-    from annelid.control.program import Contraction
-    from annelid.control.steering import Steering
+    from annelid.control.open_loop import Contraction
+    from annelid.control.turning import Steering
     from annelid.protocols import Controller, Plant
 
 
@@ -152,7 +152,7 @@ class Goals(NamedTuple):
 class TurningKind(Kind):
     """Base of the sections that scale the two sides of a worm with half-rings."""
 
-    registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.steering")
+    registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.turning")
     default: ClassVar[str] = "constant"
 
     def check_with(self, config: RunConfig) -> None:

@@ -15,7 +15,7 @@ from annelid.live.living import knobs_of
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
-from annelid.nervous.layout import by_segment, role_of
+from annelid.nervous.drawing import by_segment, role_of
 
 if TYPE_CHECKING:
     import viser

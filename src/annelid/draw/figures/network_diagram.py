@@ -21,8 +21,8 @@ from annelid.nervous.drawing import (
     frame_of,
     network_shapes,
     neuron_shapes,
+    role_of,
 )
-from annelid.nervous.layout import role_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,8 +88,8 @@ def _paint(axes: Axes, shapes: Iterable[Shape], frame: tuple[float, float, float
     for shape in shapes:
         if isinstance(shape, Words):
             axes.text(
-                float(shape.place[0]),
-                float(shape.place[1]),
+                shape.place.real,
+                shape.place.imag,
                 plain(shape.text),
                 fontsize=shape.size_pt,
                 horizontalalignment=shape.across,
@@ -99,7 +99,7 @@ def _paint(axes: Axes, shapes: Iterable[Shape], frame: tuple[float, float, float
             )
         else:
             patch = Polygon(
-                shape.points,
+                np.column_stack([shape.points.real, shape.points.imag]),
                 closed=bool(shape.fill),
                 facecolor=shape.fill or "none",
                 edgecolor=shape.color,
@@ -132,17 +132,17 @@ def _key_shapes(entries: Sequence[str], meanings: Sequence[str]) -> tuple[list[S
     shapes: list[Shape] = []
     for index, entry in enumerate(entries):
         x, y = _KEY_COLUMNS[index // n_rows], height - _ROW * (index % n_rows + 0.5)
-        path = np.linspace([x, y], [x + 0.93, y], 121)
+        path = np.linspace(complex(x, y), complex(x + 0.93, y), 121)
         what = entry.removesuffix(" synapse")
         if what in COLORS:
             shapes += connection_shapes(path, what)
         elif "neuron" in entry:
-            shapes += neuron_shapes(path.mean(axis=0), "", spiking="spiking" in entry, gated="gated" in entry)
+            shapes += neuron_shapes(path.mean(), "", spiking="spiking" in entry, gated="gated" in entry)
         else:
-            shapes += arrow_shapes(path[[0, -1]])
+            shapes += arrow_shapes(path[0], path[-1])
             rim = path[-1 if entry.startswith("input") else 0]
-            shapes.append(Line(rim + np.array([[0.0, -0.15], [0.0, 0.15]]), "black"))
-        shapes.append(Words(entry, np.array([x + 1.22, y]), 9.0, "left"))
+            shapes.append(Line(rim + np.array([-0.15j, 0.15j]), "black"))
+        shapes.append(Words(entry, complex(x + 1.22, y), 9.0, "left"))
     for row, meaning in enumerate(reversed(rows)):
-        shapes.append(Words(meaning, np.array([_KEY_COLUMNS[0], 0.45 + _ROW * row]), 9.0, "left"))
+        shapes.append(Words(meaning, complex(_KEY_COLUMNS[0], 0.45 + _ROW * row), 9.0, "left"))
     return shapes, height

@@ -11,7 +11,7 @@ from annelid.analysis.detector import detect_slip, score_detections
 from annelid.analysis.paper import ROBOT_ELONGATION_M
 from annelid.analysis.summary import middle_deficit
 from annelid.analysis.track import forward_position
-from annelid.control.program import Program
+from annelid.control.open_loop import Program
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims.evidence import (
     LABELS,

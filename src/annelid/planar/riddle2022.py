@@ -30,7 +30,6 @@ class PlanarBody(PlanarWorm):
         default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
     )
 
-
     def build(self, config: RunConfig) -> Riddle2022Plant:
         """Builds the worm, as `BodyKind.build`."""
         return Riddle2022Plant(self, config.clock)

@@ -13,7 +13,8 @@ from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
 from annelid.analysis import Summary, summary
 from annelid.analysis.paper import published
-from annelid.config import check_config, load_config
+from annelid.config import check_config, field_paths, load_config, preset_names
+from annelid.config.run import published_worms
 from annelid.simulation.runfile import Run
 
 PROMISED = {
@@ -24,7 +25,7 @@ PROMISED = {
 
 
 def run_of(data: xr.Dataset, **tree: Any) -> Run:
-    config = check_config({"name": "riddle2023"} | tree)
+    config = check_config({"name": "riddle2023", "published": "riddle2023"} | tree)
     return Run(Path("run.nc"), data, config, "complete", "")
 
 
@@ -100,10 +101,29 @@ def test_half_rings_add_up_to_a_ring_and_share_a_segment() -> None:
 
 
 def test_published_numbers_stand_beside_the_papers_worm_only() -> None:
-    paper = published(check_config({"name": "riddle2023-rods"}))
+    paper = published(check_config({"published": "riddle2023"}))
     assert paper["elongation_first_helix_pp_m"].value == (0.0420, 0.0255, 0.0402)
-    assert not published(check_config({"name": "riddle2023", "body": {"mesh": {"n_segments": 4}}}))
-    assert not published(check_config({"name": "mine"}))
+    assert not published(check_config({"published": "riddle2023", "body": {"mesh": {"n_segments": 4}}}))
+    assert not published(check_config({"published": "riddle2022"}))
+    assert not published(check_config({"name": "riddle2023"}))
+
+
+def test_published_numbers_go_with_a_preset_whatever_a_worm_is_called(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "riddle2023-rods"\n', encoding="utf-8")
+    assert published(load_config(mine)) == published(load_config("riddle2023"))
+    assert {name for name in preset_names() if published(load_config(name))} == {
+        "riddle2022-planar", "riddle2023", "riddle2023-fast", "riddle2023-rods", "wang",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(published_worms()))
+def test_what_is_published_is_of_fields_that_exist(name: str) -> None:
+    for worm in published_worms()[name]:
+        assert set(worm) == {"given", "numbers"}
+        assert set(worm["numbers"]) <= set(Summary.__slots__)
+        assert set(worm["given"]) <= {*field_paths(), "body.n_segments"}
+        assert all(len(entry) == 3 for entry in worm["numbers"].values())
 
 
 @pytest.mark.parametrize(
@@ -119,7 +139,7 @@ def test_published_numbers_stand_beside_the_papers_worm_only() -> None:
 def test_planar_periods(n_segments: int, tau_ms: float, gain: float, period_s: float | None) -> None:
     config = check_config(
         {
-            "name": "riddle2022-planar",
+            "published": "riddle2022",
             "body": {"kind": "riddle2022", "n_segments": n_segments, "gain": gain},
             "controller": {"gate_time_constant_ms": tau_ms},
         }

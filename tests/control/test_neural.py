@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid.config.sensor import StretchSensor as SensorSection
+from annelid.config.run import StretchSensor as SensorSection
 from annelid.control import AdaptiveController, SnsController
 from annelid.control.base import design_of
 from annelid.control.robust import RobustController, RobustSns

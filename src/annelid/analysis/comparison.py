@@ -18,7 +18,7 @@ Number = float | Sequence[float | None] | None
 
 _NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
 # Fields of the configuration that change nothing in a run.
-_WORDS = ("name", "summary")
+_WORDS = ("name", "summary", "published")
 
 
 @dataclass(frozen=True, slots=True)

@@ -85,16 +85,17 @@ def build(
 
 
 def presets(
-    name: Annotated[str | None, typer.Argument(help="Print this preset's commented TOML.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
 ) -> None:
-    """List the presets, or print one.
+    """List the presets, or print one: every field with its source, and the preset that it is inherited from.
 
-    What it prints is a start for a file of your own.
+    What it prints is a start for a file of your own. Of a file that extends a preset it prints the whole worm, too.
 
     \b
     annelid presets
     annelid presets riddle2023 > my.toml
+    annelid presets my.toml
     annelid presets riddle2023 --fields
     """
     from annelid.config import load_config, preset_names, preset_text

@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from inspect import get_annotations
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -212,10 +211,6 @@ class BodyKind(Kind):
         """Distance of the walls that a planar worm crawls between; None where there are none."""
         return None
 
-    def published_period_s(self, config: RunConfig) -> float | None:
-        """Returns the period that was published for this very worm, s; None where none was."""
-        return None
-
     if TYPE_CHECKING:
 
         @property
@@ -252,8 +247,7 @@ def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
 
 def every_kind() -> list[type[Kind]]:
     """Returns the kinds of all families."""
-    # The families of arenas and of the body's parts are defined beside them.
-    import_module("annelid.config.run")
+    # The families of the body's parts are defined beside them.
     BodyKind.registry.all()
     return [kind for family in Kind.__subclasses__() for kind in family.registry.all().values()]
 

@@ -300,11 +300,9 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     """
     if not references(config) or not isinstance(config.body, WormBody):
         return ""
-    changed = changed_fields(config)
+    preset, changed = changed_fields(config)
     if changed:
-        return (
-            f"this run differs from {config.name} in {listed(changed)}: the references are those of the unchanged worm"
-        )
+        return f"this run differs from {preset} in {listed(changed)}: the references are those of the unchanged worm"
     if not stands_for_the_papers(config) or has_rigid_crossings(config) or numbers.status != "complete":
         return ""
     found = agreement(numbers)

@@ -30,25 +30,10 @@ class PlanarBody(PlanarWorm):
         default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
     )
 
-    def published_period_s(self, config: RunConfig) -> float | None:
-        """Returns the period that the authors' code gives for their time constants and gains, s."""
-        gate_ms = float(getattr(config.controller, "gate_time_constant_ms", 0.0))
-        return _PUBLISHED_PERIODS_S.get((self.n_segments, gate_ms, self.gain))
-
     def build(self, config: RunConfig) -> Riddle2022Plant:
         """Builds the worm, as `BodyKind.build`."""
         return Riddle2022Plant(self, config.clock)
 
-
-# (segments, tau_h,max in ms, gain): period in s.
-_PUBLISHED_PERIODS_S = {
-    (3, 300.0, 1.3): 2.625,
-    (6, 300.0, 1.3): 5.250,
-    (3, 200.0, 1.9): 1.867,
-    (6, 200.0, 1.9): 3.734,
-    (3, 100.0, 3.6): 1.124,
-    (6, 100.0, 3.6): 2.248,
-}
 
 # A spool at 20 turns a minute takes up 2 pi 20 / 60 cm/s per cm of radius; the authors' loop moves 1/300 of that
 # number a millisecond for each unit of gain and of height error, so per second it is 1000 / 300 of it.

@@ -12,7 +12,7 @@ from annelid.errors import ConfigError
 from annelid.simulation.checkpoint import Checkpoint
 from annelid.simulation.runfile import FILE_NAME, Run, read_checkpoint, read_config
 
-_FREE = frozenset({"duration_s", "record", "name", "summary"})
+_FREE = frozenset({"duration_s", "record", "name", "summary", "published"})
 
 
 @dataclass(frozen=True, slots=True)

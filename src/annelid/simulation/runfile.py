@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,10 +16,11 @@ import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
-from annelid.errors import ConfigError, RunFileError, listed
+from annelid.errors import ConfigError, RunFileError, UnreadableText, listed
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
 from annelid.simulation.digest import Finding, examine
 from annelid.simulation.lock import LOCK_NAME
+from annelid.textfiles import parse_json
 
 if TYPE_CHECKING:
     import h5py
@@ -28,7 +31,7 @@ MESSAGE_BYTES = 512
 WARNINGS = "warnings"
 WARNING_BYTES = 8192
 SCHEMA = "schema_version"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Of the file's names and their meanings; a change that an older reader would take for something else raises it, and
 `migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
@@ -132,6 +135,7 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
 
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
+    Up to schema 1 the name of a configuration decided which published numbers its runs were compared with.
 
     Args:
         data: All variables and attributes of a run file.
@@ -139,7 +143,19 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
         data = data.assign({name: value for name, value in added.items() if name not in data})
+    if data.attrs.get(SCHEMA, 0) < 2:
+        data = data.assign_attrs(config=_with_published(data.attrs["config"]))
     return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
+
+
+def _with_published(config: str) -> str:
+    try:
+        tree = parse_json(config, "the configuration")
+        if named := re.match(r"riddle2022|riddle2023|wang\Z", tree["name"]):
+            return json.dumps(tree | {"published": named[0]})
+    except (UnreadableText, KeyError, TypeError):
+        pass  # What is wrong with it, its reader says.
+    return config
 
 
 @contextmanager

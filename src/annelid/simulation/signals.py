@@ -7,7 +7,7 @@ from annelid.simulation.anatomy import Anatomy
 
 
 def worm_signals(anatomy: Anatomy) -> tuple[Signal, ...]:
-    """Names what a worm of this anatomy records, in the order of docs/architecture.md."""
+    """Names what a worm of this anatomy records."""
     n, m, geometry = anatomy.n_segments, anatomy.n_muscles, anatomy.geometry
     sensors, springs, crossings = anatomy.rest_stretch_m.shape, len(geometry.springs), geometry.n_crossings
     signals = [

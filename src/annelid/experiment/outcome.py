@@ -76,12 +76,7 @@ def write_outcome(read: Outcome, path: Path, reader: str) -> None:
 
 
 def read_outcome(path: Path, reader: str) -> Outcome:
-    """Reads an outcome that `write_outcome` wrote.
-
-    Raises:
-        ValueError: The file is damaged, or other code read the run than ``reader``.
-        OSError: There is no such file.
-    """
+    """Reads an outcome; a ValueError where its file is damaged, or other code read the run than ``reader``."""
     try:
         content = _Written.model_validate_json(path.read_bytes())
     except ValidationError as error:

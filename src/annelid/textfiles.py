@@ -109,7 +109,7 @@ def toml_text(tree: Mapping[str, Any], heading: str = "") -> str:
 
     document = tomlkit.document()
     for line in heading.splitlines():
-        # A comment may hold no control characters, and a file no half of a pair of surrogates.
+        # A comment may have no control characters, and a file no half of a pair of surrogates.
         document.add(tomlkit.comment(printable(line)))
     document.update(_plain(tree))
     return tomlkit.dumps(document)

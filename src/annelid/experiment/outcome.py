@@ -48,7 +48,7 @@ class Outcome:
 
 
 class _Written(BaseModel):
-    """An outcome as its file holds it, with the mark of the code that read it."""
+    """An outcome as it stands in its file, with the mark of the code that read it."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 

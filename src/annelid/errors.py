@@ -94,7 +94,7 @@ def _require(what: str, is_met: Callable[[Any], bool], values: Mapping[str, obje
 
 
 def shortened(text: str, most: int = MOST_SHOWN) -> str:
-    """Returns a text as an error sentence can hold it: its beginning and its end where it is long."""
+    """Returns a text as it fits into an error sentence: its beginning and its end where it is long."""
     return text if len(text) <= most else f"{text[: most // 2]} .. {text[-most // 4 :]}"
 
 
@@ -127,7 +127,7 @@ def suggest(name: str, valid: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Joins names by commas, as many as an error sentence can hold."""
+    """Joins names by commas, as many as fit into an error sentence."""
     every = list(names)
     words, length = [], 0
     for name in map(shortened, every):

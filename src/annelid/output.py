@@ -18,10 +18,7 @@ from annelid.text import printable
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Gives a hidden draft beside a file, with the same suffix, which is moved into its place once the block is done.
 
-    Until then what is there stays; the draft of a block that ends in an error is removed.
-
-    Raises:
-        RunFileError: The file cannot be written, for example because the disk is full.
+    Until then what is there stays; the draft goes where the block ends in an error. An OSError becomes a RunFileError.
     """
     path = Path(path)
     target = path.resolve()
@@ -76,16 +73,9 @@ def _cell(text: str) -> str:
 
 
 def with_suffix(path: str | Path, suffixes: tuple[str, ...], what: str, default: str | None = None) -> Path:
-    """Returns the path of a file to write with a suffix of those allowed, which are in lower case.
+    """Returns the path of a file to write, of which the suffix must be one of those given in lower case.
 
-    Args:
-        path: The file to write.
-        suffixes: The suffixes allowed.
-        what: What is written, for the sentence.
-        default: Suffix to add where the name has none; None refuses such a name.
-
-    Raises:
-        RunFileError: Another suffix, or the path is a folder.
+    A name without a suffix gets the default one, or is refused. What is written is named in the sentence.
     """
     path = Path(path)
     if path.is_dir():

@@ -41,22 +41,12 @@ class Registry(Generic[Item]):
     """Things of one sort by their names."""
 
     def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError) -> None:
-        """Makes an empty registry.
-
-        Args:
-            what: What the things are, for messages.
-            homes: Modules and packages of annelid that register some; they are imported on first use.
-            error: What is raised for an unknown name.
-        """
+        """Makes an empty registry of what is called so in messages; its homes register some, imported on first use."""
         self._what, self._homes, self._error = what, homes, error
         self._known: dict[str, Item] = {}
 
     def add(self, name: str, item: Item) -> Item:
-        """Registers a thing, and returns it.
-
-        Raises:
-            ConfigError: Another one has that name; the same one of a module that is loaded anew takes its own place.
-        """
+        """Registers a thing, and returns it; the same one of a module that is loaded anew takes its own place."""
         other = self._known.setdefault(name, item)
         if _origin(other) != _origin(item):
             raise ConfigError(f"{_origin(item)}: {self._what} {shown(name)} is taken by {_origin(other)}")
@@ -71,11 +61,7 @@ class Registry(Generic[Item]):
         return dict(sorted(self._known.items()))
 
     def find(self, name: str) -> Item:
-        """Returns the thing of a name.
-
-        Raises:
-            AnnelidError: There is none; the sentence suggests the nearest.
-        """
+        """Returns the thing of a name; the error where there is none suggests the nearest."""
         known = self.all()
         if name not in known:
             raise self._error(f"unknown {self._what} {shown(name)}: {suggest(name, known)}")

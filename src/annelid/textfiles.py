@@ -70,11 +70,7 @@ def read_json(path: Path, what: str = "") -> Any:
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Reads TOML that an error calls by a name.
-
-    Raises:
-        UnreadableText: It is not valid TOML, too long or too deep.
-    """
+    """Reads TOML that an `UnreadableText` calls by a name where it is not valid, too long or too deep."""
     if _has_long_key(_bounded(text, name, len(text))):
         raise _too_deep(name)
     return _parsed(tomllib.loads, "TOML", text, name)
@@ -97,11 +93,7 @@ def _parsed(load: Callable[[str], Any], language: str, text: str, name: str) -> 
 
 
 def check_depth(tree: Any, name: str) -> None:
-    """Refuses lists and mappings nested deeper than `MOST_LEVELS`, such as one that contains itself.
-
-    Raises:
-        UnreadableText: It is too deep.
-    """
+    """Refuses lists and mappings nested deeper than `MOST_LEVELS`, such as one that contains itself."""
     open_nodes = [(tree, 0)]
     while open_nodes:
         node, level = open_nodes.pop()
@@ -117,7 +109,7 @@ def toml_text(tree: Mapping[str, Any], heading: str = "") -> str:
 
     document = tomlkit.document()
     for line in heading.splitlines():
-        # A comment may hold no control characters, and a file no half of a pair of surrogates.
+        # A comment may have no control characters, and a file no half of a pair of surrogates.
         document.add(tomlkit.comment(printable(line)))
     document.update(_plain(tree))
     return tomlkit.dumps(document)

@@ -540,7 +540,7 @@ def test_a_folder_in_use_is_refused_and_left_alone(tiny: Uncertainty, tmp_path: 
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
     other = load_config(tiny.config.model_dump(), {"arena.friction": 0.5})
     before = files(tiny.folder)
-    with pytest.raises(ConfigError, match="holds another run"):
+    with pytest.raises(ConfigError, match="has another run in it"):
         uncertainty(other, 2, tiny.folder)
     assert files(tiny.folder) == before
     assert open_run(tiny.folder).config == tiny.config

@@ -142,7 +142,7 @@ app = typer.Typer(
 def main() -> None:
     """Entry point of the command ``annelid``."""
     warnings.showwarning = lambda message, *_, **__: complain(f"warning: {message}")
-    # Further signals end a command in good order; one that the process was told to ignore stays ignored.
+    # Further signals end a command in good order; one that the process ignores from its start stays ignored.
     for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)

@@ -34,7 +34,7 @@ def show(
     run: RunPath,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON, in SI units.")] = False,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Only tell whether every byte of the file is as it was when the run ended.")
+        bool, typer.Option("--verify", help="Only say whether every byte of the file is as it was when the run ended.")
     ] = False,
 ) -> None:
     """Print the numbers of a run.

@@ -68,7 +68,7 @@ def run_command(
     jobs: Annotated[
         int | None, typer.Option(min=1, max=4096, help="Runs at a time with --uncertainty  [default: as many as cores]")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the run that the folder holds.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars and no table.")] = False,
 ) -> None:

@@ -83,14 +83,14 @@ def limit_cycle_command(
         output = plot_path(output)
         refuse_existing(output, force)
     config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
-    ways = cast(list["Time"], times or list(get_args(Time)))
-    cycles = {way: limit_cycle(config, time=way, neuron=neuron, threshold_mV=threshold) for way in ways}
+    wanted = cast(list["Time"], times or list(get_args(Time)))
+    cycles = {time: limit_cycle(config, time=time, neuron=neuron, threshold_mV=threshold) for time in wanted}
     if as_json:
         typer.echo(json.dumps({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)))
     else:
         Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
     if output is not None:
-        named = {TIMES[way]: cycle for way, cycle in cycles.items()}
+        named = {TIMES[time]: cycle for time, cycle in cycles.items()}
         typer.echo(limit_cycle_figure(named, output), err=as_json)
 
 

@@ -135,7 +135,7 @@ def doctor(
         bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
     ] = False,
 ) -> None:
-    """Tell what is missing and how to install it.
+    """Say what is missing and how to install it.
 
     The report names no user, no machine and no folder.
 

@@ -59,10 +59,7 @@ def own_code() -> tuple[str, str]:
 def attempt(task: Task) -> bytes | None:
     """Computes a run and publishes it in its store; returns the file to send where its folder is not on this machine.
 
-    Raises:
-        ClusterError: This worker has other code.
-        AnnelidError: The run cannot be built or written. A run that a guard stops is no error.
-        KeyboardInterrupt: It was interrupted.
+    A run that a guard stops is no error; an interrupted one is a KeyboardInterrupt.
     """
     if task.code != own_code():
         raise ClusterError(

@@ -67,7 +67,7 @@ PARAMETERS = {
 }
 """What can be fitted."""
 DEFAULT_FREE = ("young_modulus", "dry_friction", "cable_friction")
-"""What one loop can tell apart; springs and strands resist alike, so that their stiffnesses only shift between them."""
+"""What one loop can distinguish; springs and strands resist alike, so that their stiffnesses only shift between them."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class Identifiability:
         directions: Those combinations, a row each, ``(p, p)``.
         relative_error: Standard error of each parameter relative to its value if residuals were independent, ``(p,)``;
             infinite where the data say nothing.
-        correlation: Of the errors, ``(p, p)``: +1 or -1 for two that cannot be told apart.
+        correlation: Of the errors, ``(p, p)``: +1 or -1 for two that cannot be distinguished.
     """
 
     singular_values_N: Array

@@ -1,14 +1,12 @@
 """The load frame: loops of force against displacement of a ring's cable, measured or simulated.
 
 In the virtual frame the cable of one interior ring is slowly wound in and let out, and its tension read. The worm
-floats without weight and without ground. The frame is there for the mesh's own resistance; gravity would press the
-lower half of the free ends and add a force that depends on how the physical segment was supported, which is not known.
-The ring's forces balance one another, so nothing has to fix the worm in place.
+floats without weight and without ground, for the mesh's own resistance only: how the physical segment was supported is
+not known. The ring's forces balance one another, so nothing has to fix the worm in place.
 
-The ring's length is prescribed through a stiff spring that pulls and pushes. A cable that goes slack and taut again
-would be the truer picture, but it is a switch that large steps do not resolve (at 20 ms the tension jumps between 0 and
-twice its mean); so where friction keeps the ring back as it is let out the tension reads below 0, as it did on the
-robot.
+The ring's length is prescribed through a stiff spring that pulls and pushes: large steps do not resolve a cable that
+goes slack and taut again (at 20 ms the tension jumps between 0 and twice its mean). So where friction keeps the ring
+back as it is let out the tension reads below 0, as it did on the robot.
 """
 
 from __future__ import annotations
@@ -81,16 +79,9 @@ class Loop:
         return 1.0 - back / done
 
     def branches(self, at_m: Array) -> Array:
-        """Mean force about evenly spaced displacements on both branches.
+        """Mean force, N, about displacements on both branches, loading first, ``(2, k)``.
 
-        Args:
-            at_m: Displacements, ``(k,)``, at least two, evenly spaced; a mean reaches half a spacing to both sides.
-
-        Returns:
-            Loading first, N, ``(2, k)``.
-
-        Raises:
-            AnnelidError: The loop has no sample near one of the displacements.
+        There are at least two displacements, ``(k,)``, evenly spaced; a mean reaches half a spacing to both sides.
         """
         half = (at_m[1] - at_m[0]) / 2
         edges = np.append(at_m - half, at_m[-1] + half)
@@ -110,11 +101,7 @@ class Loop:
 def read_loop(path: str | Path | None = None) -> Loop:
     """Reads a measured loop: columns displacement (mm), force (N) and perhaps more, comma-separated, no header.
 
-    Args:
-        path: The file; None is the load-frame test that comes with annelid (its source is in ``data/README.md``).
-
-    Raises:
-        AnnelidError: The file cannot be read as numbers, or its displacement does not rise and fall again.
+    Without a path it is the load-frame test that comes with annelid (its source is in ``data/README.md``).
     """
     source = resources.files("annelid") / "data" / MEASURED if path is None else Path(path)
     text = read_text(source) if isinstance(source, Path) else source.read_text(encoding="utf-8")
@@ -135,10 +122,8 @@ def wrap_factors(friction: float) -> tuple[float, float]:
 
     The tension of a cable that slides round a body falls as ``exp(-mu angle)`` from the end that moves first
     (Euler and Eytelwein). With ``m = mu * wrap angle`` its mean is ``(1 - exp(-m)) / m`` of the force at that end
-    when wound in and ``(exp(m) - 1) / m`` when let out, so that the two forces differ by ``exp(m)``.
-
-    Args:
-        friction: m, the exponent of the whole wrap; 0 for a cable that slides freely.
+    when wound in and ``(exp(m) - 1) / m`` when let out, so that the two forces differ by ``exp(m)``; m = 0 is a cable
+    that slides freely.
     """
     if friction == 0.0:
         return 1.0, 1.0
@@ -150,9 +135,6 @@ def cable_force(loop: Loop, friction: float) -> Loop:
 
     Where the cable turns it first sticks: its end keeps pulling less while nothing moves. That transition takes no
     displacement and is left out.
-
-    Raises:
-        AnnelidError: The exponent of the wrap is negative or not finite.
     """
     if not 0.0 <= friction < inf:
         raise AnnelidError(f"cable friction = {friction:g} must be a finite number of at least 0")

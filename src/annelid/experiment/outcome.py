@@ -48,7 +48,7 @@ class Outcome:
 
 
 class _Written(BaseModel):
-    """An outcome as its file holds it, with the mark of the code that read it."""
+    """An outcome as it stands in its file, with the mark of the code that read it."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -76,12 +76,7 @@ def write_outcome(read: Outcome, path: Path, reader: str) -> None:
 
 
 def read_outcome(path: Path, reader: str) -> Outcome:
-    """Reads an outcome that `write_outcome` wrote.
-
-    Raises:
-        ValueError: The file is damaged, or other code read the run than ``reader``.
-        OSError: There is no such file.
-    """
+    """Reads an outcome; a ValueError where its file is damaged, or other code read the run than ``reader``."""
     try:
         content = _Written.model_validate_json(path.read_bytes())
     except ValidationError as error:

@@ -86,9 +86,7 @@ class Store:
             workers: Who computes its runs; None for processes of this machine.
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
         """
-        self.folder = folder
-        self._workers = workers
-        self._keep: Keep = keep
+        self.folder, self._workers, self._keep = folder, workers, keep
 
     def path(self, case: Case) -> Path:
         """Folder of a case's run."""
@@ -105,11 +103,7 @@ class Store:
         return found
 
     def run(self, case: Case) -> Run:
-        """Opens the run of a case that has been computed.
-
-        Raises:
-            RunFileError: It has not, or its file is damaged.
-        """
+        """Opens the run of a case that has been computed; a RunFileError if it has not."""
         return open_run(self.path(case))
 
     def _stored(self, case: Case) -> Outcome | None:

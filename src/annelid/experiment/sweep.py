@@ -241,11 +241,7 @@ def swept(
 
 
 def plan_of(study: Study) -> Plan:
-    """Lays out the runs of a study.
-
-    Raises:
-        ConfigError: The preset, a fixed field or a varied field is refused, or there are too many runs.
-    """
+    """Lays out the runs of a study; refuses too many of them."""
     base = load_config(study.preset, flattened(study.set))
     variables = variables_of(study.vary, base)
     fields = tuple(variable.field for variable in variables)

@@ -271,7 +271,7 @@ def uncertainty(
     if overwrite or not (folder / RUNS).is_dir():
         refuse_used_folder(folder, overwrite)
     elif (folder / FILE_NAME).exists() and read_config(folder) != config:
-        raise ConfigError(f"the output folder {folder} holds another run: name another, or allow overwriting")
+        raise ConfigError(f"the output folder {folder} has another run in it: name another, or allow overwriting")
     outcomes = Store(folder / RUNS).compute([case for _, case in variants], jobs=jobs, progress=progress)
     done = tuple(_done(kind, case.changes, outcomes[case_key(case)]) for kind, case in variants)
     nominal = outcomes[case_key(variants[0][1])]
@@ -384,7 +384,7 @@ def _done(kind: Kind, changed: Mapping[str, Any], of: Outcome) -> VariantRun:
 
 
 def uncertainty_table(result: Uncertainty) -> Table:
-    """Lays out values and errors as a table for the terminal; quantities that no run knows are left out."""
+    """Lays out values and errors as a table for the terminal; quantities that no run has are left out."""
     untold = f" ({result.n_untold} too short to tell)" if result.n_untold else ""
     samples = f"{result.n_ordered} of {len(result.of('drawn'))} Monte Carlo samples kept an ordered rhythm{untold}"
     table = framed_table(title=f"{result.config.name}: error bars, {samples}", caption="\n".join(_remarks(result)))

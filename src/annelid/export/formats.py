@@ -33,7 +33,7 @@ class Format:
 
     Attributes:
         name: What it is called on the command line.
-        default: What it writes in the run's folder unless told otherwise; without a suffix, a folder of files.
+        default: What it writes in the run's folder unless a path is given; without a suffix, a folder of files.
         suffix: How the name of its files ends.
         options: Options of the selection that it takes.
         write: Writes a run to a path, calling back with steps done and in all; returns the files.

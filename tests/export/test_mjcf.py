@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body.mjcf import mjcf_text
+from annelid.body.assemble import mjcf_text
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.export.formats import write_mjcf

@@ -180,13 +180,11 @@ def print_results(paths: Iterable[object], *tables: Table, quiet: bool) -> None:
 def print_table(run: Run) -> None:
     """Prints the numbers of a run, those to compare with beside them, and what follows."""
     from annelid.analysis import gait, summary
-    from annelid.draw.table import add_gait, closing_sentence, summary_table
+    from annelid.draw.table import closing_sentence, summary_table
     from annelid.terminal import Console
 
     numbers = summary(run)
-    table = summary_table(numbers, run.config)
-    add_gait(table, gait(run))
-    Console().print(table)
+    Console().print(summary_table(numbers, run.config, gait(run)))
     for doubt in run.warnings:
         typer.echo(f"warning: {doubt}")
     if closing := closing_sentence(numbers, run.config):

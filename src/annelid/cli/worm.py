@@ -73,7 +73,7 @@ def build(
     annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
-    from annelid.body.mjcf import mjcf_text
+    from annelid.body.assemble import mjcf_text
     from annelid.output import write_text
 
     refuse_existing(output, force)
@@ -82,16 +82,17 @@ def build(
 
 
 def presets(
-    name: Annotated[str | None, typer.Argument(help="Print this preset's commented TOML.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
 ) -> None:
-    """List the presets, or print one.
+    """List the presets, or print one: every field with its source, and the preset that it is inherited from.
 
-    What it prints is a start for a file of your own.
+    What it prints is a start for a file of your own. Of a file that extends a preset it prints the whole worm, too.
 
     \b
     annelid presets
     annelid presets riddle2023 > my.toml
+    annelid presets my.toml
     annelid presets riddle2023 --fields
     """
     from annelid.config import load_config, preset_names, preset_text
@@ -145,7 +146,7 @@ def doctor(
     from annelid.draw.doctor import examine
 
     if report:
-        from annelid.draw.bug_report import bug_report
+        from annelid.draw.doctor import bug_report
 
         typer.echo(bug_report(list(examine())))
     else:

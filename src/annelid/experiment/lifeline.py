@@ -29,7 +29,7 @@ def _end(wait: Callable[[], object]) -> None:
     try:
         wait()
     finally:
-        # Ends a run in good order (`simulation.interruption`), and does nothing outside of one.
+        # Ends a run in good order (`simulation.progress`), and does nothing outside of one.
         _thread.interrupt_main(signal.SIGTERM)
         time.sleep(GRACE_S)
         os._exit(1)

@@ -26,7 +26,7 @@ from annelid.body import build_spec, compile_spec, mesh_of
 from annelid.body.actuation import crossing_site, ring_names
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
-from annelid.draw.lines import load_frame_figure
+from annelid.draw.figures.experiments import load_frame_figure
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
 from annelid.morphology import Array
 from annelid.output import write_csv

@@ -238,5 +238,5 @@ class Store:
 def case_key(case: Case) -> str:
     """Digest of all that a run depends on: its configuration, the code that computes it, and the engine."""
     foreign = "".join(sorted(foreign_code(kind) for kind in kinds_in(case.config)))
-    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint() + foreign
+    text = case.config.model_dump_json(exclude={"summary", "published"}) + physics_fingerprint() + foreign
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -18,7 +18,7 @@ from rich.table import Table
 from annelid.analysis.gait import Gait
 from annelid.config import RunConfig, Vary, field_value, fields_of, load_config, parse_assignments, toml_value
 from annelid.config.checking import check_section
-from annelid.draw.figures.tuning import Mark, pareto_figure, progress_figure
+from annelid.draw.figures.experiments import Mark, pareto_figure, progress_figure
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case, write_worm
 from annelid.experiment.optimisers import optimiser_of

@@ -27,7 +27,7 @@ from rich.table import Table
 from annelid.analysis import Summary
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, unit_of
-from annelid.draw.figures.uncertainty import Panel, uncertainty_figure
+from annelid.draw.figures.experiments import Panel, uncertainty_figure
 from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case

@@ -16,7 +16,7 @@ from typing import Any, Self
 from annelid.errors import ClusterError, RunKilled
 from annelid.experiment.attempt import Task, attempt
 from annelid.experiment.lifeline import end_after
-from annelid.simulation.interruption import Interruption
+from annelid.simulation.progress import Interruption
 
 Result = Future[bytes | None]
 

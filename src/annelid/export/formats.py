@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.body.mjcf import Keyframe, mjcf_text
+from annelid.body.assemble import mjcf_text
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError
 from annelid.export.page import write_page
@@ -100,17 +100,19 @@ def write_mjcf(run: Run, path: Path) -> Path:
     from annelid.simulation.runfile import read_checkpoint
     from annelid.simulation.worm import WormPlant
 
-    keyframes: list[Keyframe] = []
+    keyframes: list[dict[str, Any]] = []
     if not run.config.body.is_planar:
         plant = WormPlant(run.config)
         try:
             plant.set_state(read_checkpoint(run.path).plant)
             parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
-            keyframes.append(Keyframe("final", float(plant.data.time), **parts))
+            keyframes.append({"name": "final", "time": float(plant.data.time), **parts})
         except RunFileError:
             if run.data.sizes.get("frame"):
                 posture, time_s = run.data["qpos"].values[-1], float(run.data["frame_time"].values[-1])
-                keyframes.append(Keyframe("last_posture", time_s, posture, act=plant.anatomy.first_act))
+                keyframes.append(
+                    {"name": "last_posture", "time": time_s, "qpos": posture, "act": plant.anatomy.first_act}
+                )
     return write_text(path, mjcf_text(run.config, keyframes))
 
 

@@ -173,9 +173,9 @@ def test_the_parzen_estimator_comes_nearer_than_its_random_start() -> None:
 
 def test_numbers_and_one_objective_are_for_the_evolution_strategy() -> None:
     choice = Choice("c", (1, 2))
-    assert optimiser_of(VALLEY, 1, None, 0).__name__ == "cma_es"
+    assert "cma_es" in repr(optimiser_of(VALLEY, 1, None, 0))
     for variables, n_objectives in (((*VALLEY, choice), 1), (VALLEY, 2), (VALLEY[:1], 1)):
-        assert optimiser_of(variables, n_objectives, None, 0).__name__ == "parzen"
+        assert "parzen" in repr(optimiser_of(variables, n_objectives, None, 0))
 
 
 class Toy(Store):

@@ -67,7 +67,7 @@ PARAMETERS = {
 }
 """What can be fitted."""
 DEFAULT_FREE = ("young_modulus", "dry_friction", "cable_friction")
-"""What one loop can distinguish; springs and strands resist alike, so that their stiffnesses only shift between them."""
+"""What one loop can distinguish; springs and strands resist alike: their stiffnesses only shift between them."""
 
 
 @dataclass(frozen=True)

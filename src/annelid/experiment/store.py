@@ -86,7 +86,8 @@ class Store:
             workers: Who computes its runs; None for processes of this machine.
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
         """
-        self.folder, self._workers, self._keep = folder, workers, keep
+        self.folder, self._workers = folder, workers
+        self._keep: Keep = keep
 
     def path(self, case: Case) -> Path:
         """Folder of a case's run."""

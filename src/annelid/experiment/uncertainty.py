@@ -31,7 +31,6 @@ from annelid.draw.figures.experiments import Panel, uncertainty_figure
 from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Progress, Store, case_key
 from annelid.output import whole_file, write_csv, write_json
@@ -266,15 +265,21 @@ def uncertainty(
     if n < FEWEST:
         raise ConfigError(f"n = {n} worms have no standard deviation: draw at least {FEWEST}")
     chosen, left_out = applicable(config, read_spread() if spread is None else spread)
-    variants = [(kind, Case(config.name, changed, config)) for kind, changed in plan(config, n, chosen)]
+    variants: list[tuple[Kind, Case]] = [
+        (kind, Case(config.name, changed, config)) for kind, changed in plan(config, n, chosen)
+    ]
     # A study goes on in its own folder, and into an empty one.
     if overwrite or not (folder / RUNS).is_dir():
         refuse_used_folder(folder, overwrite)
     elif (folder / FILE_NAME).exists() and read_config(folder) != config:
         raise ConfigError(f"the output folder {folder} has another run in it: name another, or allow overwriting")
     outcomes = Store(folder / RUNS).compute([case for _, case in variants], jobs=jobs, progress=progress)
-    done = tuple(_done(kind, case.changes, outcomes[case_key(case)]) for kind, case in variants)
-    nominal = outcomes[case_key(variants[0][1])]
+    found = [outcomes[case_key(case)] for _, case in variants]
+    done = tuple(
+        VariantRun(kind, case.changes, of.path, of.rhythm.verdict, of.rhythm.reason, of.message, readings(of.summary))
+        for (kind, case), of in zip(variants, found, strict=True)
+    )
+    nominal = found[0]
     with whole_file(folder / FILE_NAME) as draft:
         shutil.copyfile(nominal.path / FILE_NAME, draft)
     if nominal.message:
@@ -376,11 +381,6 @@ def order_of_convergence(value: float | None, half: float | None, quarter: float
     if value is None or half is None or quarter is None or (value - half) * (half - quarter) <= 0.0:
         return None
     return log2((value - half) / (half - quarter))
-
-
-def _done(kind: Kind, changed: Mapping[str, Any], of: Outcome) -> VariantRun:
-    rhythm = of.rhythm
-    return VariantRun(kind, changed, of.path, rhythm.verdict, rhythm.reason, of.message, readings(of.summary))
 
 
 def uncertainty_table(result: Uncertainty) -> Table:

@@ -21,6 +21,7 @@ from annelid.protocols import Array
 PLANE_HALF_SIZE_M = 0.01
 """Of a moving plane as drawn; the engine's planes have no end."""
 HIDDEN_GROUP = 4
+SKY = ((1.0, 1.0, 1.0), (0.88, 0.92, 0.96))
 CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
 FLOOR_HALF_SIZE_M = 40.0
 RAIL_HALF_HEIGHT_M = 0.1
@@ -93,24 +94,12 @@ def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
     Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
     unbounded planes, posts cylinders; relief and pipes are shapes to see, and hidden panels that can be touched.
     """
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[1.0, 1.0, 1.0],
-        rgb2=[0.88, 0.92, 0.96],
-        width=64,
-        height=64,
-    )
-    spec.add_texture(
-        name="floor",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=CHECKER[0],
-        rgb2=CHECKER[1],
-        width=128,
-        height=128,
-    )
+    kinds, looks = mujoco.mjtTexture, mujoco.mjtBuiltin
+    for name, kind, look, (first, second), size in (
+        ("sky", kinds.mjTEXTURE_SKYBOX, looks.mjBUILTIN_GRADIENT, SKY, 64),
+        ("floor", kinds.mjTEXTURE_2D, looks.mjBUILTIN_CHECKER, CHECKER, 128),
+    ):
+        spec.add_texture(name=name, type=kind, builtin=look, rgb1=first, rgb2=second, width=size, height=size)
     material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
     spec.worldbody.add_light(

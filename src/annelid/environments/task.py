@@ -89,7 +89,11 @@ def task_of(
             raise ConfigError(f"unknown weight {name!r}: {suggest(name, names)}")
         require_at_least(0.0, **{f"weights[{name!r}]": value})
     checked = Weights(**{name: float(value) for name, value in (weights or {}).items()})
-    return Task(config, moves, steps, checked, float(start_activation), _goal_m(config))
+    # The middle of a worm has passed a pipe behind all that bends or narrows, else a body length on.
+    reach_m = config.arena.reach_m() if config.arena is not None else None
+    assert isinstance(config.body, WormBody)
+    goal_m = None if reach_m is None else reach_m[1] or mesh_of(config.body.mesh).length_m
+    return Task(config, moves, steps, checked, float(start_activation), goal_m)
 
 
 class Deed(NamedTuple):
@@ -143,12 +147,3 @@ def _whole(name: str, value: float, unit_name: str, unit: float) -> int:
             f"{name} = {value:g}: must be an integer multiple of {unit_name} = {unit:g}, for example {near:g}"
         )
     return round(ratio)
-
-
-def _goal_m(config: RunConfig) -> float | None:
-    """Returns where the middle of a worm has passed a pipe: behind all that bends or narrows, else a body length on."""
-    reach_m = config.arena.reach_m() if config.arena is not None else None
-    if reach_m is None:
-        return None
-    assert isinstance(config.body, WormBody)
-    return reach_m[1] or mesh_of(config.body.mesh).length_m

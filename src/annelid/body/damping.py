@@ -22,6 +22,8 @@ A, which then is 1.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -130,21 +132,22 @@ def add_damper_rows(spec: mujoco.MjSpec) -> None:
     tendons = [tendon for tendon in spec.tendons if _DAMPER in tendon.name]
     if not tendons:
         return
-    joint = mujoco.mjtObj.mjOBJ_JOINT
-    spec.add_equality(name=HELD, type=mujoco.mjtEq.mjEQ_JOINT, objtype=joint, name1=HELD, data=[0.0] * 12)
+    add_row(spec, mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT, HELD, HELD)
+    # The engine wants a stiffness. Damping over inertance, times the impedance as the engine has it.
+    solref = [-1e-12, -IMPEDANCE / (INERTANCE * spec.option.timestep)]
     for tendon in tendons:
         tendon.damping = [0.0, 0.0, 0.0]
         tendon.wrap_joint(HELD, HELD_LEVER)
-        spec.add_equality(
-            name=tendon.name,
-            type=mujoco.mjtEq.mjEQ_TENDON,
-            objtype=mujoco.mjtObj.mjOBJ_TENDON,
-            name1=tendon.name,
-            data=[0.0] * 12,
-            # The engine wants a stiffness. Damping over inertance, times the impedance as the engine has it.
-            solref=[-1e-12, -IMPEDANCE / (INERTANCE * spec.option.timestep)],
-            solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-        )
+        limits = {"solref": solref, "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]}
+        add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, tendon.name, tendon.name, **limits)
+
+
+def add_row(
+    spec: mujoco.MjSpec, kind: mujoco.mjtEq, of: mujoco.mjtObj, name: str, *between: str, **options: Sequence[float]
+) -> None:
+    """Adds an equality constraint of one or two things of the spec, with no data unless options give some."""
+    names = dict(zip(("name1", "name2"), between, strict=False))
+    spec.add_equality(**{"name": name, "type": kind, "objtype": of, "data": [0.0] * 12, **names, **options})
 
 
 class MaterialDamping:

@@ -1,4 +1,4 @@
-"""What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances held against one another.
+"""What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances checked against one another.
 
 Everything here follows from the configuration alone, in closed form, in under a millisecond and without the engine.
 """
@@ -23,7 +23,7 @@ IDLE_SHARE = 1e-3
 
 
 def check(config: RunConfig) -> list[Finding]:
-    """Holds the numbers of a configuration against one another, before anything is computed.
+    """Checks the numbers of a configuration against one another, before anything is computed.
 
     Args:
         config: Any configuration; of a planar worm there is nothing to check.

@@ -1,6 +1,6 @@
 """The geoms of an arena: what the skin touches, and what is seen.
 
-A level floor and guard rails are planes of the engine, and posts its cylinders. Every other ground is felt through one
+A level floor and guard rails are planes of the engine, and posts its cylinders. Any other ground is touched through one
 plane for each part of the skin that can touch, tangent to the ground at the nearest point and paired with that part
 alone. The planes hang on mocap bodies, which are part of the engine's state, and are laid anew before every step
 (`annelid.simulation.ground`): the ground has no seams, one part has one contact, and a step costs the same on any
@@ -79,7 +79,7 @@ def set_friction(model: mujoco.MjModel, friction: float) -> None:
 
 
 def add_box(spec: mujoco.MjSpec, arena: ArenaKind, place_m: Array, half_size_m: list[float], axes: Array) -> None:
-    """Adds a box that can be touched and is not drawn, to hold a worm in plain MuJoCo; its axes are columns."""
+    """Adds a box that can be touched and is not drawn, to support a worm in plain MuJoCo; its axes are columns."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
     box = mujoco.mjtGeom.mjGEOM_BOX

@@ -1,4 +1,4 @@
-"""How much a mesh resists its rings, in closed form, and what is found by holding a worm's numbers against it.
+"""How much a mesh resists its rings, in closed form, and what is found by checking a worm's numbers against it.
 
 How much the mesh resists: where a ring of the length L = m c is drawn in (m crossings, c apart), the rhombi round it
 close. With h, the hypotenuse of a rhombus' two diagonals at rest, they keep ``c = h sin(a)`` and springs of the length
@@ -97,7 +97,7 @@ def strongest(rings: ActuatorKind, n_segments: int) -> Iterator[tuple[float, flo
 
 
 def weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
-    """Holds the greatest force of an actuator against what hardly closes a ring."""
+    """Checks the greatest force of an actuator against what hardly closes a ring."""
     needed = bearable_force_N(body, 1.0 - HARDLY)
     if force_N < needed / UNSURE:
         problem = (
@@ -108,7 +108,7 @@ def weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[F
 
 
 def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Iterator[Finding]:
-    """Holds a force against what the mesh bears, where its actuator closes a ring to a share of its length at rest."""
+    """Checks a force against what the mesh bears, where its actuator closes a ring to a share of its length at rest."""
     if share < COLLAPSED and force_N > UNSURE * bearable_N:
         problem = (
             f"rings close under about {bearable_N:.2g} N, and nothing stops them above {100 * max(0.0, share):.0f} % "

@@ -102,7 +102,7 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
 
     @property
     def sensations(self) -> list[Sensation]:
-        """What every worm feels, in full and without noise."""
+        """What every worm senses, in full and without noise."""
         return [episode.sensation for episode in self._episodes]
 
     def reset(

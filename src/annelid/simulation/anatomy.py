@@ -88,7 +88,7 @@ class Anatomy:
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
-        elasticity: The energy that strands, joints and springs hold.
+        elasticity: The energy that strands, joints and springs store.
         energy_meter: What a physics step does, in work.
         outputs: Names of the engine's arrays that `forces` needs.
     """

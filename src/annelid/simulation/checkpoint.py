@@ -1,4 +1,4 @@
-"""The state of a whole simulation as bytes, and the two slots of a run file that hold it.
+"""The state of a whole simulation as bytes, and the two slots of a run file that carry it.
 
 The slots are written in turn. Each carries a sequence number and a checksum, so that a slot torn by a kill is
 noticed and the other one, at most one checkpoint older, is used.

@@ -136,7 +136,7 @@ def layout(
     sizes |= dict(zip(("segment", "sensor"), rest_stretch_m.shape, strict=True))
     flags = {"flag_values": np.arange(len(runfile.STATUSES), dtype="i1"), "flag_meanings": " ".join(runfile.STATUSES)}
     text = {"_Encoding": "utf-8"}
-    message, warning = "why the run ended before its time", "what is doubtful about the run, a sentence a line"
+    message, warning = "why the run ended before its time", "what is doubtful about the run, one sentence per line"
     variables = [
         Variable("samples_written", (), "1", "samples of the signals that hold data", "<i8"),
         Variable("frames_written", (), "1", "frames that hold data", "<i8"),
@@ -244,7 +244,7 @@ class Recorder:
         self._samples.put({name: value for source in sources for name, value in source.items()}, self._writer)
 
     def frame(self, *sources: Values) -> None:
-        """Takes one frame, in the same way."""
+        """Takes one frame likewise."""
         self._frames.put({name: value for source in sources for name, value in source.items()}, self._writer)
 
     def flush(self) -> None:

@@ -1,8 +1,9 @@
-"""What the skin feels of the ground, and how it slides: touch on four sides of every segment, slip and its loss.
+"""What the skin senses of the ground, and how it slides: touch on four sides of every segment, slip and its loss.
 
-The skin is the geoms that can touch: one sphere a vertex for rods, one capsule an element for chains. A geom belongs to
-the segment and the side that it is nearest to at rest, and slides by what its centre is displaced between two movements
-of the body. For rods that is the displacement of the point that touches; a chain's capsules also turn a little.
+The skin is the geoms that can touch: one sphere per vertex for rods, one capsule per element for chains. A geom belongs
+to the segment and the side that it is nearest to at rest, and slides by what its centre is displaced between two
+movements of the body. For rods that is the displacement of the point that touches; a chain's capsules also turn a
+little.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from annelid.protocols import SIDES, State
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What every segment feels of the ground, and how far it has slid; ``(n_segments,)`` unless said otherwise."""
+    """What every segment senses of the ground, and how far it has slid; ``(n_segments,)`` unless said otherwise."""
 
     normal: Array  # normal force on each side during the last physics step, N, (n_segments, 4) in the order of SIDES
     count: Array  # number of geoms that touched then
@@ -105,7 +106,7 @@ def _dot(first: Array, second: Array) -> Array:
 
 
 def sides_of(left_right_m: Array, up_m: Array) -> NDArray[np.int64]:
-    """Returns the side that points of a cross-section lie on, as indices of `SIDES`: the quarter that holds them.
+    """Returns the side that points of a cross-section lie on, as indices of `SIDES`: the quarter that they are in.
 
     Points are so far right of the axis (left is negative) and above it, m. One between two quarters counts to belly or
     back, the same on the left and the right.

@@ -2,7 +2,7 @@
 
 Every mesh vertex is a body on three slides; a crossing is ONE such body for both of its strands, so a pin costs
 no constraint and cannot part. Each strand is a 1D flex through its vertices' bodies, a discrete elastic rod with
-bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge an edge, found by its
+bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
 Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by a spring
@@ -179,7 +179,7 @@ def add_rod(
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
     Args:
-        spec: The spec that holds the bodies.
+        spec: The spec that has the bodies.
         name: Name of the flex; the twist hinges are named after it.
         vertices_m: Rest positions, shape ``(n_vertices, 3)``.
         bodies: Body of each vertex, at the vertex's place; "world" fixes the vertex.

@@ -7,17 +7,14 @@ edge, whose twist hinge turns at the rate w1, by
 
     (cos(2h) b . e1' / l1 - b . e0' / l0) / cos(h)^2 - 2 tan(h) w1
 
-and in that of the front edge by the same with the cosine at e0' and with w0. Either is zero in every rigid rotation.
-The elastic energy takes the mean over both frames; the damping takes one of them for each vertex, that of every second
-edge for the vertices at its two ends, since rows with two hinges take an eighth of a step longer. Times the material's
-time and its bending stiffness, it makes bending alike in all directions (Kelvin-Voigt).
+and in that of the front edge by the same with the cosine at e0' and with w0; both are zero in every rigid rotation. The
+damping takes one frame for each vertex, that of every second edge, since rows with two hinges take an eighth of a step
+longer. Times the material's time and its bending stiffness, it makes bending alike in all directions (Kelvin-Voigt).
 
-The coefficients follow the posture, step by step. As dampers of tendons they would cost twice the time of a step. A
-plant has constraint rows instead, which the engine solves at the end of the step too. The engine scales a row's damping
-by A, the ratio of the row's inverse inertia without the forces of the step to that with them: a row's force is
-``-A (I a + c v)``, with the wanted damping c and a small inertance I. A depends on step, posture and the world's axes,
-and would be 1 to 80. So every row also includes one dof that is fixed and so light that it alone decides about A, which
-then is 1.
+The coefficients follow the posture. Dampers of tendons would double the time of a step, so a plant has constraint rows,
+solved at the end of the step too. The engine scales a row's force to ``-A (I a + c v)``, with the wanted damping c, a
+small inertance I, and A the ratio of the row's inverse inertia without the forces of the step to that with them: 1 to
+80 with step, posture and axes. So every row includes one dof that is fixed and so light that A is 1.
 """
 
 from __future__ import annotations

@@ -1,25 +1,25 @@
 """The 3D worm's energies: what its muscles have done and where it went, step by step, and what its strands store.
 
-The engine moves the body by the step h times the new velocity v', and the work of a generalised force f in a step is
-``h f . v'``. With the mass matrix M constant, as it is for point masses on slides,
+The engine moves the body by the step h times the new velocity v', so that a generalised force f does the work
+``h f . v'`` in a step, and with a constant mass matrix M, as of point masses on slides,
 
     change of kinetic energy = work of all forces - 1/2 |v' - v|^2_M
 
-is exact to rounding. Forces are the engine's own: weight, constraints, dampers, springs, actuators. The integrator
-`discrete` takes springs, dampers and actuators at the end of the step to first order, with simpler matrices than
-theirs. What that takes beyond the true change of elastic energy and the dampers' own work, and the square above, is the
-numerical loss. It is what is left of the muscles' work when everything else is subtracted (docs/gait.md).
+is exact to rounding. The integrator `discrete` takes springs, dampers and actuators at the end of the step to first
+order, with simpler matrices than theirs. What that takes beyond the true change of elastic energy and the dampers' own
+work, and the square above, is the numerical loss: what is left of the muscles' work when everything else is subtracted
+(docs/gait.md).
 
-The engine gives no elastic energy of rods. A rod is the engine's discrete elastic rod (Bergou et al. 2008, "Discrete
-elastic rods"). An edge e carries a unit tangent t and a reference direction u across it, which the engine transports
-along in time without twist and keeps as "plastic" state; its material frame is that direction turned by the angle q of
-its twist hinge. Between two edges of rest lengths l and l', the rod stores
+The engine gives no elastic energy of its discrete elastic rods (Bergou et al. 2008). An edge e carries a unit tangent t
+and a reference direction u across it, which the engine transports along in time without twist and keeps as "plastic"
+state; its material frame is that direction turned by the angle q of its twist hinge. Two edges of rest lengths l, l'
+store
 
     E I / (l + l') * mean over both edges of |k - k0|^2  +  G J / (l + l') * (q' - q + w)^2
 
-where ``k = 2 t x t' / (1 + t . t')`` is the curvature, seen in the edge's material frame, k0 the same at rest, and w
-the turn from the reference direction of one edge, transported to the other, to that one's. That this is the energy
-behind the engine's forces is tested in `tests/simulation/test_elasticity.py`.
+with the curvature ``k = 2 t x t' / (1 + t . t')`` seen in the edge's material frame, k0 the same at rest, and w the
+turn from the reference direction of one edge, transported to the other, to that one's
+(`tests/simulation/test_elasticity.py`).
 """
 
 from __future__ import annotations

@@ -5,11 +5,9 @@ no constraint and cannot part. Each strand is a 1D flex through its vertices' bo
 bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
-Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by a spring
-and a dashpot in N/m and N s/m, constraint rows whose static stiffness and damping follow from their reference and
-regularisation (MuJoCo's documentation, "Constraint model"). A material's damping time is completed by
-`annelid.body.damping`, since the engine damps a curved vertex in the plane of its bend alone. Lateral damping by a
-number per joint is older: its rows are fixed in the world, so it brakes a rotating worm and fits a straight one only.
+Separate pins are point masses tied to a vertex of each strand by a spring and a dashpot: constraint rows (MuJoCo's
+documentation, "Constraint model"). A material's damping time is completed by `annelid.body.damping`. Lateral damping by
+a number per joint is older: its rows are fixed in the world, so it brakes a rotating worm and fits a straight one only.
 """
 
 from __future__ import annotations
@@ -178,16 +176,9 @@ def add_rod(
 ) -> None:
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
-    Args:
-        spec: The spec that has the bodies.
-        name: Name of the flex; the twist hinges are named after it.
-        vertices_m: Rest positions, shape ``(n_vertices, 3)``.
-        bodies: Body of each vertex, at the vertex's place; "world" fixes the vertex.
-        strands: Material.
-        formulation: Settings of the inextensible edges.
-        rgba: Colour.
-        clamped: The first two vertices belong to one body (a cantilever): their edge has no twist hinge.
-        dampers: As of `add_rods`.
+    Its twist hinges are named after it. The body of a vertex, ``(n_vertices, 3)``, lies at its place; "world" fixes the
+    vertex, and a clamped rod has its first two on one body, so that their edge has no twist hinge. Dampers as
+    `add_rods`.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     n_edges = len(lengths)

@@ -74,17 +74,9 @@ def add_chain(
 ) -> None:
     """Adds one chain of capsules; element ``e`` is body ``<name>_<e>`` between vertices ``e`` and ``e + 1``.
 
-    Args:
-        spec: The spec to add to.
-        name: Name of the strand.
-        vertices_m: Rest positions, shape ``(n_vertices, 3)``.
-        strands: Material.
-        formulation: Kind of joint and its numerical inertia.
-        contact: Contact attributes; None for a chain that touches nothing.
-        vertices_touch: A sphere at each vertex touches instead of the capsules.
-        rgba: Colour.
-        root: Element that the tree grows from, by default the middle one.
-        fixed_root: Welds the root element to the world (a cantilever).
+    The tree grows from a root element, by default the middle one, which may be welded to the world (a cantilever).
+    Without contact attributes the chain touches nothing, else by its capsules or by spheres at its vertices,
+    ``(n_vertices, 3)``.
     """
     n_elements = len(vertices_m) - 1
     middle = _middle_element(len(vertices_m)) if root is None else root

@@ -17,17 +17,17 @@ from time import perf_counter, process_time
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options, touching
+from annelid.arena.geoms import contact_options, touching
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.kinds.pipe import Pipe, add_pipe_panels
+from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.output import write_csv
 from annelid.simulation.anatomy import Anatomy
-from annelid.simulation.assemble import build_controller
-from annelid.simulation.worm import Worm, WormPlant
+from annelid.simulation.stepping import build_controller
+from annelid.simulation.worm import WormPlant
 
 WORM = {
     "arena.friction": 0.7,
@@ -61,10 +61,8 @@ class StillGround(WormPlant):
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.delete(spec.geom("floor"))
         _add_contact_sensors(spec)
-        Worm.__init__(self, config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
+        super().__init__(config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
         self.ground = None
-        self.data = mujoco.MjData(self.model)
-        self._outputs = {name: getattr(self.data, name) for name in self.anatomy.outputs}
 
 
 def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
@@ -86,7 +84,7 @@ def panels(around: int) -> Ground:
 
     def add(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
         if isinstance(arena, Pipe):
-            add_pipe_panels(spec, arena, length_m, around)
+            arena.add_panels(spec, length_m, around)
         else:
             arena.add_panels(spec, length_m)
 

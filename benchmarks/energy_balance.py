@@ -1,4 +1,4 @@
-"""Where the muscles' work goes, over the time step, and whether the books close.
+"""Where the muscles' work goes, over the time step, and whether the totals close.
 
 The numerical loss stands twice: as what is left of the muscles' work when all else is subtracted, which is what a run
 tells, and from the matrices with which the engine's integrator takes springs and dampers. The residual is the
@@ -26,7 +26,6 @@ from annelid.config import RunConfig, load_config
 from annelid.morphology import Array
 from annelid.output import write_csv
 from annelid.simulation import build_controller
-from annelid.simulation.energies import Engine
 from annelid.simulation.worm import WormPlant
 
 HELD = ("kinetic_energy", "elastic_energy", "potential_energy")
@@ -46,9 +45,9 @@ class AuditedWorm(WormPlant):
         self.integrator_J = self.spring_J = 0.0
         self._slides = self.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
 
-    def book(self, engine: Engine, drive: Array) -> None:
-        """Enters a step in the books and audits it."""
-        super().book(engine, drive)
+    def add_step(self, drive: Array) -> None:
+        """Adds a step to the energy totals and audits it."""
+        super().add_step(drive)
         data, h = self.data, float(self.model.opt.timestep)
         inertial = np.zeros(self.model.nv)
         mujoco.mj_mulM(self.model, data, inertial, data.qacc)

@@ -19,9 +19,9 @@ import mujoco
 
 from annelid import load_config
 from annelid.body import build_spec, compile_spec
+from annelid.body.damping import MaterialDamping, add_damper_rows
 from annelid.body.worm import WormBody
 from annelid.output import write_csv
-from annelid.simulation.damping import MaterialDamping, add_damper_rows
 
 FORCE_N = 2.5
 DURATION_S = 0.2

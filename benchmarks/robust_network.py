@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.analysis.score import DESIGN_INTERVAL_S, RhythmScore, score
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S, RhythmScore, score
 from annelid.nervous import Network, peristalsis_network
 from annelid.nervous.robust import robust_network
 from annelid.output import write_csv

@@ -21,7 +21,7 @@ import numpy as np
 
 from annelid import Run, load_config, simulate
 from annelid.analysis import rhythm_score
-from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S
 from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
 from annelid.plausibility import tolerance_window_m

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis.slip import slip_cost
+from annelid.analysis.gait import slip_cost
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store
 from annelid.output import write_csv

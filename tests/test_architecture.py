@@ -17,9 +17,10 @@ import annelid
 from annelid.config.kinds import every_kind
 
 SOURCE = Path(annelid.__file__).parent
-BASE = {"errors", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
+BASE = {"errors", "markdown", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
 MAY_IMPORT = {
     "errors": {"text"},
+    "markdown": {"text"},
     "protocols": set(),
     "clock": set(),
     "text": set(),

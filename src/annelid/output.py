@@ -16,13 +16,9 @@ from annelid.text import printable
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Gives a hidden draft beside a file, to be written and then moved into its place.
+    """Gives a hidden draft beside a file, with the same suffix, which is moved into its place once the block is done.
 
-    Args:
-        path: The file to write; what is there stays until the draft is complete.
-
-    Yields:
-        The draft, which has the same suffix; it is removed where the block ends in an error.
+    Until then what is there stays; the draft of a block that ends in an error is removed.
 
     Raises:
         RunFileError: The file cannot be written, for example because the disk is full.
@@ -44,20 +40,22 @@ def whole_file(path: str | Path) -> Iterator[Path]:
                 draft.unlink()
 
 
+def write_text(path: Path, text: str) -> Path:
+    """Writes a text as a `whole_file` in UTF-8 and returns its path."""
+    with whole_file(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return path
+
+
+def write_json(path: Path, content: Any) -> Path:
+    """Writes plain values as JSON, as `write_text` does; NaN is refused."""
+    return write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Path:
-    """Writes a table as CSV with a header.
+    """Writes a table as CSV with a header, as a `whole_file`, and returns its path.
 
-    Args:
-        path: The file to write.
-        columns: Names of the columns.
-        rows: Values of each row; None leaves a cell empty, and text that a spreadsheet would take for a formula gets
-            a leading apostrophe.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
+    None leaves a cell empty, and text that a spreadsheet would take for a formula gets a leading apostrophe.
     """
     with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -67,7 +65,6 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
 
 
 def _cell(text: str) -> str:
-    """Text as it is in a table; a leading apostrophe keeps spreadsheets from taking it for a formula."""
     text = printable(text)
     if text[:1] not in tuple("=+-@\t"):
         return text
@@ -78,35 +75,14 @@ def _cell(text: str) -> str:
     return text
 
 
-def write_json(path: Path, content: Any) -> Path:
-    """Writes plain values as JSON; NaN is refused.
-
-    Args:
-        path: The file to write.
-        content: Plain lists, mappings, numbers, strings and None.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
-    with whole_file(path) as draft:
-        draft.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    return path
-
-
 def with_suffix(path: str | Path, suffixes: tuple[str, ...], what: str, default: str | None = None) -> Path:
-    """Checks a file's suffix.
+    """Returns the path of a file to write with a suffix of those allowed, which are in lower case.
 
     Args:
         path: The file to write.
-        suffixes: The suffixes allowed, in lower case.
+        suffixes: The suffixes allowed.
         what: What is written, for the sentence.
         default: Suffix to add where the name has none; None refuses such a name.
-
-    Returns:
-        The path, with a suffix.
 
     Raises:
         RunFileError: Another suffix, or the path is a folder.

@@ -28,7 +28,7 @@ def load_home(home: str) -> None:
 
 @cache
 def load_extensions() -> None:
-    """Imports what other installed packages name; one that fails is told of and left out."""
+    """Imports what other installed packages name; one that fails is left out with a warning."""
     for entry in entry_points(group=GROUP):
         try:
             entry.load()
@@ -41,7 +41,7 @@ class Registry(Generic[Item]):
     """Things of one sort by their names."""
 
     def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError) -> None:
-        """Makes an empty one.
+        """Makes an empty registry.
 
         Args:
             what: What the things are, for messages.
@@ -82,10 +82,9 @@ class Registry(Generic[Item]):
         return known[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Goes through the names."""
         return iter(self.all())
 
 
 def _origin(item: Any) -> Any:
-    """Tells where a class or a function was written, anything else as it is."""
+    """Where a class or a function was written; anything else as it is."""
     return f"{item.__module__}.{item.__qualname__}" if hasattr(item, "__qualname__") else item

@@ -11,16 +11,13 @@ import numpy as np
 
 from annelid.body.worm import WormBody
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
+from annelid.draw.canvas import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.store import Store
-from annelid.experiment.tune.judge import Judged
-from annelid.experiment.tune.search import judged_run
+from annelid.experiment.tune import Judged, judge
+from annelid.markdown import Table
 from annelid.morphology import Array
 from annelid.output import write_csv
 from annelid_studies.riddle2023.examination import Effort
@@ -141,7 +138,7 @@ def crawl(
         KeyboardInterrupt: Finished runs are kept.
     """
     store.compute([point.case for point in chosen], jobs=jobs, progress=in_stage(progress, "crawling"))
-    return [Reading(point, judged_run(store, point.case)) for point in chosen]
+    return [Reading(point, judge(store[point.case])) for point in chosen]
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> None:

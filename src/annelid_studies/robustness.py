@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
-from annelid.analysis.score import DESIGN_INTERVAL_S
-from annelid.draw.markdown import plain_table
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
 from annelid.experiment.fingerprint import code_fingerprint
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Workers
+from annelid.markdown import plain_table
 from annelid.output import whole_file
 from annelid.plausibility import tolerance_window_m
 from annelid.simulation.lock import locks

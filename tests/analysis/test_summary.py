@@ -166,6 +166,38 @@ def test_loads_are_told_segment_by_segment() -> None:
     assert numbers.contraction_force_peak_N == pytest.approx(8.0)
 
 
+def test_forces_are_those_of_every_sample_in_which_the_muscle_itself_is_contracted() -> None:
+    data = wave_data().isel(time=slice(3))
+    shape = ("time", "muscle")
+    data["muscle_force"] = (shape, [[9.0, 1.0, 0.0], [2.0, 1.0, 0.0], [2.0, 7.0, 0.0]])
+    data["activation"] = (shape, [[0.9, 0.0, 0.0], [0.9, 0.5, 0.0], [0.2, 0.6, 0.0]])
+    numbers = summary(run_of(data))
+    assert numbers.segment_force_median_N == [5.5, 7.0, None]
+    assert (numbers.contraction_force_median_N, numbers.contraction_force_peak_N) == (7.0, 9.0)
+
+
+def test_both_readings_of_a_written_down_stretch() -> None:
+    rest = np.array([[0.07, 0.08], [0.07, 0.08], [0.07, 0.08]])
+    stretch = np.repeat(rest[None], 4, axis=0)
+    stretch[1, 0] += [0.04, 0.02]  # segment 1 lengthens
+    stretch[2, 0, 0] -= 0.01  # its first helix shortens below rest
+    stretch[3, 2] += [0.00, 0.03]  # segment 3 lengthens away from the first helix
+    data = wave_data().isel(time=slice(4)).drop_dims("sensor")
+    data["stretch_length"] = (("time", "segment", "sensor"), stretch)
+    data["stretch_rest_length"] = (("segment", "sensor"), rest)
+    numbers = summary(run_of(data))
+    assert numbers.elongation_first_helix_pp_m == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
+    assert numbers.elongation_mean_max_m == pytest.approx([0.03, 0.0, 0.015], abs=1e-15)
+
+
+def test_travel_is_net_and_its_path_goes_forwards_and_backwards() -> None:
+    data = wave_data().isel(time=slice(4))
+    data["center_of_mass"][:, 0] = [-0.1, -0.3, -0.2, 0.0]
+    numbers = summary(run_of(data))
+    assert numbers.travel_m == pytest.approx(-0.1)
+    assert numbers.travel_path_m == pytest.approx(0.5)
+
+
 def test_the_robot_stands_beside_its_preset_only() -> None:
     assert published(load_config("wang"))["elongation_mean_max_m"].value == (0.0615, 0.0382, 0.0478, 0.0598)
     assert published(load_config("wang", {"body.mesh.n_segments": 5})) == {}

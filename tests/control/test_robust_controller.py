@@ -18,7 +18,7 @@ from annelid.control.robust import DescendingDrive, RobustController, RobustSns
 from annelid.errors import ConfigError
 from annelid.nervous.robust import ROLES, robust_network
 from annelid.protocols import SIDES, Records, Sensation, Stateful, StridingController
-from annelid.simulation.assemble import build_controller, build_plant
+from annelid.simulation.stepping import build_controller, build_plant
 
 N, TIMESTEP_S, REST_M = 4, 0.001, 0.1
 

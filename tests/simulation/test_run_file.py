@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import reduce
 from operator import getitem
 from pathlib import Path
@@ -436,13 +436,12 @@ def test_what_is_written_raw_is_what_xarray_reads(
         for variable in variables[:-1]:
             unwritten = before[variable.name].values
             assert np.isnan(unwritten).all() if variable.dtype == "<f8" else (unwritten == 0).all()
-    with RawWriter(path, extents) as writer:
+    with closing(RawWriter(path, extents)) as writer:
         for name, content in contents.items():
             writer.write(name, content[:1])
             if shape[0] > 1:
                 writer.write(name, content[1:], content[0].nbytes)
         writer.write("counter", np.array(-5, dtype="<i8"))
-        writer.close()
     assert path.stat().st_size == size
     with xarray.open_dataset(path, engine="h5netcdf") as after:
         for name, content in contents.items():

@@ -34,7 +34,7 @@ def test_the_key_of_a_run_covers_all_that_computes_it_and_nothing_else() -> None
 
 def test_the_key_of_an_outcome_covers_all_that_reads_it() -> None:
     modules = modules_behind(*READERS)
-    readers = ("experiment.outcome", "analysis.summary", "analysis.gait", "analysis.score", "simulation.runfile")
+    readers = ("experiment.outcome", "analysis.summary", "analysis.gait", "analysis.rhythm", "simulation.runfile")
     assert {f"annelid.{name}" for name in readers} <= modules
     assert not {name for name in modules if name.split(".")[1] in ("draw", "live", "cli", "export")}
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from annelid.analysis.score import RhythmScore
+from annelid.analysis.rhythm import RhythmScore
 from annelid.control.open_loop import TimedWave
 from annelid.errors import ConfigError, RunFileError
 from annelid.plausibility import tolerance_window_m

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from annelid.draw import plots
+from annelid.draw.canvas import activation_color, segment_colors
 from annelid.draw.plots import figure7
-from annelid.draw.style import activation_color, segment_colors
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
 

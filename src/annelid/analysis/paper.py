@@ -16,6 +16,8 @@ from annelid.config.run import published_worms
 from annelid.control.sns import paper_controller
 from annelid.textfiles import parse_json
 
+ROBOT_ELONGATION_M: tuple[float, ...] = tuple(published_worms()["wang"][0]["numbers"]["elongation_mean_max_m"][0])
+"""Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m."""
 FORMULATION = "riddle2023"
 """The preset that rebuilds the paper's worm in the paper's own formulation, and the name of what it publishes."""
 
@@ -136,7 +138,7 @@ def changed_fields(config: RunConfig) -> tuple[str, list[str]]:
 
 
 def _changes(preset: RunConfig, config: RunConfig) -> list[str]:
-    fields, _ = differing_fields([preset, config])
+    fields = differing_fields([preset, config])
     uncounted = (*_BESIDE_THE_WORM, *(() if config.sensor.noise_m else ("seed",)))
     changed = [field for field in fields if not field.startswith(uncounted)]
     others = tuple(field.removesuffix("kind") for field in changed if field.endswith(".kind"))

@@ -15,40 +15,20 @@ from annelid.simulation.runfile import Run
 
 @dataclass(frozen=True, slots=True)
 class Deformation:
-    """Relative change of every rhombus' diagonals against rest.
+    """Relative change of every rhombus' diagonals against rest, ``(..., n_rhombi)``."""
 
-    Attributes:
-        axial: Of the diagonal from the front to the rear corner, a fraction, shape ``(..., n_rhombi)``.
-        lateral: Of the diagonal between the left and the right corner, a fraction, same shape.
-    """
-
-    axial: Array
-    lateral: Array
+    axial: Array  # of the diagonal from the front to the rear corner
+    lateral: Array  # of the diagonal between the left and the right corner
 
 
 def rhombus_diagonals(crossings_m: ArrayLike, rhombi: Indices) -> tuple[Array, Array]:
-    """Measures the straight lines between opposite corners.
-
-    Args:
-        crossings_m: Positions of the crossings, m, shape ``(..., n_crossings, 3)``.
-        rhombi: Front, left, rear and right crossing of each rhombus, shape ``(n_rhombi, 4)``.
-
-    Returns:
-        Axial and lateral diagonals, m, each of shape ``(..., n_rhombi)``.
-    """
-    corners = np.asarray(crossings_m, dtype=float)[..., rhombi, :]
-    axial = np.linalg.norm(corners[..., 2, :] - corners[..., 0, :], axis=-1)
-    lateral = np.linalg.norm(corners[..., 3, :] - corners[..., 1, :], axis=-1)
-    return axial, lateral
+    """Measures axial and lateral diagonals, m, ``(..., n_rhombi)``, from crossings, m, ``(..., n_crossings, 3)``."""
+    front, left, rear, right = np.moveaxis(np.asarray(crossings_m, dtype=float)[..., rhombi, :], -2, 0)
+    return np.linalg.norm(rear - front, axis=-1), np.linalg.norm(right - left, axis=-1)
 
 
 def deformation(crossings_m: ArrayLike, geometry: MeshGeometry) -> Deformation:
-    """Compares every rhombus with its shape at rest.
-
-    Args:
-        crossings_m: Positions of the crossings, m, shape ``(..., n_crossings, 3)``.
-        geometry: The mesh at rest.
-    """
+    """Compares every rhombus with its shape at rest; crossings in m, ``(..., n_crossings, 3)``."""
     axial, lateral = rhombus_diagonals(crossings_m, geometry.rhombi)
     rest_axial, rest_lateral = rhombus_diagonals(geometry.crossings_m, geometry.rhombi)
     return Deformation(axial / rest_axial - 1.0, lateral / rest_lateral - 1.0)
@@ -62,13 +42,17 @@ def nearest_frame(run: Run, time_s: float) -> int:
     """
     if "crossing_position" not in run.data or run.data.sizes.get("frame", 0) == 0:
         raise RunFileError(f"{run.path} holds no recorded postures of a 3D worm")
-    times = run.data["frame_time"].values
-    margin = float(np.diff(times).max()) if len(times) > 1 else 0.0
-    if not times[0] - margin <= time_s <= times[-1] + margin:
+    return nearest_time(run, run.data["frame_time"].values, time_s)
+
+
+def nearest_time(run: Run, times_s: Array, time_s: float) -> int:
+    """Returns the index of the recorded time nearest to a wanted one, as `nearest_frame` does."""
+    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
+    if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
         raise RunFileError(
-            f"{run.path} holds no posture at {time_s:g} s: it was recorded from {times[0]:g} to {times[-1]:g} s"
+            f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
         )
-    return int(np.abs(times - time_s).argmin())
+    return int(np.abs(times_s - time_s).argmin())
 
 
 def rhombus_plane(geometry: MeshGeometry) -> Indices:
@@ -77,15 +61,12 @@ def rhombus_plane(geometry: MeshGeometry) -> Indices:
 
 
 def actuated(geometry: MeshGeometry) -> NDArray[np.bool_]:
-    """Tells which rhombi have a ring muscle across them, shape ``(n_rhombi,)``."""
+    """Which rhombi have a ring muscle across them, shape ``(n_rhombi,)``."""
     return np.isin(rhombus_plane(geometry), geometry.ring_planes)
 
 
 def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
-    """Distance along the resting body from the ring of a segment (from 0) to the middle of each rhombus.
-
-    In m, negative towards the front, shape ``(n_rhombi,)``.
-    """
+    """Distance along the resting body from a segment's ring (from 0) to each rhombus' middle, m, negative forwards."""
     return geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[segment]]
 
 

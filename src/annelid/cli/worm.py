@@ -32,7 +32,7 @@ def check(
     arena: ArenaName = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
 ) -> None:
-    """Hold the numbers of a 3D worm against one another, before anything is computed.
+    """Compare the numbers of a 3D worm with one another, before anything is computed.
 
     Lengths against the ring at rest, forces against what the mesh bears, the step against stiffness, the sensors'
     tolerance against the mesh. A finding says what is wrong and what to set instead. With an error a run can mean
@@ -73,15 +73,12 @@ def build(
     annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
-    from annelid.body.mjcf import mjcf_text
-    from annelid.output import whole_file
+    from annelid.body.assemble import mjcf_text
+    from annelid.output import write_text
 
     refuse_existing(output, force)
     config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
-    text = mjcf_text(config)
-    with whole_file(output) as draft:
-        draft.write_text(text, encoding="utf-8")
-    typer.echo(output)
+    typer.echo(write_text(output, mjcf_text(config)))
 
 
 def presets(
@@ -149,10 +146,8 @@ def doctor(
     from annelid.draw.doctor import examine
 
     if report:
-        from annelid.draw.bug_report import bug_report
+        from annelid.draw.doctor import bug_report
 
         typer.echo(bug_report(list(examine())))
-        return
-
-    for finding in examine():
-        typer.echo(finding.line())
+    else:
+        typer.echo("\n".join(finding.line() for finding in examine()))

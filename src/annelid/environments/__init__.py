@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from annelid.errors import MissingDependency
 
 if TYPE_CHECKING:
-    from annelid.environments.observation import Layout
+    from annelid.environments.episode import Layout
     from annelid.environments.single import WormEnv
     from annelid.environments.task import Weights
     from annelid.environments.vector import WormVectorEnv
@@ -29,7 +29,7 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
     "WormPipe-v0": {"arena": "pipe.taper", "episode_s": PIPE_EPISODE_S},
 }
 """Names within the namespace, and what they set beyond the defaults of `WormEnv`."""
-_HOME = {"Layout": "observation", "Weights": "task", "WormEnv": "single", "WormVectorEnv": "vector"}
+_HOME = {"Layout": "episode", "Weights": "task", "WormEnv": "single", "WormVectorEnv": "vector"}
 
 __all__ = ["ENVIRONMENTS", "Layout", "Weights", "WormEnv", "WormVectorEnv"]
 

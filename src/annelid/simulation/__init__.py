@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from annelid.simulation.assemble import build_controller, build_plant
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run, open_run
+from annelid.simulation.stepping import build_controller, build_plant
 
 __all__ = ["Run", "build_controller", "build_plant", "open_run", "simulate"]

@@ -39,16 +39,9 @@ _held: set[tuple[int, int, Path]] = set()
 
 @contextmanager
 def locked(folder: str | Path, *, new: bool = False) -> Iterator[Path]:
-    """Keeps every other writer out of a folder, which is made if it is not there.
+    """Keeps every other writer out of a folder, which is made if it is not there; yields it.
 
-    Folders that were made for the lock and are empty at its end are removed.
-
-    Args:
-        folder: The folder.
-        new: Make the folder, and no other than a new one.
-
-    Yields:
-        The folder.
+    Folders that were made for the lock and are empty at its end are removed. A new folder is to be made, and no other.
 
     Raises:
         ConfigError: It is a file.

@@ -57,10 +57,9 @@ def measure(config: RunConfig) -> dict[str, Any]:
     import numpy as np
 
     from annelid.experiment.outcome import outcome
-    from annelid.simulation.assemble import build_controller
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import open_run
-    from annelid.simulation.stepping import start
+    from annelid.simulation.stepping import build_controller, start
     from annelid.simulation.worm import WormPlant
     from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares
 

@@ -11,11 +11,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
+from annelid.analysis.summary import middle_deficit
 from annelid.body.worm import WormBody
-from annelid.draw.figures import network_diagram
-from annelid.draw.markdown import Table
+from annelid.draw.figures.network_diagram import network_figure
 from annelid.draw.plots import figure7
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
@@ -23,6 +22,7 @@ from annelid.experiment.fingerprint import code_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Workers
+from annelid.markdown import Table
 from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.output import whole_file
 from annelid.simulation.lock import locks
@@ -149,10 +149,19 @@ def _figure_5(run: Run, series: Series, stem: Path) -> str:
     return muscle_surface.figure_5_muscle_surface(run.config.body.muscles, stem, run.config.body.n_segments)
 
 
+NETWORK_CAPTION = (
+    "The network that controls the worm, drawn from the network object that the simulation steps: one column a "
+    "segment. The contraction and the expansion neuron (U1, U2) form a half-centre: they have a persistent sodium "
+    "channel (double outline) and inhibit each other. The sensory neuron (U3), which the stretch sensor excites while "
+    "its segment is at rest length, holds the segment expanded; the relay (U4) silences the sensory neuron of the next "
+    "segment, and that of the last segment closes the ring to the first."
+)
+
+
 def _figure_6(run: Run, series: Series, stem: Path) -> str:
     network = peristalsis_network(run.config.body.n_segments, PeristalsisParameters())
-    network_diagram.figure_6_network_diagram(network, stem)
-    return network_diagram.CAPTION
+    network_figure(network, stem)
+    return NETWORK_CAPTION
 
 
 def _figure_7(run: Run, series: Series, stem: Path) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.analysis.robot import ROBOT_ELONGATION_M
+from annelid.analysis.paper import ROBOT_ELONGATION_M
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Store
 from annelid_studies.weak_middle.pulls import base_body, force_limited

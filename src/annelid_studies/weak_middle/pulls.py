@@ -8,7 +8,7 @@ from functools import partial
 from math import isfinite, nan
 from typing import Any
 
-from annelid.analysis.robot import ROBOT_ELONGATION_M
+from annelid.analysis.paper import ROBOT_ELONGATION_M
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
 from annelid.body.assemble import mesh_of

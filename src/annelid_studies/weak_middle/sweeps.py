@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from annelid.analysis.elongation import interior_deficit
+from annelid.analysis.summary import interior_deficit
 from annelid.body.assemble import mesh_of
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case

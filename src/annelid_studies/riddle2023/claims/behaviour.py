@@ -7,8 +7,8 @@ from math import nan
 
 import numpy as np
 
-from annelid.analysis.elongation import end_difference, middle_deficit
 from annelid.analysis.rhythm import CONTRACTED
+from annelid.analysis.summary import end_difference, middle_deficit
 from annelid.control.sns import Sns
 from annelid.experiment.case import Case
 from annelid.simulation.runfile import Run

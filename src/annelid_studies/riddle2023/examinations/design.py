@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from annelid.analysis import RhythmScore
-from annelid.analysis.elongation import middle_deficit
+from annelid.analysis.summary import middle_deficit
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.morphology import Array

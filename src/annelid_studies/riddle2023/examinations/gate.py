@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.analysis.rhythm import contractions, segment_activation
-from annelid.analysis.score import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore, contractions, segment_activation
+from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.morphology import Array

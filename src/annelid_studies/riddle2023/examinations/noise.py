@@ -14,8 +14,7 @@ import numpy as np
 
 from annelid.analysis import RhythmScore
 from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title
+from annelid.draw.canvas import canvas, panel_title, save_both
 from annelid.experiment.case import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import words

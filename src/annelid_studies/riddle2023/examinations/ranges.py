@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from annelid.analysis.elongation import middle_deficit
 from annelid.analysis.paper import published
+from annelid.analysis.summary import middle_deficit
 from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save_both
 from annelid.morphology import Array

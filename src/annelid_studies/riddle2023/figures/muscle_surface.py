@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.body.actuators.muscle import Rings
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
 from annelid.morphology import Array
 
 if TYPE_CHECKING:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.config import RunConfig, load_config
-from annelid.draw.canvas import canvas, save_both
+from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
 from annelid.draw.planar_scene import bent_rhombi, rhombi
-from annelid.draw.style import panel_title, segment_colors
 from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.planar.sections import PlanarWorm

@@ -18,9 +18,8 @@ from annelid.analysis.rhombi import (
     rhombus_plane,
 )
 from annelid.draw.camera import picture_axes
-from annelid.draw.canvas import WIDTH_IN, canvas, save_both
+from annelid.draw.canvas import WIDTH_IN, canvas, panel_title, save_both
 from annelid.draw.planar_scene import rhombi as flat_rhombi
-from annelid.draw.style import panel_title
 from annelid.morphology import Array, MeshGeometry
 from annelid_studies.riddle2023.figures.renderings import (
     Place,

@@ -16,11 +16,9 @@ from annelid.body.formulations.rods.net import PIN_RGBA, STRAND_RGBA
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
-from annelid.draw.canvas import canvas, save_both
+from annelid.draw.canvas import CONTRACTED, activation_color, canvas, panel_title, save_both
 from annelid.draw.gl import find_backend
-from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, postures_of, render_still
-from annelid.draw.skeleton import Skeleton
-from annelid.draw.style import CONTRACTED, activation_color, panel_title
+from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, postures_of, render_still
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation.worm import compile_worm

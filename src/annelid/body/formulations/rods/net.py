@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options
+from annelid.arena.geoms import contact_options
 from annelid.body.actuation import crossing_site
 from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
 from annelid.body.worm import Strands, WormBody
@@ -46,33 +46,11 @@ TWIST_MASS_KG = 1e-9
 def add_rods(
     spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: ArenaKind, *, dampers: bool
 ) -> None:
-    """Adds the mesh as a net of rods, and the solver settings that it needs.
+    """Adds the mesh as a net of rods, and the solver settings that it needs, as `FormulationKind.add`.
 
-    Args:
-        spec: An empty spec.
-        geometry: The mesh at rest.
-        body: Materials and pins.
-        formulation: Numerical settings of the rods.
-        arena: Contact settings, which the strands share with the floor.
-        dampers: Whether somebody lets the dampers of bending follow the posture; without them they would mislead.
+    ``dampers`` are for a plant that lets the dampers of bending follow the posture; without that they would mislead.
     """
-    _set_solver(spec, formulation)
-    names = _add_vertices(spec, geometry, body, formulation, contact_options(arena))
-    for strand in range(geometry.n_strands):
-        add_rod(
-            spec,
-            f"strand_{strand}",
-            geometry.vertices_m[strand],
-            names[strand],
-            body.strands,
-            formulation,
-            rgba=STRAND_RGBA[strand // geometry.n_per_plane],
-            dampers=dampers,
-        )
-
-
-def _set_solver(spec: mujoco.MjSpec, formulation: Rods) -> None:
-    """Sets the one combination under which stiff rods are stable: implicit in position, with Newton."""
+    # The one combination under which stiff rods are stable: implicit in position, with Newton.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.iterations = formulation.solver_iterations
@@ -80,16 +58,16 @@ def _set_solver(spec: mujoco.MjSpec, formulation: Rods) -> None:
     spec.option.impratio = formulation.friction_impedance_ratio
     # The net is one island; looking for others takes 3 % of a step.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
+    names = _add_vertices(spec, geometry, body, formulation, contact_options(arena))
+    for strand, (vertices_m, bodies) in enumerate(zip(geometry.vertices_m, names, strict=True)):
+        rgba = STRAND_RGBA[strand // geometry.n_per_plane]
+        add_rod(spec, f"strand_{strand}", vertices_m, bodies, body.strands, formulation, rgba=rgba, dampers=dampers)
 
 
 def _add_vertices(
     spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, contact: dict[str, list[float]]
 ) -> list[list[str]]:
-    """Adds a body for every vertex, crossings first (which the solver is fastest with).
-
-    Returns:
-        The names of each strand's bodies from front to back.
-    """
+    """Adds a body for every vertex, crossings first (which the solver is fastest with); returns each strand's names."""
     masses = lumped_masses(geometry.vertices_m[0], body.strands.linear_density_kg_per_m).tolist()
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
     shared = formulation.pins == "shared"
@@ -148,12 +126,8 @@ def vertex_name(strand: int, vertex: int | str) -> str:
 
 def _tie(spec: mujoco.MjSpec, pin: mujoco.MjsBody, point: mujoco.MjsBody, formulation: Rods) -> None:
     """Ties a strand's vertex to its pin by a spring and a dashpot at one place."""
-    solref, solimp = spring_row(
-        1.0 / pin.mass + 1.0 / point.mass,
-        formulation.pin_stiffness_N_per_m,
-        formulation.pin_damping_Ns_per_m,
-        formulation.pin_inertance_kg,
-    )
+    stiffness, damping = formulation.pin_stiffness_N_per_m, formulation.pin_damping_Ns_per_m
+    row = spring_row(1.0 / pin.mass + 1.0 / point.mass, stiffness, damping, formulation.pin_inertance_kg)
     spec.add_equality(
         name=f"tie_{point.name}",
         type=mujoco.mjtEq.mjEQ_CONNECT,
@@ -161,8 +135,8 @@ def _tie(spec: mujoco.MjSpec, pin: mujoco.MjsBody, point: mujoco.MjsBody, formul
         name1=pin.name,
         name2=point.name,
         data=[0.0] * 12,
-        solref=solref,
-        solimp=solimp,
+        solref=row[0],
+        solimp=row[1],
     )
 
 
@@ -172,13 +146,8 @@ def spring_row(
     """Returns the engine's ``solref`` and ``solimp`` of a constraint row that acts as spring, dashpot and inerter.
 
     A row's force is ``(-b v - k r - a) / R`` for a violation r, its rate v and its acceleration a, where
-    ``R = inverse_mass (1 - d) / d`` at impedance d, and the engine divides the coefficients given by d and d^2.
-
-    Args:
-        inverse_mass: The row's inverse inertia at rest as the engine computes it, 1/kg (or 1/(kg m^2)).
-        stiffness: Force per violation, N/m (or N m/rad).
-        damping: Force per rate, N s/m (or N m s/rad).
-        inertance: Force per acceleration, kg (or kg m^2).
+    ``R = inverse_mass (1 - d) / d`` at impedance d, and the engine divides the coefficients given by d and d^2. The
+    row's inverse inertia at rest is as the engine computes it, 1/kg, or of a hinge 1/(kg m^2).
     """
     impedance = inertance * inverse_mass / (1.0 + inertance * inverse_mass)
     compliance = inverse_mass * (1.0 - impedance) / impedance
@@ -190,15 +159,8 @@ def spring_row(
 
 def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> mujoco.MjsBody:
     """Adds a point mass on three slides along the world's axes, the form that the Newton solver is fastest on."""
-    point = spec.worldbody.add_body(
-        name=name,
-        pos=position,
-        mass=mass,
-        ipos=[0.0, 0.0, 0.0],
-        iquat=[1.0, 0.0, 0.0, 0.0],
-        inertia=[1e-6 * mass] * 3,
-        explicitinertial=True,
-    )
+    point = add_holder(spec, name, mass, 1e-6 * mass)
+    point.pos = position
     for axis, letter in zip(AXES, "xyz", strict=True):
         point.add_joint(name=f"{name}_{letter}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     return point
@@ -207,11 +169,7 @@ def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> 
 def add_touch(point: mujoco.MjsBody, radius_m: float, contact: dict[str, list[float]], place_m: Array = ORIGIN) -> None:
     """Lets a vertex touch the ground: one sphere, where a flex would make a contact for each strand of a crossing.
 
-    Args:
-        point: The vertex' body.
-        radius_m: Radius of the strand.
-        contact: Contact attributes.
-        place_m: The vertex in the body's axes, m, ``(3,)``.
+    Its place is in the axes of the vertex' body, m, ``(3,)``, and its radius that of the strand.
     """
     point.add_geom(
         type=mujoco.mjtGeom.mjGEOM_SPHERE,

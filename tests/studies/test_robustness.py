@@ -14,7 +14,7 @@ from annelid.control.open_loop import TimedWave
 from annelid.errors import ConfigError, RunFileError
 from annelid.plausibility import tolerance_window_m
 from annelid_studies import robustness as study
-from annelid_studies.robustness import CONTROLLERS, STARTS, Judged, Point, judge, points, shares, shares_table, wilson
+from annelid_studies.robustness import CONTROLLERS, STARTS, Judged, Point, judge, points, shares, wilson
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -95,10 +95,8 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         model = spec.compile()
     except ValueError as error:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
-        remedy = next(
-            (f" ({reason}): {remedy}" for words, remedy in _REMEDIES.items() if words in reason), f": {reason}"
-        )
-        raise ConfigError(f"the engine refuses this body{remedy}") from None
+        remedy = next((f"{remedy} ({reason})" for words, remedy in _REMEDIES.items() if words in reason), reason)
+        raise ConfigError(f"the engine refuses this body: {remedy}") from None
     order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:

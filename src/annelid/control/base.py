@@ -242,21 +242,26 @@ class CallableController:
         Raises:
             ConfigError: The activation is no number, has another shape, or leaves [0, 1].
         """
-        result, n, time = self._function(sensation), self._n_muscles, f"at {sensation.time_s:g} s; it must"
-        returned = "the controller function returned"
+        result, n, time_s = self._function(sensation), self._n_muscles, sensation.time_s
         try:
             activation = np.array(result, dtype=np.float64)
         except (TypeError, ValueError):
-            problem = f"{returned} {type(result).__name__} {time} return {n} numbers in [0, 1]"
-            raise ConfigError(problem) from None
+            raise ConfigError(
+                f"the controller function returned {type(result).__name__} at {time_s:g} s; it must return {n} numbers "
+                "in [0, 1]"
+            ) from None
         if activation.ndim == 0:
             activation = np.full(n, activation)
         if activation.shape != (n,):
-            raise ConfigError(f"{returned} shape {activation.shape} {time} return shape ({n},)")
+            raise ConfigError(
+                f"the controller function returned shape {activation.shape} at {time_s:g} s; it must return shape "
+                f"({n},)"
+            )
         within = (activation >= 0.0) & (activation <= 1.0)
         if not within.all():
             worst = int(np.argmin(within))
             raise ConfigError(
-                f"{returned} activation {activation[worst]:g} for muscle {worst + 1} {time} lie in [0, 1]"
+                f"the controller function returned activation {activation[worst]:g} for muscle {worst + 1} at "
+                f"{time_s:g} s; it must lie in [0, 1]"
             )
         return activation

@@ -176,16 +176,19 @@ class Simulation:
 
     def check_activation(self, activation: Array) -> None:
         """Stops a controller that breaks its promise before its numbers reach the engine."""
-        reason = ""
         if activation.shape != self.activation.shape:
-            reason = f"activation of shape {activation.shape}, not {self.activation.shape}"
+            raise SimulationStopped(
+                self.at(f"the controller gave activation of shape {activation.shape}, not {self.activation.shape}")
+            )
         # Written so that NaN fails it; for a few muscles faster than numpy.
-        elif not all(-_ACTIVATION_SLACK <= value <= 1 + _ACTIVATION_SLACK for value in activation.tolist()):
+        if not all(-_ACTIVATION_SLACK <= value <= 1 + _ACTIVATION_SLACK for value in activation.tolist()):
             bad = ~((activation >= -_ACTIVATION_SLACK) & (activation <= 1 + _ACTIVATION_SLACK))
             muscle = int(np.argmax(bad))
-            reason = f"muscle {muscle + 1} an activation of {activation[muscle]:g}, not in 0 .. 1"
-        if reason:
-            raise SimulationStopped(self.at(f"the controller gave {reason}"))
+            raise SimulationStopped(
+                self.at(
+                    f"the controller gave muscle {muscle + 1} an activation of {activation[muscle]:g}, not in 0 .. 1"
+                )
+            )
 
     def checkpoint(self) -> Checkpoint | None:
         """Returns all that the next step depends on, or None if plant or controller cannot be saved."""

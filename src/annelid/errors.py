@@ -9,6 +9,20 @@ from numbers import Real
 
 from annelid.text import printable
 
+__all__ = [
+    "AnnelidError",
+    "ClusterError",
+    "ConfigError",
+    "MissingDependency",
+    "MixedEngine",
+    "RenderingUnavailable",
+    "RunFileError",
+    "RunKilled",
+    "SimulationStopped",
+    "UnreadableText",
+    "suggest",
+]
+
 MOST_SHOWN = 80
 """Characters of a value in an error sentence."""
 MOST_LISTED = 300

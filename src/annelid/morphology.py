@@ -20,6 +20,8 @@ from math import asin, cos, floor, hypot, pi, radians, sin
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Array", "Indices", "MeshGeometry", "helical_mesh"]
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 

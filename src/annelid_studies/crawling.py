@@ -9,18 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from annelid.body.worm import WormBody
+from annelid.body import WormBody
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
+from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store
-from annelid.experiment.tune.judge import Judged
-from annelid.experiment.tune.search import judged_run
+from annelid.experiment import Case, Judged, Store, StudyProgress, in_stage, judged_run
+from annelid.markdown import Table
 from annelid.morphology import Array
 from annelid.output import write_csv
 from annelid_studies.riddle2023.examination import Effort

@@ -10,14 +10,9 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from annelid.analysis.gait import gait
-from annelid.analysis.passage import Passage, passage_of
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
-from annelid.draw.style import panel_title, segment_colors
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store
+from annelid.analysis import Passage, gait, passage_of
+from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
+from annelid.experiment import Case, Store, StudyProgress, in_stage
 from annelid.morphology import Array
 from annelid_studies.tables import tabulated, terminal_table
 
@@ -25,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from rich.table import Table as TerminalTable
 
-    from annelid.simulation.runfile import Run
+    from annelid.simulation import Run
 
 PRESET = "riddle2025-muscles"
 CM = 100.0

@@ -20,17 +20,13 @@ from math import sqrt
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
-from annelid.analysis.score import DESIGN_INTERVAL_S
-from annelid.draw.markdown import plain_table
+from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
-from annelid.experiment.fingerprint import code_fingerprint
-from annelid.experiment.store import Store, case_key
-from annelid.experiment.workers import Workers
+from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, Workers, case_key, code_fingerprint
+from annelid.markdown import plain_table
 from annelid.output import whole_file
 from annelid.plausibility import tolerance_window_m
-from annelid.simulation.lock import locks
+from annelid.simulation import locks
 from annelid.textfiles import read_json
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import RODS

@@ -7,7 +7,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from annelid.draw.markdown import Table
+from annelid.markdown import Table
 from annelid.output import write_csv
 
 if TYPE_CHECKING:

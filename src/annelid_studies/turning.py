@@ -10,13 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.track import Track, track_of, turn_of
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
-from annelid.draw.style import panel_title, segment_colors
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store
+from annelid.analysis import Track, track_of, turn_of
+from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
+from annelid.experiment import Case, Store, StudyProgress, in_stage
 from annelid_studies.tables import tabulated, terminal_table
 
 if TYPE_CHECKING:

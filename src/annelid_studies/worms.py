@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from annelid.experiment.case import Case
+from annelid.experiment import Case
 
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, rigid crossings, soft crossings in seconds."""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.analysis.detector import Detection, detect, precision_recall, score
+from annelid.analysis.detector import Detection, detect_slip, precision_recall, score_detections
 from annelid.analysis.slip import slip_cost
 from annelid.errors import RunFileError
 from annelid.protocols import Array
@@ -26,7 +26,7 @@ def detection(slips: list[int], estimated: list[float]) -> Detection:
 
 def test_a_perfect_detector_scores_full_marks() -> None:
     truth = [0] * 20 + [1] * 10 + [0] * 20
-    got = score([detection(truth, [0.3 * one for one in truth])], 0.1)
+    got = score_detections([detection(truth, [0.3 * one for one in truth])], 0.1)
     assert (got.precision, got.recall, got.found, got.episodes) == (1.0, 1.0, 1.0, 1)
     assert (got.delay_s, got.false_alarms_per_s) == (0.0, 0.0)
     assert got.base_rate == pytest.approx(0.2)
@@ -38,7 +38,7 @@ def test_late_false_and_missed_alarms_are_counted() -> None:
     told = [0.0] * 51
     for i in (13, 14, 15, 16, 45, 46):
         told[i] = 0.3
-    got = score([detection(truth, told)], 0.1)
+    got = score_detections([detection(truth, told)], 0.1)
     assert got.precision == pytest.approx(4 / 6)
     assert got.recall == pytest.approx(4 / 20)
     assert (got.episodes, got.found) == (2, 0.5)
@@ -47,10 +47,10 @@ def test_late_false_and_missed_alarms_are_counted() -> None:
 
 
 def test_nothing_told_has_no_precision_and_no_slip_no_recall() -> None:
-    silent = score([detection([1] * 10, [0.0] * 10)], 0.1)
+    silent = score_detections([detection([1] * 10, [0.0] * 10)], 0.1)
     assert isnan(silent.precision)
     assert silent.recall == 0.0
-    resting = score([detection([0] * 10, [0.0] * 10)], 0.1)
+    resting = score_detections([detection([0] * 10, [0.0] * 10)], 0.1)
     assert isnan(resting.recall)
 
 
@@ -100,21 +100,21 @@ def sliding(speed: Array, load: Array) -> Recorded:
 def test_true_slip_is_a_mean_over_a_window_weighted_by_load() -> None:
     speed = np.zeros(40)
     speed[20] = 0.5
-    found = detect(sliding(speed, np.full(40, 4.0)))  # type: ignore[arg-type]
+    found = detect_slip(sliding(speed, np.full(40, 4.0)))  # type: ignore[arg-type]
     assert np.flatnonzero(found.slips[:, 0]).tolist() == [18, 19, 20, 21, 22]
     assert found.true_m_per_s[18:23, 0] == pytest.approx(np.full(5, 0.1))
     assert not found.slips[:, 1:].any()
 
 
 def test_what_bears_no_load_does_not_slip() -> None:
-    found = detect(sliding(np.full(40, 0.5), np.full(40, 0.9)))  # type: ignore[arg-type]
+    found = detect_slip(sliding(np.full(40, 0.5), np.full(40, 0.9)))  # type: ignore[arg-type]
     assert not found.slips.any()
 
 
 def test_a_run_without_skin_is_refused() -> None:
     run = Recorded(xr.Dataset(coords={"time": np.arange(3.0)}))
     with pytest.raises(RunFileError, match="holds no touch of a skin"):
-        detect(run)  # type: ignore[arg-type]
+        detect_slip(run)  # type: ignore[arg-type]
 
 
 @dataclass

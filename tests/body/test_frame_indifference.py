@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from annelid import simulate
 from annelid.analysis import summary
 from annelid.analysis.gait import cycle_marks
-from annelid.analysis.travel import way_ahead
+from annelid.analysis.travel import forward_position
 from annelid.config import load_config
 from annelid.protocols import Array
 from annelid.simulation.placing import Placed, turned
@@ -168,7 +168,7 @@ def test_a_worm_walks_alike_along_x_along_y_and_between_them(tmp_path: Path) -> 
         numbers, marks = summary(run), cycle_marks(run)
         assert numbers.wave
         elongation.append(numbers.elongation_mean_max_m)
-        ahead = np.interp(marks[:3], run.data["time"].values, way_ahead(run))
+        ahead = np.interp(marks[:3], run.data["time"].values, forward_position(run))
         travel.append(ahead[-1] - ahead[0])
         print(f"heading {heading:g}: elongation {elongation[-1]}, travel in {len(ahead) - 1} cycles {travel[-1]} m")
     assert np.array(elongation[1:]) == pytest.approx(np.array([elongation[0]] * 2), rel=5e-3)

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.draw.canvas import canvas, save_both
-from annelid.draw.markdown import anchors, cell, code, words
 from annelid.errors import RunFileError
+from annelid.markdown import anchors, cell, code, words
 from annelid.text import printable
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, Verdict
 from annelid_studies.riddle2023.examination import Examination, Findings, Table

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from annelid.analysis.detector import Score
+from annelid.analysis.detector import DetectionScore
 from annelid.analysis.slip import SlipCost
 from annelid.config import load_config
 from annelid.control.pressure import PressureSns
@@ -77,7 +77,7 @@ def test_savings_are_told_against_no_feedback_on_the_same_friction(tmp_path: Pat
 
 
 def test_scores_are_written_under_their_names(tmp_path: Path) -> None:
-    write_scores({"a": Score(0.5, 0.25, 0.1, 2.0, 7, 0.75, 0.03, 0.9)}, tmp_path / "d.csv")
+    write_scores({"a": DetectionScore(0.5, 0.25, 0.1, 2.0, 7, 0.75, 0.03, 0.9)}, tmp_path / "d.csv")
     [row] = csv.DictReader((tmp_path / "d.csv").read_text(encoding="utf-8").splitlines())
     assert row["run"] == "a"
     assert [float(row[name]) for name in ("precision", "recall", "episodes", "delay_s")] == [0.5, 0.25, 7, 0.03]

@@ -16,8 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid import simulate
-from annelid.analysis import RhythmScore, Summary
-from annelid.analysis.robot import ROBOT_ELONGATION_M
+from annelid.analysis import ROBOT_ELONGATION_M, RhythmScore, Summary
 from annelid.body.worm import WormBody
 from annelid.errors import ConfigError
 from annelid.experiment.outcome import Hold, Outcome, outcome

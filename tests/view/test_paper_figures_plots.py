@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
+from annelid.analysis import ROBOT_ELONGATION_M
 from annelid.body.actuators.muscle import Rings
 from annelid.body.worm import WormBody
 from annelid.config import load_config
@@ -287,7 +287,7 @@ def test_abbreviations_tell_names_apart() -> None:
 
 @pytest.mark.parametrize("conductances", [False, True])
 def test_figure_6(network: Network, tmp_path: Path, conductances: bool) -> None:
-    png = network_diagram.figure_6_network_diagram(network, tmp_path / "figure_6", conductances=conductances)
+    png = network_diagram.network_figure(network, tmp_path / "figure_6", conductances=conductances)
     assert_two_good_files(png)
     ids = Counter(node.get("id") for node in ElementTree.parse(png.with_suffix(".svg")).iter() if node.get("id"))
     for name in network.neurons:
@@ -298,7 +298,7 @@ def test_figure_6(network: Network, tmp_path: Path, conductances: bool) -> None:
 
 
 def test_the_robots_published_percentages_follow_from_its_elongations() -> None:
-    below = 100 * (1 - relative_to_first(ROBOT_ELONGATION_M))
+    below = 100 * (1 - np.divide(ROBOT_ELONGATION_M, ROBOT_ELONGATION_M[0]))
     assert below == pytest.approx([0.0, 37.8, 22.2, 2.75], abs=0.1)
 
 

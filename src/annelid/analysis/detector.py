@@ -47,7 +47,7 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
+class DetectionScore:
     """How good a detector is; samples of all segments count alike.
 
     Attributes:
@@ -71,7 +71,7 @@ class Score:
     correlation: float
 
 
-def detect(run: Run, detector: SlipDetector | None = None) -> Detection:
+def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
     """Lets a detector (by default `SlipDetector` as it is) read a run sample by sample, the true slip beside it.
 
     Raises:
@@ -108,7 +108,7 @@ def _windowed(values: Array, load_N: Array, interval_s: float) -> tuple[Array, A
     return mean(values * load_N) / np.where(load > 0.0, load, 1.0), load
 
 
-def score(detections: list[Detection], limit_m_per_s: float) -> Score:
+def score_detections(detections: list[Detection], limit_m_per_s: float) -> DetectionScore:
     """Scores a detector, which tells slip above an estimated speed, over the runs of some detections together."""
     alarms = episodes = 0
     delays = list[float]()
@@ -123,7 +123,7 @@ def score(detections: list[Detection], limit_m_per_s: float) -> Score:
                     delays += [float(one.time_s[first + within[0]] - one.time_s[first])] if within.size else []
     hits = sum(int((alarm & one.slips).sum()) for one, alarm in zip(detections, told, strict=True))
     slips = sum(int(one.slips.sum()) for one in detections)
-    return Score(
+    return DetectionScore(
         precision=_share(hits, sum(int(alarm.sum()) for alarm in told)),
         recall=_share(hits, slips),
         base_rate=_share(slips, sum(one.slips.size for one in detections)),
@@ -156,5 +156,5 @@ def _stretches(on: Bools) -> list[tuple[int, int]]:
 
 def precision_recall(detections: list[Detection], limits_m_per_s: Array) -> tuple[Array, Array]:
     """Returns recall and precision over some runs together for every limit, ``(n_limits,)`` each."""
-    scores = [score(detections, float(limit)) for limit in limits_m_per_s]
+    scores = [score_detections(detections, float(limit)) for limit in limits_m_per_s]
     return np.array([one.recall for one in scores]), np.array([one.precision for one in scores])

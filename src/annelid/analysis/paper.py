@@ -8,13 +8,17 @@ from functools import cache
 from importlib import resources
 
 from annelid.analysis.comparison import differing_fields, relative_difference
-from annelid.analysis.robot import ROBOT_ELONGATION_M
 from annelid.analysis.summary import Summary
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, preset_names
 from annelid.control.sns import paper_controller
 from annelid.textfiles import parse_json
 
+ROBOT_ELONGATION_M = (0.0615, 0.0382, 0.0478, 0.0598)
+"""Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m: each the mean of the left
+and the right stretch sensor. Riddle et al. 2023, section 4, from data of Wang. Its Fig. 9 shows the readings over
+time as a graph; numbers are given of these maxima only.
+"""
 PAPER_2023 = "Riddle et al. 2023"
 PAPER_2022 = "Riddle et al. 2022"
 FORMULATION = "riddle2023"

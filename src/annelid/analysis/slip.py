@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.gait import cycle_marks
-from annelid.analysis.travel import way_ahead
+from annelid.analysis.travel import forward_position
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -40,6 +40,8 @@ def slip_cost(run: Run) -> SlipCost | None:
         return None
     ends = np.searchsorted(run.data["time"].values, marks[[0, -1]])
     loss = run.data["slip_loss"].values.sum(axis=1)
-    duration, way, lost = (float(np.diff(each[ends])[0]) for each in (run.data["time"].values, way_ahead(run), loss))
+    duration, way, lost = (
+        float(np.diff(each[ends])[0]) for each in (run.data["time"].values, forward_position(run), loss)
+    )
     cycles = len(marks) - 1
     return SlipCost(cycles, duration / cycles, way / duration, lost / duration, lost / way if way > 0.0 else np.inf)

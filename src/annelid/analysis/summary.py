@@ -13,7 +13,7 @@ import numpy as np
 from annelid.analysis.elongation import elongation, end_difference, middle_deficit
 from annelid.analysis.forces import contraction_forces, net_work, positive_work
 from annelid.analysis.rhythm import Rhythm, run_rhythm
-from annelid.analysis.travel import net_travel, path_travel, way_ahead
+from annelid.analysis.travel import forward_position, net_travel, path_travel
 from annelid.protocols import Array
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def summary(run: Run) -> Summary:
     spread = read if read and data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
     pulling = np.concatenate([np.empty(0), *forces])
-    ahead = way_ahead(run) if "center_of_mass" in data else np.empty(0)
+    ahead = forward_position(run) if "center_of_mass" in data else np.empty(0)
     return Summary(
         name=run.config.name,
         status=run.status,

@@ -25,7 +25,7 @@ def first_heading(run: Run) -> Array:
     return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
 
 
-def way_ahead(run: Run) -> Array:
+def forward_position(run: Run) -> Array:
     """Returns how far the centre of mass is where the worm leads at the start, m from the origin, ``(n_times,)``."""
     ahead, centre = first_heading(run), run.data["center_of_mass"]
     along: Array = ahead[0] * centre.sel(axis="x").values

@@ -15,6 +15,8 @@ import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from annelid.lazy import lazy
+
 if TYPE_CHECKING:
     from annelid.config.arena import ArenaKind
     from annelid.config.checking import check_config, field_paths, field_value, fields_of, unit_of, whole_path
@@ -36,30 +38,6 @@ if TYPE_CHECKING:
     from annelid.config.sensor import StretchSensor
     from annelid.config.study import Study, Vary, load_study
     from annelid.textfiles import toml_value
-
-_HOME = {
-    "arena": ("ArenaKind",),
-    "checking": ("check_config", "field_paths", "field_value", "fields_of", "unit_of", "whole_path"),
-    "cluster": ("Cluster", "find_cluster"),
-    "fidelity": ("LEVELS", "Fidelity", "find_level"),
-    "kinds": ("BodyKind", "ControllerKind", "Knob", "TurningKind", "kinds_of"),
-    "loading": (
-        "arena_names",
-        "arena_summary",
-        "arena_text",
-        "as_config",
-        "load_config",
-        "parse_assignments",
-        "preset_names",
-        "preset_text",
-    ),
-    "run": ("Clock", "Guard", "Record", "RunConfig"),
-    "sections": ("Section",),
-    "sensor": ("StretchSensor",),
-    "study": ("Study", "Vary", "load_study"),
-}
-_MODULE = {name: f"annelid.config.{module}" for module, names in _HOME.items() for name in names}
-_MODULE["toml_value"] = "annelid.textfiles"
 
 _MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
     "Contraction": "annelid.control.program",
@@ -108,9 +86,12 @@ __all__ = [
 ]
 
 
+_offered, __dir__ = lazy(__name__)
+
+
 def __getattr__(name: str) -> Any:
-    if name in _MODULE:
-        return getattr(import_module(_MODULE[name]), name)
+    if name in __all__:
+        return _offered(name)
     from annelid.config.kinds import class_named
 
     # Where the first edition had them; for one release.
@@ -123,7 +104,3 @@ def __getattr__(name: str) -> Any:
     where = f"{found.__module__}.{found.__name__}"
     warnings.warn(f"annelid.config.{name} is now {where}", DeprecationWarning, stacklevel=2)
     return found
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
-from annelid.draw.markdown import anchors
+from annelid.markdown import anchors
 from annelid.text import printable
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ _CELL = re.compile(r"<t[hd][^>]*>(.*?)</t[hd]>", re.DOTALL)
 _ITEM = re.compile(r"<li>(.*?)</li>", re.DOTALL)
 
 
-def page(title: str, head: str, contents: str, content: str, folder: Path) -> str:
+def html_page(title: str, head: str, contents: str, content: str, folder: Path) -> str:
     """Returns an HTML page.
 
     Beyond plain Markdown, a picture and the paragraph after it become a figure with its caption, and the items of

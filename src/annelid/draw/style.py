@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from annelid.text import printable
 
 if TYPE_CHECKING:
@@ -50,6 +48,7 @@ def segment_colors(n_segments: int) -> list[Any]:
     """
     if n_segments <= len(_FEW):
         return list(_FEW[:n_segments])
+    import numpy as np
     from matplotlib import colormaps
 
     return [tuple(rgba) for rgba in colormaps["viridis"](np.linspace(0.0, 0.88, n_segments))]

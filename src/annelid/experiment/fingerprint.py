@@ -1,7 +1,8 @@
 """Digests of annelid's code and of the engine: what runs, numbers and pictures are made by.
 
-Only what computes counts. Comments, docstrings, the layout of the text, descriptions of a configuration's fields and
-imports for type checkers do not. Which modules are meant is found by following their imports, so none is forgotten.
+Only what computes counts. Comments, docstrings, the layout of the text, descriptions of a configuration's fields, lists
+of public names and imports for type checkers do not. Which modules are meant is found by following their imports, so
+none is forgotten.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import annelid
+from annelid.lazy import offered
 
 SOURCE = Path(annelid.__file__).parent.parent
 PACKAGES = ("annelid", "annelid_studies")
@@ -27,8 +29,8 @@ PHYSICS = tuple(
 """The code that computes runs, with all that it imports."""
 READERS = ("annelid.experiment.outcome",)
 """The code that reads a run's outcome: where it has changed, the outcome is read again, and the run kept."""
-_NO_RESULT = {*PACKAGES, "annelid.simulation.progress"}
-"""Modules that no number depends on: the list of public names, and the progress bar."""
+_NO_RESULT = {*PACKAGES, "annelid.lazy", "annelid.simulation.progress"}
+"""Modules that no number depends on: the list of public names, how they are loaded, and the progress bar."""
 
 
 @cache
@@ -94,7 +96,11 @@ def _said(parts: Iterable[Any], of: ast.AST) -> Iterator[Any]:
     """Those parts of some code that something depends on."""
     for part in parts:
         match part, of:
-            case (ast.Expr(ast.Constant()), _) | (ast.keyword("description"), ast.Call(ast.Name("Field"))):
+            case (
+                (ast.Expr(ast.Constant()), _)
+                | (ast.keyword("description"), ast.Call(ast.Name("Field")))
+                | (ast.Assign([ast.Name("__all__")]), ast.Module())
+            ):
                 pass
             case ast.If(ast.Name("TYPE_CHECKING")), _:
                 yield from _said(part.orelse, part)
@@ -130,7 +136,7 @@ def _imported(name: str) -> frozenset[str]:
     for statement in _statements(_parsed(name)):
         named = []
         if isinstance(statement, ast.ImportFrom):
-            named = [f"{statement.module}.{alias.name}" for alias in statement.names]
+            named = [_home(str(statement.module), alias.name) for alias in statement.names]
         elif isinstance(statement, ast.Import):
             named = [alias.name for alias in statement.names]
         for whole in named:
@@ -139,6 +145,16 @@ def _imported(name: str) -> frozenset[str]:
                 if _path(inner := ".".join(parts[:end])).exists():
                     found.add(inner)
     return frozenset(found)
+
+
+def _home(module: str, name: str) -> str:
+    """Full name of what a statement imports, also where a package loads it from another module on first use."""
+    package = SOURCE.joinpath(*module.split("."))
+    if module.split(".")[0] in PACKAGES and package.is_dir():
+        home = offered(_parsed(module)).get(name)
+        if home not in (None, module):
+            return _home(home, name)
+    return f"{module}.{name}"
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 from annelid.analysis import gait, summary
 from annelid.config import RunConfig, field_value, fields_of, toml_value
 from annelid.draw.figures.track import track_figure
-from annelid.draw.markdown import anchors, code, emphasis, table, words
-from annelid.draw.page import page
+from annelid.draw.page import html_page
 from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame
 from annelid.draw.table import COMPARED, closing_sentence, gait_rows, legend, summary_rows
 from annelid.errors import AnnelidError
+from annelid.markdown import anchors, code, emphasis, table, words
 from annelid.output import whole_file
 from annelid.references import bibtex, references_of
 
@@ -43,7 +43,7 @@ def write_page(run: Run, path: Path, progress: Progress = lambda done, total: No
         contents = "\n".join(f"- [{heading}](#{anchor})" for heading, anchor in links)
         times = run.data["time"].values
         title = f"{run.config.name}: {run.config.body.n_segments} segments, {times[0]:g} to {times[-1]:g} s"
-        html = page(title, f"# {words(title)}\n\n{_head(run)}", contents, "\n\n".join(blocks), Path(temporary))
+        html = html_page(title, f"# {words(title)}\n\n{_head(run)}", contents, "\n\n".join(blocks), Path(temporary))
     with whole_file(path) as draft:
         draft.write_text(html, encoding="utf-8")
     return path

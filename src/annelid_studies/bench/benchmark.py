@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from annelid.output import write_json
-from annelid.simulation.lock import locks
+from annelid.simulation import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
 from annelid_studies.bench.store import MeasurementFailed, Measurements
 from annelid_studies.riddle2023.examination import Effort

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any, Literal
 
-from annelid.body.worm import WormBody
+from annelid.body import WormBody
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
-from annelid.experiment.case import Case
+from annelid.experiment import Case
 from annelid_studies.riddle2023.examination import Effort
 from annelid_studies.worms import CHAIN, RODS
 

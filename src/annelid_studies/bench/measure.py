@@ -15,7 +15,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import AnnelidError, SimulationStopped
-from annelid.experiment.lifeline import end_after
+from annelid.experiment import end_after
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -56,12 +56,8 @@ def measure(config: RunConfig) -> dict[str, Any]:
     """
     import numpy as np
 
-    from annelid.experiment.outcome import outcome
-    from annelid.simulation.assemble import build_controller
-    from annelid.simulation.loop import simulate
-    from annelid.simulation.runfile import open_run
-    from annelid.simulation.stepping import start
-    from annelid.simulation.worm import WormPlant
+    from annelid.analysis import rhythm_score, summary
+    from annelid.simulation import WormPlant, build_controller, open_run, simulate, start
     from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares
 
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
@@ -82,10 +78,10 @@ def measure(config: RunConfig) -> dict[str, Any]:
         peak = peak_memory_bytes()
         if run.status == "interrupted":
             raise KeyboardInterrupt
-        read = outcome(run)
+        numbers, rhythm = summary(run), rhythm_score(run)
     total_s = run.wall_time_s
     plant_s, control_s = stepping.seconds + watching.seconds, controlling.seconds
-    simulated_s = read.summary.duration_s or 0.0
+    simulated_s = numbers.duration_s or 0.0
     # From one movement to the next the whole loop goes round, recording included.
     laps_ms = 1e3 * laps_s(stepping.ends, stepping.readings, config.clock.physics_timestep_s)
     again = start(config, plant, controller, None)
@@ -93,9 +89,9 @@ def measure(config: RunConfig) -> dict[str, Any]:
     build_s, compile_s = _building(config)
     return {
         "status": run.status,
-        "message": read.message,
+        "message": run.message,
         "wall_s": total_s,
-        "real_time_factor": read.summary.real_time_factor,
+        "real_time_factor": numbers.real_time_factor,
         "simulated_s": simulated_s,
         "step_median_ms": float(np.median(laps_ms)) if laps_ms.size else None,
         "step_mean_ms": float(np.mean(laps_ms)) if laps_ms.size else None,
@@ -107,8 +103,8 @@ def measure(config: RunConfig) -> dict[str, Any]:
         "constraint_rows_mean": float(np.mean(engine.constraints or 0)),
         "solver_iterations_mean": float(np.mean(engine.iterations or 0)),
         "solver_iterations_max": max(engine.iterations, default=0),
-        "rhythm": {"verdict": read.rhythm.verdict, "reason": read.rhythm.reason},
-        "summary": read.summary.to_dict(),
+        "rhythm": {"verdict": rhythm.verdict, "reason": rhythm.reason},
+        "summary": numbers.to_dict(),
         "load_average_1min": load,
     }
 

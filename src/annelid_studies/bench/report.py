@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid.markdown import Table
 from annelid_studies.tables import terminal_table
 
 if TYPE_CHECKING:

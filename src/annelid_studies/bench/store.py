@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.errors import AnnelidError
-from annelid.experiment.fingerprint import code_fingerprint
-from annelid.experiment.store import case_key
+from annelid.experiment import case_key, code_fingerprint
 from annelid.output import whole_file
 from annelid.textfiles import read_json
 from annelid_studies.bench.cases import BenchCase

@@ -15,8 +15,7 @@ from annelid.errors import SimulationStopped
 if TYPE_CHECKING:
     import mujoco
 
-    from annelid.simulation.stepping import Simulation
-    from annelid.simulation.worm import WormPlant
+    from annelid.simulation import Simulation, WormPlant
 
 ENGINE_PHASES = ("position", "velocity", "actuation", "constraint", "advance")
 """The engine's timers that together make up a step, but for a rest."""

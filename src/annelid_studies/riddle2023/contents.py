@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from annelid.draw.markdown import Table
+from annelid.markdown import Table
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings
 
 Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]

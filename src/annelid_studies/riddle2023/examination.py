@@ -8,10 +8,9 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Literal
 
-from annelid.draw.markdown import Table
 from annelid.errors import suggest
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.experiment import Case, Outcome
+from annelid.markdown import Table
 
 Effort = Literal["quick", "full"]
 """Coarse and within minutes, or the whole."""

@@ -11,22 +11,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis.elongation import middle_deficit
-from annelid.analysis.paper import published
-from annelid.body.worm import WormBody
-from annelid.draw.figures import network_diagram
-from annelid.draw.markdown import Table
-from annelid.draw.plots import figure7
+from annelid.analysis import middle_deficit, published
+from annelid.body import WormBody
+from annelid.draw import figure7, network_figure
 from annelid.errors import ConfigError, suggest
-from annelid.experiment.case import Case
-from annelid.experiment.fingerprint import code_fingerprint
-from annelid.experiment.outcome import Outcome
-from annelid.experiment.store import Store, case_key
-from annelid.experiment.workers import Workers
+from annelid.experiment import Case, Outcome, Store, Workers, case_key, code_fingerprint
+from annelid.markdown import Table
 from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.output import whole_file
-from annelid.simulation.lock import locks
-from annelid.simulation.runfile import Run
+from annelid.simulation import Run, locks
 from annelid.textfiles import read_json
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
 from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
@@ -151,8 +144,17 @@ def _figure_5(run: Run, series: Series, stem: Path) -> str:
 
 def _figure_6(run: Run, series: Series, stem: Path) -> str:
     network = peristalsis_network(run.config.body.n_segments, PeristalsisParameters())
-    network_diagram.figure_6_network_diagram(network, stem)
-    return network_diagram.CAPTION
+    network_figure(network, stem)
+    return _CAPTION_6
+
+
+_CAPTION_6 = (
+    "The network that controls the worm, drawn from the network object that the simulation steps: one column a "
+    "segment. The contraction and the expansion neuron (U1, U2) form a half-centre: they have a persistent sodium "
+    "channel (double outline) and inhibit each other. The sensory neuron (U3), which the stretch sensor excites while "
+    "its segment is at rest length, holds the segment expanded; the relay (U4) silences the sensory neuron of the next "
+    "segment, and that of the last segment closes the ring to the first."
+)
 
 
 def _figure_7(run: Run, series: Series, stem: Path) -> str:

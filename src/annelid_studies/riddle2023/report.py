@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from annelid.draw.markdown import anchors, code, emphasis, plain_table, strong, table, words
-from annelid.draw.page import page
+from annelid.draw import html_page
+from annelid.markdown import anchors, code, emphasis, plain_table, strong, table, words
 from annelid.output import whole_file
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, tally
 
@@ -37,7 +37,7 @@ def write_report(report: Report, folder: Path) -> Path:
     head, sections = _head(report), _sections(report, folder)
     contents, content = _contents(sections), "\n\n".join(sections)
     _write(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
-    _write(folder / HTML_NAME, page(TITLE, head, contents, content, folder))
+    _write(folder / HTML_NAME, html_page(TITLE, head, contents, content, folder))
     return folder / HTML_NAME
 
 

@@ -12,12 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.detector import Detection, Score, detect, precision_recall, score
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store
+from annelid.analysis import Detection, DetectionScore, detect_slip, precision_recall, score_detections
+from annelid.draw import canvas, draw_lines, save_both
+from annelid.experiment import Case, Store, StudyProgress, in_stage
 from annelid.output import write_csv
 from annelid_studies.slip.feedback import DURATION_S, PLAIN, PRESET, PRESSURE, case
 from annelid_studies.tables import tabulated, terminal_table
@@ -62,29 +59,29 @@ def slip_detection(
     """
     cases = {name: CASES[name] for name in names or CASES}
     store.compute(cases.values(), jobs=jobs, progress=in_stage(progress, "detector"))
-    return {name: detect(store.run(one)) for name, one in cases.items()}
+    return {name: detect_slip(store.run(one)) for name, one in cases.items()}
 
 
-def scores(detections: Mapping[str, Detection]) -> dict[str, Score]:
+def scores(detections: Mapping[str, Detection]) -> dict[str, DetectionScore]:
     """Scores every run at the detector's own limit, and all of them but the one that it was chosen on together."""
-    each = {name: score([one], LIMIT_M_PER_S) for name, one in detections.items()}
+    each = {name: score_detections([one], LIMIT_M_PER_S) for name, one in detections.items()}
     unseen = [one for name, one in detections.items() if name != CHOSEN_ON]
-    return each | ({"all but the first": score(unseen, LIMIT_M_PER_S)} if unseen else {})
+    return each | ({"all but the first": score_detections(unseen, LIMIT_M_PER_S)} if unseen else {})
 
 
-def write_scores(told: Mapping[str, Score], path: Path) -> None:
+def write_scores(told: Mapping[str, DetectionScore], path: Path) -> None:
     """Writes one row a run as CSV with a header.
 
     Raises:
         RunFileError: The file cannot be written.
     """
     rows = ([name, *(f"{number:.5g}" for number in astuple(one))] for name, one in told.items())
-    write_csv(path, ["run", *(field.name for field in fields(Score))], rows)
+    write_csv(path, ["run", *(field.name for field in fields(DetectionScore))], rows)
 
 
-def detection_table(told: Mapping[str, Score]) -> TerminalTable:
+def detection_table(told: Mapping[str, DetectionScore]) -> TerminalTable:
     """Tabulates the scores."""
-    columns: Mapping[str, Callable[[tuple[str, Score]], str]] = {
+    columns: Mapping[str, Callable[[tuple[str, DetectionScore]], str]] = {
         "run": lambda row: row[0],
         "precision": lambda row: f"{row[1].precision:.2f}",
         "recall": lambda row: f"{row[1].recall:.2f}",
@@ -111,7 +108,7 @@ def detector_figure(detections: Mapping[str, Detection], stem: str | Path) -> Pa
     Raises:
         RunFileError: A file cannot be written.
     """
-    together = score(list(detections.values()), LIMIT_M_PER_S)
+    together = score_detections(list(detections.values()), LIMIT_M_PER_S)
     with canvas(3.6) as figure:
         axes = figure.subplots()
         curves = {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}

@@ -11,16 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from annelid.analysis.slip import SlipCost, slip_cost
+from annelid.analysis import SlipCost, slip_cost
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import draw_lines
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title
+from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store
+from annelid.experiment import Case, Store, StudyProgress, in_stage
+from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import terminal_table
 

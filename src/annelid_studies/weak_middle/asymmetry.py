@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.analysis.robot import ROBOT_ELONGATION_M
-from annelid.experiment.progress import StudyProgress
-from annelid.experiment.store import Store
+from annelid.analysis import ROBOT_ELONGATION_M
+from annelid.experiment import Store, StudyProgress
 from annelid_studies.weak_middle.pulls import base_body, force_limited
 from annelid_studies.weak_middle.sweeps import (
     FRICTION,

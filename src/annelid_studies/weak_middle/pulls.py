@@ -8,17 +8,11 @@ from functools import partial
 from math import isfinite, nan
 from typing import Any
 
-from annelid.analysis.robot import ROBOT_ELONGATION_M
-from annelid.body.actuators.muscle import Rings
-from annelid.body.actuators.servo import ServoRings
-from annelid.body.assemble import mesh_of
-from annelid.body.worm import WormBody
+from annelid.analysis import ROBOT_ELONGATION_M
+from annelid.body import Rings, ServoRings, WormBody, mesh_of
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Hold, Outcome
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store, case_key
+from annelid.experiment import Case, Hold, Outcome, Store, StudyProgress, case_key, in_stage
 from annelid_studies.riddle2023.figures.muscle_surface import closed_form_flv, scaled_length
 from annelid_studies.worms import RODS
 

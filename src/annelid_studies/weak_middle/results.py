@@ -9,13 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis.elongation import interior_deficit
-from annelid.analysis.paper import published
-from annelid.analysis.robot import ROBOT_ELONGATION_M
+from annelid.analysis import ROBOT_ELONGATION_M, interior_deficit, published
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.markdown import Table
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import tabulated, terminal_table
 from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry

@@ -9,12 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from annelid.analysis.elongation import interior_deficit
-from annelid.body.assemble import mesh_of
+from annelid.analysis import interior_deficit
+from annelid.body import mesh_of
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store, case_key
+from annelid.experiment import Case, Store, StudyProgress, case_key, in_stage
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort
 from annelid_studies.weak_middle.pulls import (

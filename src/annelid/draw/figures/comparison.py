@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.analysis.travel import way_ahead
+from annelid.analysis.travel import forward_position
 from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, save
 from annelid.draw.style import panel_title, plain, segment_colors
@@ -81,7 +81,7 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
         for run, way, above, color in zip(runs, ways, seen, segment_colors(len(runs)), strict=True):
             if way is None:
                 continue
-            ahead = way_ahead(run)
+            ahead = forward_position(run)
             panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), color=color)
             if above:
                 panels[1].plot(way[:, 0], way[:, 1], color=color)

@@ -28,14 +28,6 @@ from annelid.nervous.layout import role_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-CAPTION = (
-    "The network that controls the worm, drawn from the network object that the simulation steps: one column a "
-    "segment. The contraction and the expansion neuron (U1, U2) form a half-centre: they have a persistent sodium "
-    "channel (double outline) and inhibit each other. The sensory neuron (U3), which the stretch sensor excites while "
-    "its segment is at rest length, holds the segment expanded; the relay (U4) silences the sensory neuron of the next "
-    "segment, and that of the last segment closes the ring to the first."
-)
-
 PAPER_SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
 """The paper's symbols of the four neurons of a segment, by the role in a neuron's name."""
 
@@ -113,7 +105,7 @@ def abbreviations(names: Iterable[str]) -> dict[str, str]:
     return short
 
 
-def figure_6_network_diagram(
+def network_figure(
     network: Network, stem: Path, symbols: Mapping[str, str] = PAPER_SYMBOLS, *, conductances: bool = False
 ) -> Path:
     """Draws a network with a key to its symbols.

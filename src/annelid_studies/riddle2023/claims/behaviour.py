@@ -7,11 +7,10 @@ from math import nan
 
 import numpy as np
 
-from annelid.analysis.elongation import end_difference, middle_deficit
-from annelid.analysis.rhythm import CONTRACTED
-from annelid.control.sns import Sns
-from annelid.experiment.case import Case
-from annelid.simulation.runfile import Run
+from annelid.analysis import CONTRACTED, end_difference, middle_deficit
+from annelid.config import field_value
+from annelid.experiment import Case
+from annelid.simulation import Run
 from annelid_studies.riddle2023.claims.evidence import (
     MAIN,
     PAPER_STEPS,
@@ -91,15 +90,14 @@ def control_claims(evidence: Evidence) -> list[Claim]:
 
 def _half_centres(run: Run) -> tuple[float, float]:
     """Share of samples in which both neurons of a half-centre are excited, and in which activation follows them."""
-    data, controller = run.data, run.config.controller
-    assert isinstance(controller, Sns)
+    data = run.data
     names = [str(name) for name in data["neuron"].values]
     segments = range(1, run.config.body.n_segments + 1)
     contraction, expansion = (
         data["potential"].values[:, [names.index(f"{role}_{segment}") for segment in segments]]
         for role in ("contraction", "expansion")
     )
-    half = controller.range_mV / 2
+    half = field_value(run.config, "controller.range_mV") / 2
     both = (contraction > half) & (expansion > half)
     following = (contraction > expansion) == (data["activation"].values > CONTRACTED)
     return float(both.mean()), float(following.mean())

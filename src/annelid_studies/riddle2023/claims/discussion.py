@@ -7,12 +7,14 @@ from math import nan
 
 import numpy as np
 
-from annelid.analysis.detector import detect, score
-from annelid.analysis.elongation import middle_deficit
-from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
-from annelid.analysis.travel import way_ahead
-from annelid.control.program import Program
-from annelid.simulation.runfile import Run
+from annelid.analysis import (
+    ROBOT_ELONGATION_M,
+    detect_slip,
+    forward_position,
+    middle_deficit,
+    score_detections,
+)
+from annelid.simulation import Run
 from annelid_studies.riddle2023.claims.evidence import (
     LABELS,
     MAIN,
@@ -127,7 +129,7 @@ def _speed_claim(evidence: Evidence, main: Run) -> Claim:
 
 def _travel_in_a_cycle(run: Run, period_s: float) -> float:
     """Displacement of the centre of mass over the last period of a run, m; forwards positive."""
-    time, ahead = run.data["time"].values, way_ahead(run)
+    time, ahead = run.data["time"].values, forward_position(run)
     return float(ahead[-1] - np.interp(time[-1] - period_s, time, ahead))
 
 
@@ -191,10 +193,9 @@ def _own(run: Run) -> np.ndarray:
     Returns:
         By every spring of the segment and by their mean, shape ``(n_segments, n_readings)``.
     """
-    program, times = run.config.controller, run.data["time"].values
-    assert isinstance(program, Program)
+    times = run.data["time"].values
     own = np.full((run.config.body.n_segments, run.data.sizes["sensor"]), np.nan)
-    for contraction in program.contractions:
+    for contraction in run.config.controller.scheduled:
         last = np.flatnonzero(times <= contraction.stop_s + 1e-9)[-1]
         at_end = (run.data["stretch_length"][last] - run.data["stretch_rest_length"]).values
         own[contraction.segment - 1] = at_end[contraction.segment - 1]
@@ -232,10 +233,10 @@ def cause_claim(evidence: Evidence) -> Claim:
 
 
 def _robot_claim(evidence: Evidence) -> Claim:
-    robot = relative_to_first(ROBOT_ELONGATION_M)
+    robot = np.divide(ROBOT_ELONGATION_M, ROBOT_ELONGATION_M[0])
     worms = [worm for n, worm in longer_worms(evidence.effort) if n == 4]
     held = {worm: _own(evidence.store.run(longer_worm(4, worm))) for worm in worms}
-    ours = {worm: relative_to_first(own[:, -1]) for worm, own in held.items()}
+    ours = {worm: own[:, -1] / own[0, -1] for worm, own in held.items()}
     weak = [middle_deficit(of_reading) for own in held.values() for of_reading in own.T]
     return _of_discussion(
         "The model closely emulates the robot: ends alike, middle segments clearly weaker.",
@@ -340,7 +341,9 @@ def friction_claim(evidence: Evidence) -> Claim:
 
 def _slip_claim(evidence: Evidence) -> Claim:
     cases = {name: detection.CASES[name] for name in slip_runs(evidence.effort)}
-    found = [score([detect(evidence.store.run(case))], detection.LIMIT_M_PER_S) for case in cases.values()]
+    found = [
+        score_detections([detect_slip(evidence.store.run(case))], detection.LIMIT_M_PER_S) for case in cases.values()
+    ]
     return _of_outlook(
         "Pressure and stretch sensors together detect slip reliably.",
         "section 5",

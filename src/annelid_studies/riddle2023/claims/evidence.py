@@ -9,11 +9,9 @@ from math import nan
 
 import numpy as np
 
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
-from annelid.experiment.store import Store
+from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
-from annelid.simulation.runfile import Run
+from annelid.simulation import Run
 from annelid_studies.riddle2023.contents import Verdict
 from annelid_studies.riddle2023.examination import Effort, Findings, Results
 from annelid_studies.riddle2023.examinations.design import WORMS

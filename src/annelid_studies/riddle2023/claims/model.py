@@ -7,11 +7,9 @@ from math import isnan, nan, pi, sqrt
 
 import numpy as np
 
-from annelid.body import mesh_of
-from annelid.body.worm import WormBody
-from annelid.control.sns import Sns
-from annelid.planar.riddle2022 import PlanarBody
-from annelid.simulation.runfile import Run
+from annelid.body import WormBody, mesh_of
+from annelid.config import field_value
+from annelid.simulation import Run
 from annelid_studies.riddle2023.claims.evidence import (
     EXACT,
     MAIN,
@@ -43,11 +41,10 @@ def structure_claims(evidence: Evidence, main: Run) -> list[Claim]:
     equal_area = sqrt(TUBE_AREA_M2 / pi)
     density = TUBE_AREA_M2 * POLYETHYLENE_KG_PER_M3
     planar = evidence.store.run(PLANAR_CASES[300])
-    planar_body = planar.config.body
-    assert isinstance(planar_body, PlanarBody)
+    whole = (2 * field_value(planar.config, "body.side_m")) ** 2
     length = planar.data["stretch_length"].values[..., 0]
     height = planar.data["ring_length"].values
-    residual = float(np.abs(length**2 + height**2 - 4 * planar_body.side_m**2).max() / (4 * planar_body.side_m**2))
+    residual = float(np.abs(length**2 + height**2 - whole).max() / whole)
     return [
         _of_structure(
             "A rhombus of the planar model keeps l^2 + w^2 = 4 l_s^2 while it contracts.",
@@ -172,15 +169,14 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
     """Judges the claims about the muscles."""
     from annelid_studies.riddle2023.figures.muscle_surface import largest_difference
 
-    body, controller = main.config.body, main.config.controller
+    body = main.config.body
     assert isinstance(body, WormBody)
-    assert isinstance(controller, Sns)
     difference = largest_difference(body.muscles)
     summaries = [one.summary for one, _ in evidence.runs]
     medians = [summary.contraction_force_median_N or nan for summary in summaries]
     peaks = [summary.contraction_force_peak_N or nan for summary in summaries]
     spring_force = [6 * body.springs.stiffness_N_per_m * stretch for stretch in (0.02, 0.03)]
-    slope, reach = controller.activation_slope_per_mV, controller.range_mV
+    slope, reach = (field_value(main.config, f"controller.{name}") for name in ("activation_slope_per_mV", "range_mV"))
     printed, meant = (1 / (1 + np.exp(sign * slope * reach)) for sign in (1, -1))
     usual, short = (
         [hold.ring_length_m for worm in (fast, rods) for hold in evidence.results[worm(changes)].holds]

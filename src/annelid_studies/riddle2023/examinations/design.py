@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from annelid.analysis import RhythmScore
-from annelid.analysis.elongation import middle_deficit
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.analysis import RhythmScore, middle_deficit
+from annelid.experiment import Case, Outcome
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Results
 from annelid_studies.worms import chain, fast, rods

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
+from annelid.draw import canvas, save_both
+from annelid.experiment import Case
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
+from annelid.draw import canvas, save_both
+from annelid.experiment import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm

@@ -9,14 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.analysis.rhythm import contractions, segment_activation
-from annelid.analysis.score import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.analysis import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore, contractions, segment_activation
+from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid.experiment import Case, Outcome
 from annelid.morphology import Array
-from annelid.simulation.runfile import open_run
+from annelid.simulation import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import plots, words
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm

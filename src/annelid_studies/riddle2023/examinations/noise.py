@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from annelid.analysis import RhythmScore
-from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title
-from annelid.experiment.case import Case
+from annelid.body import WormBody
+from annelid.draw import canvas, panel_title, save_both
+from annelid.experiment import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import words
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm

@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from annelid.body.assemble import build_spec
-from annelid.body.formulations.chain import Chain
-from annelid.body.formulations.rods import Rods
-from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save_both
+from annelid.body import Rods, WormBody, build_spec
+from annelid.config import field_value
+from annelid.draw import canvas, save_both
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
+from annelid.experiment import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading
@@ -60,13 +58,15 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     formulation = config.body.formulation
     if isinstance(formulation, Rods):
         return formulation.pin_stiffness_N_per_m if formulation.pins == "separate" else float("inf")
-    assert isinstance(formulation, Chain)
     model = build_spec(config).compile()
     inverse_mass = model.body_invweight0[model.eq_obj1id, 0] + model.body_invweight0[model.eq_obj2id, 0]
-    impedance = formulation.pin_impedance[1]
-    reference = 1.0 / (impedance * formulation.pin_time_constant_s) ** 2
+    impedance, time_s = (
+        field_value(config, f"{_FORMULATION}.{name}") for name in ("pin_impedance", "pin_time_constant_s")
+    )
+    impedance = impedance[1]
+    reference = 1.0 / (impedance * time_s) ** 2
     stiffness = reference * impedance / ((1.0 - impedance) / impedance * inverse_mass)
-    return float(stiffness.mean()) * (2.0 if formulation.pins == "direct" else 1.0)
+    return float(stiffness.mean()) * (2.0 if field_value(config, f"{_FORMULATION}.pins") == "direct" else 1.0)
 
 
 def _tied(stiffness: float) -> dict[str, Any]:

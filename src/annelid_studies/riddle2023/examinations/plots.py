@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw import panel_title, segment_colors
 from annelid_studies.riddle2023.examinations import words
 from annelid_studies.riddle2023.examinations.design import WORMS, Reading, by_worm
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
+from annelid.draw import canvas, save_both
+from annelid.experiment import Case
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from annelid.analysis.elongation import middle_deficit
-from annelid.analysis.paper import published
-from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save_both
+from annelid.analysis import middle_deficit, published
+from annelid.body import WormBody
+from annelid.draw import canvas, save_both
 from annelid.morphology import Array
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words

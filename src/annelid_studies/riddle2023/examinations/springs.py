@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import segment_colors
+from annelid.draw import canvas, save_both, segment_colors
 from annelid.morphology import Array
-from annelid.simulation.runfile import open_run
+from annelid.simulation import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading

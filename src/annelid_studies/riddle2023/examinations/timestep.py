@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.body.worm import WormBody
+from annelid.body import WormBody
 from annelid.config import RunConfig
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.draw import canvas, save_both
+from annelid.experiment import Case, Outcome
 from annelid.morphology import Array
-from annelid.simulation.runfile import open_run
+from annelid.simulation import open_run
 from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
 from annelid_studies.riddle2023.examinations import design, plots, words
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading, Worm

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.body.actuators.muscle import Rings
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
+from annelid.body import Rings
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.morphology import Array
 
 if TYPE_CHECKING:

@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.config import RunConfig, load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.planar_scene import bent_rhombi, rhombi
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw import bent_rhombi, canvas, panel_title, rhombi, save_both, segment_colors
 from annelid.errors import ConfigError
 from annelid.morphology import Array
-from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Records
 from annelid.simulation import build_plant
 
@@ -47,7 +44,7 @@ def contracted_outline(config: RunConfig, contracted: int) -> Array:
     Raises:
         ConfigError: The body is not a planar one.
     """
-    if not isinstance(config.body, PlanarWorm):
+    if not config.body.is_planar:
         raise ConfigError(f"figure 1 is drawn of planar bodies, and {config.name!r} has a body in 3D")
     plant = build_plant(config)
     activation = np.zeros(plant.n_muscles)

@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.analysis.rhombi import (
-    actuated,
-    deformation,
-    distance_from_ring_m,
-    plane_means,
-    rhombus_diagonals,
-    rhombus_plane,
-)
-from annelid.draw.camera import picture_axes
-from annelid.draw.canvas import WIDTH_IN, canvas, save_both
-from annelid.draw.planar_scene import rhombi as flat_rhombi
-from annelid.draw.style import panel_title
+from annelid.analysis import actuated, deformation, distance_from_ring_m, plane_means, rhombus_diagonals, rhombus_plane
+from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
+from annelid.draw import rhombi as flat_rhombi
 from annelid.morphology import Array, MeshGeometry
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
@@ -35,7 +26,7 @@ from annelid_studies.riddle2023.figures.renderings import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from annelid.simulation.runfile import Run
+    from annelid.simulation import Run
 
 
 TIME_S = 1.5

@@ -10,25 +10,36 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.analysis.rhombi import nearest_frame
-from annelid.body import mesh_of
-from annelid.body.formulations.rods.net import PIN_RGBA, STRAND_RGBA
-from annelid.body.worm import WormBody
+from annelid.analysis import nearest_frame
+from annelid.body import WormBody, mesh_of
 from annelid.config import RunConfig
-from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.gl import find_backend
-from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, postures_of, render_still
-from annelid.draw.skeleton import Skeleton
-from annelid.draw.style import CONTRACTED, activation_color, panel_title
+from annelid.draw import (
+    CONTRACTED,
+    CONTRACTED_WIDTH,
+    PIN_RGBA,
+    SPRING_RGBA,
+    STRAND_RGBA,
+    VIEWS_DEG,
+    Skeleton,
+    activation_color,
+    canvas,
+    find_backend,
+    fitting_distance,
+    panel_title,
+    picture_axes,
+    picture_points,
+    postures_of,
+    render_still,
+    save_both,
+)
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import Array, MeshGeometry
-from annelid.simulation.worm import compile_worm
+from annelid.simulation import compile_worm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from annelid.simulation.runfile import Run
+    from annelid.simulation import Run
 
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""

@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.analysis.paper import published
-from annelid.analysis.robot import ROBOT_ELONGATION_M, relative_to_first
+from annelid.analysis import ROBOT_ELONGATION_M, published
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.style import panel_title, segment_colors
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +45,7 @@ def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) ->
     with canvas(4.6) as figure:
         absolute, relative = figure.subplots(2, 1, sharex=True)
         _draw_bars(absolute, {label: _CM * np.asarray(values) for label, values in groups.items()}, colors)
-        _draw_bars(relative, {label: relative_to_first(values) for label, values in groups.items()}, colors)
+        _draw_bars(relative, {label: np.divide(values, values[0]) for label, values in groups.items()}, colors)
         panel_title(absolute, "a) largest elongation")
         absolute.set_ylabel("elongation (cm)")
         panel_title(relative, "b) the same relative to segment 1")

@@ -9,6 +9,8 @@ from itertools import count
 
 from annelid.text import printable
 
+__all__ = ["Table", "anchors", "code", "emphasis", "plain_table", "strong", "table", "words"]
+
 # What Markdown, and GitHub's kind of it, would take for markup inside a line; an underscore inside a word is safe.
 _MARKUP = re.compile(r"[\\*\[\]<~$`]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
 _OPENING = re.compile(r"^(#{1,6}(?=\s|$)|[-+=>]|\d+(?=[.)](?:\s|$)))")

@@ -77,6 +77,10 @@ def read_toml(path: Path, what: str = "the configuration file") -> dict[str, Any
 def read_json(path: Path, what: str = "") -> Any:
     """Reads a JSON file.
 
+    Args:
+        path: The file.
+        what: What it is, for the sentence of an error; default: its path alone.
+
     Raises:
         UnreadableText: It cannot be read (`read_text`), or is not valid JSON (`parse_json`).
     """

@@ -41,8 +41,8 @@ class Detection:
     estimated_m_per_s: Array
     bears: Bools
 
-    def told(self, limit_m_per_s: float) -> Bools:
-        """Returns what the detector tells to slip with this limit, ``(n_times, n_segments)``."""
+    def alarms(self, limit_m_per_s: float) -> Bools:
+        """Returns where the detector reports slip with this limit, ``(n_times, n_segments)``."""
         return (np.abs(self.estimated_m_per_s) > limit_m_per_s) & self.bears
 
 
@@ -72,7 +72,11 @@ class DetectionScore:
 
 
 def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
-    """Lets a detector (by default `SlipDetector` as it is) read a run sample by sample, the true slip beside it.
+    """Has a detector read a run sample by sample, with the true slip beside it.
+
+    Args:
+        run: The run of a 3D worm.
+        detector: The detector; default: `annelid.control.slip_detector.SlipDetector` as it is.
 
     Raises:
         RunFileError: The run has no touch.
@@ -109,10 +113,15 @@ def _windowed(values: Array, load_N: Array, interval_s: float) -> tuple[Array, A
 
 
 def score_detections(detections: list[Detection], limit_m_per_s: float) -> DetectionScore:
-    """Scores a detector, which tells slip above an estimated speed, over the runs of some detections together."""
+    """Scores a detector over several runs together.
+
+    Args:
+        detections: What it made of each run.
+        limit_m_per_s: Estimated speed above which it reports slip, m/s.
+    """
     alarms = episodes = 0
     delays = list[float]()
-    told = [one.told(limit_m_per_s) for one in detections]
+    told = [one.alarms(limit_m_per_s) for one in detections]
     for one, alarm in zip(detections, told, strict=True):
         for of_segment, truly in zip(alarm.T, one.slips.T, strict=True):
             alarms += sum(not truly[first:last].any() for first, last in _stretches(of_segment))
@@ -155,6 +164,14 @@ def _stretches(on: Bools) -> list[tuple[int, int]]:
 
 
 def precision_recall(detections: list[Detection], limits_m_per_s: Array) -> tuple[Array, Array]:
-    """Returns recall and precision over some runs together for every limit, ``(n_limits,)`` each."""
+    """Scores a detector over several runs together for every limit.
+
+    Args:
+        detections: What it made of each run.
+        limits_m_per_s: Estimated speeds above which it reports slip, m/s, ``(n_limits,)``.
+
+    Returns:
+        Recall and precision, each ``(n_limits,)``.
+    """
     scores = [score_detections(detections, float(limit)) for limit in limits_m_per_s]
     return np.array([one.recall for one in scores]), np.array([one.precision for one in scores])

@@ -57,6 +57,13 @@ def deformation(crossings_m: ArrayLike, geometry: MeshGeometry) -> Deformation:
 def nearest_frame(run: Run, time_s: float) -> int:
     """Finds the recorded posture nearest to a time.
 
+    Args:
+        run: The run of a 3D worm.
+        time_s: The time, s.
+
+    Returns:
+        Its index along the run's ``frame`` dimension.
+
     Raises:
         RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.
     """
@@ -82,15 +89,28 @@ def actuated(geometry: MeshGeometry) -> NDArray[np.bool_]:
 
 
 def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
-    """Distance along the resting body from the ring of a segment (from 0) to the middle of each rhombus.
+    """Distance along the resting body from the ring of a segment to the middle of each rhombus.
 
-    In m, negative towards the front, shape ``(n_rhombi,)``.
+    Args:
+        geometry: The mesh at rest.
+        segment: The segment, from 0.
+
+    Returns:
+        Distances, m, negative towards the front, ``(n_rhombi,)``.
     """
     return geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[segment]]
 
 
 def plane_means(values: ArrayLike, geometry: MeshGeometry) -> Array:
-    """Averages values, ``(.., n_rhombi)``, round each plane that has rhombi, front to back, ``(.., n_planes - 2)``."""
+    """Averages values of rhombi round each plane that has some.
+
+    Args:
+        values: One value a rhombus, ``(.., n_rhombi)``.
+        geometry: The mesh at rest.
+
+    Returns:
+        Means from front to back, ``(.., n_planes - 2)``.
+    """
     array = np.asarray(values, dtype=float)
     plane = rhombus_plane(geometry)
     return np.stack([array[..., plane == p].mean(axis=-1) for p in np.unique(plane)], axis=-1)

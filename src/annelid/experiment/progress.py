@@ -18,7 +18,12 @@ LINE_EVERY_S = 30.0
 
 
 def in_stage(progress: StudyProgress | None, stage: str) -> Callable[[int, int, float], object] | None:
-    """Returns what a store of runs calls to tell the progress of one stage, or None where nobody wants to know."""
+    """Returns what `Store.compute` calls as the runs of one stage go on.
+
+    Args:
+        progress: What the progress of the whole study is reported to; None for nothing, and then the result is None.
+        stage: The stage, in a few words.
+    """
     return None if progress is None else partial(progress, stage)
 
 

@@ -163,7 +163,18 @@ def _dominates(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
 
 
 def judged_run(store: Store, case: Case) -> Judged:
-    """Judges a run that the store has."""
+    """Judges a gait by its run.
+
+    Args:
+        store: The store, which has computed the run.
+        case: The run.
+
+    Returns:
+        The gait's numbers, or why it does not count as one.
+
+    Raises:
+        KeyError: The store has not computed it.
+    """
     outcome = store[case]
     return judge(outcome, None if outcome.message else outcome.gait)
 

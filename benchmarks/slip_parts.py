@@ -11,7 +11,7 @@ from typing import Any
 from annelid.analysis.slip import slip_cost
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store
-from annelid_studies.slip.feedback import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
+from annelid_studies.slip import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
 
 HALF_STEP = {"clock.physics_timestep_s": 0.005, "duration_s": 10.0}
 

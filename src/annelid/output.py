@@ -13,7 +13,7 @@ from typing import Any
 from annelid.errors import RunFileError
 from annelid.text import printable
 
-__all__ = ["whole_file", "with_suffix", "write_csv", "write_json"]
+__all__ = ["whole_file", "with_suffix", "write_csv", "write_json", "write_text"]
 
 
 @contextmanager
@@ -44,6 +44,24 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         if not direct:
             with suppress(OSError):
                 draft.unlink()
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Writes a text as a `whole_file` in UTF-8.
+
+    Args:
+        path: The file to write.
+        text: Its content.
+
+    Returns:
+        The path.
+
+    Raises:
+        RunFileError: The file cannot be written.
+    """
+    with whole_file(path) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return path
 
 
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Path:

@@ -1,4 +1,4 @@
-"""One way to lay readings out as a table: for the terminal, and for a report."""
+"""Readings grouped, and laid out as a table for the terminal, for a report, and as CSV."""
 
 from __future__ import annotations
 
@@ -13,16 +13,19 @@ from annelid.output import write_csv
 if TYPE_CHECKING:
     from rich.table import Table as TerminalTable
 
-T = TypeVar("T")
+T, K = TypeVar("T"), TypeVar("K")
+
+
+def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
+    """Groups things by what a function returns for them, in the order in which they come."""
+    found: dict[K, list[T]] = {}
+    for item in items:
+        found.setdefault(key(item), []).append(item)
+    return found
 
 
 def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
-    """Makes a table from what stands in each column of a row.
-
-    Args:
-        rows: What was read, one thing a row.
-        columns: What each column writes of a row, by its head.
-    """
+    """Makes a table of things, one a row, from what each column writes of a row, by its head."""
     return Table(list(columns), [[cell(row) for cell in columns.values()] for row in rows])
 
 
@@ -48,17 +51,5 @@ def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str =
 
 
 def write_fields(kind: type[Any], readings: Iterable[Any], path: Path) -> Path:
-    """Writes readings as CSV, a column for every field and a row each.
-
-    Args:
-        kind: Their dataclass, with slots.
-        readings: What was read.
-        path: The file to write.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
+    """Writes readings, of a dataclass with slots, as CSV, a column for every field and a row each."""
     return write_csv(path, kind.__slots__, map(astuple, readings))

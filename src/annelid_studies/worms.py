@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from annelid.experiment import Case
 
+Effort = Literal["quick", "full"]
+"""Coarse and within minutes, or the whole."""
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, rigid crossings, soft crossings in seconds."""
 PLANAR = "riddle2022-planar"

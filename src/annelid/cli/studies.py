@@ -50,7 +50,7 @@ def paper_command(
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
     with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
         effort = "quick" if quick else "full"
-        report = reproduce(output, effort, only=only or None, jobs=jobs, workers=workers, progress=progress)
+        report = reproduce(output, effort, only=only or None, workers=workers, progress=progress)
         html = write_report(report, output)
     if claims is not None:
         with whole_file(claims) as draft:
@@ -99,7 +99,6 @@ def robustness_command(
             controllers=tuple(controller or CONTROLLERS),
             n_segments=segments,
             keep=keep,
-            jobs=jobs,
             workers=workers,
             progress=progress,
         )

@@ -83,8 +83,8 @@ def tune_command(
     task = Task(preset, changes, variables, objectives, trials, seed)
     found: list[Trial] = []
     written: list[Path] = []
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        for generation in search(task, store, jobs=jobs, progress=progress):
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        for generation in search(task, store, progress=store.progress):
             found += generation
             written = write_results(task, found, typed_command(), output)
     print_results(written, results_table(task, found), quiet=quiet)

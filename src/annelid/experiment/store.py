@@ -34,7 +34,7 @@ from annelid.experiment.attempt import (
 from annelid.experiment.case import Case, refusal
 from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
-from annelid.experiment.progress import StudyProgress
+from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.simulation.runfile import Run, open_run
 
@@ -83,15 +83,19 @@ class Done:
 class Store:
     """A folder of runs."""
 
-    def __init__(self, folder: Path, workers: Workers | None = None, keep: Keep = "runs") -> None:
+    def __init__(
+        self, folder: Path, workers: Workers | None = None, keep: Keep = "runs", progress: StudyProgress | None = None
+    ) -> None:
         """Opens a store; the folder is made when the first run is computed.
 
         Args:
             folder: The folder.
             workers: Who computes its runs; None for processes of this machine.
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
+            progress: Called as runs go on, with what `compute` names their stage; None for nothing.
         """
         self.folder = folder
+        self.progress = progress
         self._workers = workers
         self._keep: Keep = keep
 
@@ -123,6 +127,7 @@ class Store:
     def compute(
         self,
         cases: Iterable[Case],
+        stage: str = "",
         *,
         jobs: int | None = None,
         progress: Progress | None = None,
@@ -132,8 +137,9 @@ class Store:
 
         Args:
             cases: The cases; a case given twice runs once.
+            stage: What is done, in a few words, for the store's ``progress``.
             jobs: Processes, by default as many as there are cores; has no effect on workers given to the store.
-            progress: Called at the start and after every run.
+            progress: Called at the start and after every run, in place of the store's own.
             failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
                 end the call.
 
@@ -151,6 +157,7 @@ class Store:
         missing = sorted((wanted[key] for key in wanted if key not in found), key=lambda case: -case.cost_s)
         total_s = sum(case.cost_s for case in missing)
         left_s, done = total_s, len(found)
+        progress = progress or in_stage(self.progress, stage)
 
         def report() -> None:
             if progress is not None:
@@ -184,11 +191,12 @@ class Store:
             cases: The cases.
             stage: What is told as they are run.
             jobs: As of `compute`.
-            progress: Called as cases are checked and run.
+            progress: Called as cases are checked and run, in place of the store's own.
 
         Returns:
             What became of every case, in their order.
         """
+        progress = progress or self.progress
 
         def told(text: str, done: int, total: int, share: float) -> None:
             if progress is not None:

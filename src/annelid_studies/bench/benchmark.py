@@ -15,8 +15,7 @@ from annelid.output import write_json
 from annelid.simulation import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
 from annelid_studies.bench.store import MeasurementFailed, Measurements
-from annelid_studies.riddle2023.examination import Effort
-from annelid_studies.worms import CHAIN, RODS
+from annelid_studies.worms import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"

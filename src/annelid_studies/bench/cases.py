@@ -11,8 +11,7 @@ from annelid.body import WormBody
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case
-from annelid_studies.riddle2023.examination import Effort
-from annelid_studies.worms import CHAIN, RODS
+from annelid_studies.worms import CHAIN, RODS, Effort
 
 Kind = Literal["judged", "converged", "speed"]
 

@@ -14,7 +14,6 @@ from annelid.body import mesh_of
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Store, StudyProgress, case_key, in_stage
 from annelid.morphology import Array
-from annelid_studies.riddle2023.examination import Effort
 from annelid_studies.weak_middle.pulls import (
     GUESSES_M,
     Actuator,
@@ -26,6 +25,7 @@ from annelid_studies.weak_middle.pulls import (
     read_pull,
     settings,
 )
+from annelid_studies.worms import Effort
 
 
 class Quantity(NamedTuple):

@@ -39,12 +39,11 @@ def speed_command(
     annelid experiment speed
     annelid experiment speed crawler tune/best.toml -o mine
     """
-    from annelid_studies.crawling import GAITS, VALUES, crawl, crawling_table, points, write_figure, write_readings
+    from annelid_studies.crawling import GAITS, VALUES, crawl, crawling_table, write_figure, write_readings
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        readings = crawl(store, points(gaits or GAITS, "quick" if quick else "full"), jobs=jobs, progress=progress)
-    path = output / "speed.csv"
-    write_readings(readings, path)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = crawl(store, gaits or GAITS, "quick" if quick else "full")
+    path = write_readings(readings, output / "speed.csv")
     written = path, write_figure(readings, path.with_suffix(""))
     print_results(written, *(crawling_table(readings, quantity) for quantity in VALUES), quiet=quiet)
 
@@ -69,19 +68,18 @@ def slip_command(
     annelid experiment slip --quick
     annelid experiment slip --preset crawler -o slip-crawler
     """
-    from annelid_studies.slip.feedback import (
+    from annelid_studies.slip import (
         FRICTIONS,
-        QUICK,
+        QUICK_FRICTIONS,
         feedback_figure,
         feedback_table,
         slip_feedback,
         write_readings,
     )
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        readings = slip_feedback(store, QUICK if quick else FRICTIONS, preset=preset, jobs=jobs, progress=progress)
-    path = output / "slip.csv"
-    write_readings(readings, path)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = slip_feedback(store, QUICK_FRICTIONS if quick else FRICTIONS, preset)
+    path = write_readings(readings, output / "slip.csv")
     written = path, feedback_figure(readings, preset, path.with_suffix(""))
     print_results(written, feedback_table(readings, preset), quiet=quiet)
 
@@ -105,8 +103,9 @@ def slip_detector_command(
     annelid experiment slip-detector --quick
     annelid experiment slip-detector -o slip
     """
-    from annelid_studies.slip.detection import (
-        QUICK,
+    from annelid_studies.slip import (
+        CASES,
+        QUICK_CASES,
         detection_table,
         detector_figure,
         scores,
@@ -114,13 +113,12 @@ def slip_detector_command(
         write_scores,
     )
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        detections = slip_detection(store, QUICK if quick else None, jobs=jobs, progress=progress)
-    told = scores(detections)
-    path = output / "slip_detector.csv"
-    write_scores(told, path)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        detections = slip_detection(store, QUICK_CASES if quick else tuple(CASES))
+    found = scores(detections)
+    path = write_scores(found, output / "slip_detector.csv")
     written = path, detector_figure(detections, path.with_suffix(""))
-    print_results(written, detection_table(told), quiet=quiet)
+    print_results(written, detection_table(found), quiet=quiet)
 
 
 @study("turning")
@@ -147,11 +145,11 @@ def turning_command(
     from annelid_studies.tables import write_fields
     from annelid_studies.turning import MODULATIONS, QUICK, Reading, turning, turning_picture, turning_table
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)
-    path = write_fields(Reading, turned.readings, output / "turning.csv")
-    written = path, turning_picture(turned, path.with_suffix(""))
-    print_results(written, turning_table(turned.readings), quiet=quiet)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings, tracks = turning(store, QUICK if quick else MODULATIONS)
+    path = write_fields(Reading, readings, output / "turning.csv")
+    written = path, turning_picture(readings, tracks, path.with_suffix(""))
+    print_results(written, turning_table(readings), quiet=quiet)
 
 
 @study("pipes")
@@ -180,8 +178,8 @@ def pipes_command(
     from annelid_studies.pipes import Reading, pass_pipes, pipes_picture, pipes_table, trials
     from annelid_studies.tables import write_fields
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        found = pass_pipes(store, trials(quick), jobs=jobs, progress=progress)
-    path = write_fields(Reading, found.readings, output / "pipes.csv")
-    written = path, pipes_picture(found, path.with_suffix(""))
-    print_results(written, pipes_table(found.readings), quiet=quiet)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings, courses = pass_pipes(store, trials(quick))
+    path = write_fields(Reading, readings, output / "pipes.csv")
+    written = path, pipes_picture(readings, courses, path.with_suffix(""))
+    print_results(written, pipes_table(readings), quiet=quiet)

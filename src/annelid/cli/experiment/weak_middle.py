@@ -47,10 +47,10 @@ def weak_middle_command(
     from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
 
     found = None
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        set_to, readings = weak_middle(store, "quick" if quick else "full")
         if not quick:
-            found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)
+            found = asymmetry(store, set_to[BASE_KEY].force_N)
     tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
     tables += [checks_table(readings), asymmetry_table(found)] if found else []
     path = output / "weak_middle.csv"

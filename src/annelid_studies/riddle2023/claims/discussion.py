@@ -15,6 +15,7 @@ from annelid.analysis import (
     score_detections,
 )
 from annelid.simulation import Run
+from annelid_studies import slip
 from annelid_studies.riddle2023.claims.evidence import (
     LABELS,
     MAIN,
@@ -31,7 +32,6 @@ from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY, frictions_of
 from annelid_studies.riddle2023.examinations.words import span
-from annelid_studies.slip import detection
 from annelid_studies.worms import chain, fast, one_after_the_other, rods
 
 _of_discussion = partial(Claim, "Discussion")
@@ -340,10 +340,8 @@ def friction_claim(evidence: Evidence) -> Claim:
 
 
 def _slip_claim(evidence: Evidence) -> Claim:
-    cases = {name: detection.CASES[name] for name in slip_runs(evidence.effort)}
-    found = [
-        score_detections([detect_slip(evidence.store.run(case))], detection.LIMIT_M_PER_S) for case in cases.values()
-    ]
+    cases = {name: slip.CASES[name] for name in slip_runs(evidence.effort)}
+    found = [score_detections([detect_slip(evidence.store.run(case))], slip.LIMIT_M_PER_S) for case in cases.values()]
     return _of_outlook(
         "Pressure and stretch sensors together detect slip reliably.",
         "section 5",

@@ -12,10 +12,10 @@ import numpy as np
 from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
+from annelid_studies import slip
 from annelid_studies.riddle2023.contents import Verdict
 from annelid_studies.riddle2023.examination import Effort, Findings, Results
 from annelid_studies.riddle2023.examinations.design import WORMS
-from annelid_studies.slip import detection
 from annelid_studies.worms import CHAIN, FAST, PLANAR, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
@@ -163,13 +163,13 @@ def claim_cases(effort: Effort) -> Sequence[Case]:
         ),
         *PLANAR_CASES.values(),
         *(longer_worm(n, worm) for n, worm in longer_worms(effort)),
-        *(detection.CASES[name] for name in slip_runs(effort)),
+        *(slip.CASES[name] for name in slip_runs(effort)),
     ]
 
 
 def slip_runs(effort: Effort) -> Sequence[str]:
     """Names of the runs that the slip detector is judged on."""
-    return list(detection.CASES) if effort == "full" else detection.QUICK
+    return list(slip.CASES) if effort == "full" else slip.QUICK_CASES
 
 
 def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:

@@ -16,19 +16,26 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.resources import files
-from math import sqrt
 from pathlib import Path
 from typing import Any
 
 from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, Workers, case_key, code_fingerprint
+from annelid.experiment import (
+    SHEAR_OVER_YOUNG,
+    Case,
+    Store,
+    StudyProgress,
+    Workers,
+    case_key,
+    code_fingerprint,
+)
 from annelid.markdown import plain_table
-from annelid.output import whole_file
+from annelid.output import write_text
 from annelid.plausibility import tolerance_window_m
 from annelid.simulation import locks
 from annelid.textfiles import read_json
-from annelid_studies.tables import tabulated
+from annelid_studies.tables import grouped, tabulated
 from annelid_studies.worms import RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
@@ -42,13 +49,10 @@ CYCLES = 2.3
 STARTS = ("design", "silent", "random")
 """How the robust network starts, in turn."""
 TOGETHER = 8
-"""Points computed as one lot for each process, so that no process waits long for the lot's last run."""
+"""Points computed as one lot for each core, so that no process waits long for the lot's last run."""
 PERIOD_TOLERANCE = 0.1
 TIMED = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 0.0, "interval_s": DESIGN_INTERVAL_S}
 """A wave of the paper's turns: its muscles' rhythm is in time by construction, its segments' lengthening is not."""
-
-Progress = Callable[[str, int, int, float], object]
-"""Called with the stage, the number of points done, their total, and the share of the work that is done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,7 @@ class Point:
         physics_timestep_ms: Step of the body, whole ms.
         n_segments: Number of segments.
         young_modulus_Pa: Of the strands, Pa.
-        seed: Of the noise, and of the network's start.
+        seed: Of the noise, and of how the network starts.
     """
 
     noise_m: float
@@ -113,7 +117,7 @@ class Judged:
 
     Attributes:
         point: Number of the point, from 0 in the order drawn.
-        controller: Kind of the controller.
+        controller: One of `CONTROLLERS`.
         n_segments: Segments of the worm that was run.
         reason: What the score says, or why the run ended before its time.
         period_s: Mean period, s; None if no segment repeats.
@@ -153,13 +157,12 @@ def judge(
     Args:
         number: Number of the point.
         point: The point.
-        controller: Kind of the controller.
+        controller: One of `CONTROLLERS`.
         rhythm: The score of its activation.
         lengthening: The score of its segments' lengthening.
         message: Why the run ended before its time; empty if it did not.
     """
-    walked = not message and rhythm.is_one_wave
-    period = rhythm.period_s
+    walked, period = not message and rhythm.is_one_wave, rhythm.period_s
     return Judged(
         point=number,
         controller=controller,
@@ -185,22 +188,20 @@ def robustness(
     controllers: Sequence[str] = CONTROLLERS,
     n_segments: int | None = None,
     keep: bool = False,
-    jobs: int | None = None,
     workers: Workers | None = None,
-    progress: Progress | None = None,
+    progress: StudyProgress | None = None,
 ) -> list[Judged]:
-    """Walks the first points of the sample under each controller, as far as the folder does not tell how that goes.
+    """Walks the first points of the sample under each controller, as far as the folder does not have their judgement.
 
     Args:
         folder: Folder of the results; runs go to ``runs`` within it. Written after every run, so that a stopped study
             shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
         n_points: How many points, in the order drawn.
-        controllers: Kinds of controllers, of `CONTROLLERS`.
+        controllers: Some of `CONTROLLERS`.
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
             that costs less; None for the sample as it is.
         keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
-        jobs: Processes; default: one a core.
-        workers: Who computes the runs instead of processes of this machine.
+        workers: Who computes the runs; default: a process for each core.
         progress: Called before the first and after every run.
 
     Returns:
@@ -228,32 +229,30 @@ def robustness(
     cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
     store, total_s, before_s = Store(folder / "runs", workers), sum(case.cost_s for case in cases.values()), 0.0
 
-    def judge_what_is_there() -> None:
+    def in_order() -> list[Judged]:
+        return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
+
+    def judge_what_is_there(lot_s: float, _: int, __: int, share: float) -> None:
         for (kind, i), case in cases.items():
             if (kind, i) not in judged and case in store:
-                judged[kind, i] = _judged_run(store, case, i, chosen[i], kind)
-        _write(_sorted(judged), folder)
-
-    def tell(lot_s: float, _: int, __: int, share: float) -> None:
-        judge_what_is_there()
+                run = store.run(case)
+                scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+                judged[kind, i] = judge(i, chosen[i], kind, *scores, store[case].message)
+        found = shares(in_order())
+        write_text(
+            folder / RESULTS, json.dumps({"shares": found, "judged": [*map(asdict, in_order())]}, indent=1) + "\n"
+        )
+        write_text(folder / "robustness.md", shares_table(found) + "\n")
         if progress is not None:
             done = sum(key in judged for key in cases)
             progress("robustness", done, len(cases), (before_s + share * lot_s) / total_s)
 
-    in_order = list(cases.values())
-    size = TOGETHER * (jobs or os.cpu_count() or 1)
-    for lot in (in_order[first : first + size] for first in range(0, len(in_order), size)):
+    waiting, size = list(cases.values()), TOGETHER * (os.cpu_count() or 1)
+    for lot in (waiting[first : first + size] for first in range(0, len(waiting), size)):
         lot_s = sum(case.cost_s for case in lot)
-        store.compute(lot, jobs=jobs, progress=partial(tell, lot_s))
+        store.compute(lot, progress=partial(judge_what_is_there, lot_s))
         before_s += lot_s
-    return _sorted(judged)
-
-
-def _judged_run(store: Store, case: Case, number: int, point: Point, controller: str) -> Judged:
-    """Judges a point whose run the store has."""
-    run = store.run(case)
-    scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
-    return judge(number, point, controller, *scores, store[case].message)
+    return in_order()
 
 
 def read_judged(folder: Path) -> list[Judged]:
@@ -276,31 +275,22 @@ def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
 
     Returns:
         For every controller the number of points, of those walked, in time, and in time with their segments lengthening
-        in the same order, and the share in time with its 95 % interval after Wilson.
+        in the same order, and the share in time with its 95 % interval after Wilson 1927.
     """
+    from scipy.stats import binomtest
+
     found: dict[str, dict[str, Any]] = {}
-    for controller in dict.fromkeys(one.controller for one in judged):
-        of_it = [one for one in judged if one.controller == controller]
-        n, good = len(of_it), sum(one.in_time for one in of_it)
-        low, high = wilson(good, n)
-        walked = sum(one.walked for one in of_it)
+    for controller, own in grouped(judged, lambda one: one.controller).items():
+        n, good = len(own), sum(one.in_time for one in own)
         found[controller] = {
             "points": n,
-            "walked": walked,
+            "walked": sum(one.walked for one in own),
             "in_time": good,
-            "lengthened": sum(one.in_time and one.lengthened for one in of_it),
+            "lengthened": sum(one.in_time and one.lengthened for one in own),
             "share": good / n,
-            "interval": [low, high],
+            "interval": [*map(float, binomtest(good, n).proportion_ci(method="wilson"))],
         }
     return found
-
-
-def wilson(successes: int, n: int, z: float = 1.959964) -> tuple[float, float]:
-    """Interval of a share of ``successes`` out of ``n``, after Wilson 1927; by default of 95 %."""
-    share, z2 = successes / n, z * z / n
-    middle = (share + z2 / 2.0) / (1.0 + z2)
-    half = z * sqrt(share * (1.0 - share) / n + z2 / (4.0 * n)) / (1.0 + z2)
-    return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
 def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
@@ -316,17 +306,3 @@ def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
         ),
     }
     return plain_table(tabulated(found.items(), columns))
-
-
-def _sorted(judged: Mapping[tuple[str, int], Judged]) -> list[Judged]:
-    return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
-
-
-def _write(judged: Sequence[Judged], folder: Path) -> None:
-    found = shares(judged)
-    content = {"shares": found, "judged": [asdict(one) for one in judged]}
-    folder.mkdir(parents=True, exist_ok=True)
-    texts = {RESULTS: json.dumps(content, indent=1), "robustness.md": shares_table(found)}
-    for name, text in texts.items():
-        with whole_file(folder / name) as draft:
-            draft.write_text(text + "\n", encoding="utf-8")

@@ -17,13 +17,12 @@ from hypothesis import strategies as st
 
 from annelid import simulate
 from annelid.analysis import ROBOT_ELONGATION_M, RhythmScore, Summary
-from annelid.body.worm import WormBody
+from annelid.body import ServoRings, WormBody
 from annelid.errors import ConfigError
 from annelid.experiment.outcome import Hold, Outcome, outcome
 from annelid.simulation.worm import WormPlant
 from annelid_studies.riddle2023.figures.muscle_surface import engine_flv, scaled_length
 from annelid_studies.weak_middle import pulls, sweeps
-from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry, value_at
 from annelid_studies.weak_middle.pulls import (
     ACTUATORS,
     END_M,
@@ -56,12 +55,15 @@ from annelid_studies.weak_middle.results import (
 )
 from annelid_studies.weak_middle.sweeps import (
     QUANTITIES,
+    Answer,
+    Asymmetry,
     Point,
     Reading,
     check_points,
     deficits,
     stiffness_changes,
     sweep_points,
+    value_at,
     weight_changes,
 )
 
@@ -145,12 +147,12 @@ def test_a_muscle_pulls_with_the_force_of_its_length(bench: Bench) -> None:
 
 
 def test_a_servo_ends_at_its_cable_where_rods_are_soft(bench: Bench) -> None:
-    shortest = pulls.base_servos().length_ranges(1)[0][0]
+    servos = pulls.base_body().rings
+    assert isinstance(servos, ServoRings)
+    shortest = servos.length_ranges(1)[0][0]
     soft = bench(1, servo(), **stiffness_changes(0.5))
-    assert soft.force_N < 0.9 * pulls.base_servos().forces(1)[0]
-    assert soft.ring_length_m == pytest.approx(
-        shortest + 2 * soft.force_N / pulls.base_servos().stiffness_N_per_m, abs=2e-3
-    )
+    assert soft.force_N < 0.9 * servos.forces(1)[0]
+    assert soft.ring_length_m == pytest.approx(shortest + 2 * soft.force_N / servos.stiffness_N_per_m, abs=2e-3)
 
 
 def test_too_great_a_force_collapses_a_ring_and_gives_no_point(bench: Bench) -> None:

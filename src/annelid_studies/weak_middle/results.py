@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,6 @@ from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import tabulated, terminal_table
-from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry
 from annelid_studies.weak_middle.pulls import ACTUATORS, Key, Setting
 from annelid_studies.weak_middle.sweeps import (
     BASE,
@@ -23,6 +22,8 @@ from annelid_studies.weak_middle.sweeps import (
     QUANTITIES,
     STIFFNESS,
     WEIGHT,
+    Answer,
+    Asymmetry,
     Quantity,
     Reading,
     deficits,
@@ -52,25 +53,16 @@ COLUMNS = (
 )
 
 
-def write_readings(readings: Sequence[Reading], path: Path) -> None:
-    """Writes one row a pulled segment as CSV with a header; the deficit is that of its worm.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
-    write_csv(path, COLUMNS, (row for reading in readings for row in _rows(reading)))
-
-
-def _rows(reading: Reading) -> Iterator[list[object]]:
-    point = reading.point
-    for one in reading.pulled:
-        yield [
-            point.quantity,
-            f"{point.value:g}",
-            point.n_segments,
-            point.actuator.kind,
-            point.actuator.setting,
-            point.resolution,
+def write_readings(readings: Sequence[Reading], path: Path) -> Path:
+    """Writes one row a pulled segment as CSV with a header, and returns its path; the deficit is that of its worm."""
+    rows = (
+        [
+            reading.point.quantity,
+            f"{reading.point.value:g}",
+            reading.point.n_segments,
+            reading.point.actuator.kind,
+            reading.point.actuator.setting,
+            reading.point.resolution,
             one.segment,
             _number(100 * one.elongation_m, 3),
             _number(one.ring_length_m, 4),
@@ -79,6 +71,10 @@ def _rows(reading: Reading) -> Iterator[list[object]]:
             _number(100 * reading.deficit, 2),
             one.problem,
         ]
+        for reading in readings
+        for one in reading.pulled
+    )
+    return write_csv(path, COLUMNS, rows)
 
 
 def robot_deficit() -> float:
@@ -93,18 +89,11 @@ def papers_deficit() -> float:
     return interior_deficit(elongation)
 
 
-def weak_middle_figure(readings: Sequence[Reading], stem: str | Path) -> Path:
+def weak_middle_figure(readings: Sequence[Reading], stem: Path) -> Path:
     """Draws the deficit over every quantity, a panel each, one line for every kind of actuator.
 
-    Args:
-        readings: The sweeps.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
     Returns:
-        The path of the picture in pixels.
-
-    Raises:
-        RunFileError: A file cannot be written.
+        The path of the picture in pixels; as vectors it lies beside it.
     """
     marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
     largest = max([*marks.values(), *(one.deficit for one in readings if isfinite(one.deficit))])
@@ -154,9 +143,7 @@ def settings_table(set_to: Mapping[Key, Setting]) -> TerminalTable:
             labels.get(name, name),
             f"{value:g}" if name in labels else "",
             f"{one.force_N:.2f}",
-            f"{one.length_m:.4f}",
-            f"{one.ring_length_m:.4f}",
-            f"{one.activation:.4f}",
+            *(f"{number:.4f}" for number in (one.length_m, one.ring_length_m, one.activation)),
         ]
         for (name, value), one in set_to.items()
     ]

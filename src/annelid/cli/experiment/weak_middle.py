@@ -35,7 +35,6 @@ def weak_middle_command(
     annelid experiment weak-middle --quick
     annelid experiment weak-middle -o weak-middle
     """
-    from annelid_studies.weak_middle.asymmetry import asymmetry
     from annelid_studies.weak_middle.results import (
         asymmetry_table,
         checks_table,
@@ -44,7 +43,7 @@ def weak_middle_command(
         weak_middle_figure,
         write_readings,
     )
-    from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
+    from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, asymmetry, weak_middle
 
     found = None
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
@@ -53,6 +52,5 @@ def weak_middle_command(
             found = asymmetry(store, set_to[BASE_KEY].force_N)
     tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
     tables += [checks_table(readings), asymmetry_table(found)] if found else []
-    path = output / "weak_middle.csv"
-    write_readings([*readings, *(found.readings if found else ())], path)
+    path = write_readings([*readings, *(found.readings if found else ())], output / "weak_middle.csv")
     print_results((path, weak_middle_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from annelid.experiment import StudyProgress
 from annelid.output import write_json
 from annelid.simulation import locks
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
@@ -41,9 +42,6 @@ SCHEMA = {
     "peer": "free rods without joints, contact or muscles; step_limit_us is the closed form of the largest stable step",
 }
 
-Progress = Callable[[str, int, int, float], object]
-"""Called with what is being done, the number of cases done, their total, and the share of the work."""
-
 _PEER_COST_S = 15.0
 # Importing, compiling, and the pass with the engine's timers.
 _OVERHEAD_S = 5.0
@@ -53,7 +51,7 @@ _GROWTH = {"chain": 2.0, "rods": 0.4}
 
 @locks("folder")
 def bench(
-    folder: Path, effort: Effort = "full", *, lines: Sequence[str] | None = None, progress: Progress | None = None
+    folder: Path, effort: Effort = "full", *, lines: Sequence[str] | None = None, progress: StudyProgress | None = None
 ) -> Path:
     """Times closed loops one after the other, as far as they have not been timed into the folder before.
 
@@ -72,23 +70,39 @@ def bench(
         KeyboardInterrupt: The case in progress is dropped, all others kept.
     """
     cases = bench_cases(effort, lines)
-    with_peer = "peer" in check_lines(lines)
-    measured = _measure_all(cases, with_peer, Measurements(folder / CASES_FOLDER), progress)
-    report = {
+    wanted: dict[str, BenchCase | None] = {case.name: case for case in cases}
+    if "peer" in check_lines(lines):
+        wanted["peer"] = None
+    store = Measurements(folder / CASES_FOLDER)
+    measured = {name: kept for name, case in wanted.items() if (kept := store.find(case)) is not None}
+    costs_s = {name: _cost_s(case) for name, case in wanted.items() if name not in measured}
+    total_s, done_s = sum(costs_s.values()) or 1.0, 0.0
+
+    def report(within_s: float) -> None:
+        if progress is not None:
+            progress("timing worms", len(measured), len(wanted), min(1.0, (done_s + within_s) / total_s))
+
+    for name, cost_s in costs_s.items():
+        report(0.0)
+        try:
+            measured[name] = store.measure(wanted[name], lambda share, cost_s=cost_s: report(share * cost_s))
+        except MeasurementFailed as failure:
+            measured[name] = {"failed": str(failure)}
+        done_s += cost_s
+    content = {
         "effort": effort,
         "machine": f"{os.cpu_count()} cores, one of them used",
         "versions": {name: version(name) for name in ("annelid", "mujoco-core", "numpy")}
         | {"python": platform.python_version()},
         "schema": SCHEMA,
         **judge(cases, measured),
-        "peer": measured.get(None),
+        "peer": measured.get("peer"),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    return write_json(folder / JSON_NAME, report)
+    return write_json(folder / JSON_NAME, content)
 
 
-def judge(cases: Sequence[BenchCase], measured: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
-    """Lays measurements side by side: errors, fronts, exponents, levels.
+def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Compares measurements: errors, fronts, exponents, levels.
 
     Args:
         cases: The cases.
@@ -97,41 +111,23 @@ def judge(cases: Sequence[BenchCase], measured: Mapping[str | None, Mapping[str,
     references = {case.name: measured[case.name] for case in cases if case.kind == "converged"}
     entries = [_entry(case, measured[case.name], references) for case in cases]
     usable = [entry for entry in entries if "failed" not in entry]
-    judged = [entry for entry in usable if entry["kind"] == "judged"]
+    # The period of a run that is not ordered is no measure of it.
+    ordered = [entry for entry in usable if entry["kind"] == "judged" and entry["rhythm"]["verdict"] == "ordered"]
+    fronts = {}
+    for name, run in references.items():
+        if "failed" not in run:
+            points = {
+                entry["name"]: (entry["real_time_factor"], error)
+                for entry in ordered
+                if (error := entry["errors"][name]["largest"]) is not None
+            }
+            fronts[name] = front(points)
     return {
         "cases": entries,
         "cost_exponents": {preset: _exponents(usable, line) for preset, line in ((RODS, "segments"), (CHAIN, "chain"))},
-        "fronts": {name: _front(judged, name) for name, run in references.items() if "failed" not in run},
+        "fronts": fronts,
         "levels": {entry["level"]: entry["name"] for entry in entries if entry["level"]},
     }
-
-
-def _measure_all(
-    cases: Sequence[BenchCase], with_peer: bool, store: Measurements, progress: Progress | None
-) -> dict[str | None, dict[str, Any]]:
-    wanted: list[BenchCase | None] = [*cases, *([None] if with_peer else [])]
-    found = {_name(case): stored for case in wanted if (stored := store.find(case)) is not None}
-    missing = [case for case in wanted if _name(case) not in found]
-    total_s = sum(map(_cost_s, missing)) or 1.0
-    done_s = 0.0
-
-    def report(within_s: float) -> None:
-        if progress is not None:
-            progress("timing worms", len(found), len(wanted), min(1.0, (done_s + within_s) / total_s))
-
-    for case in missing:
-        cost_s = _cost_s(case)
-        report(0.0)
-        try:
-            found[_name(case)] = store.measure(case, lambda share, cost_s=cost_s: report(share * cost_s))
-        except MeasurementFailed as failure:
-            found[_name(case)] = {"failed": str(failure)}
-        done_s += cost_s
-    return found
-
-
-def _name(case: BenchCase | None) -> str | None:
-    return None if case is None else case.name
 
 
 def _cost_s(case: BenchCase | None) -> float:
@@ -143,7 +139,7 @@ def _cost_s(case: BenchCase | None) -> float:
 
 def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     config = case.case.config
-    known = {
+    entry = {
         "name": case.name,
         "kind": case.kind,
         "lines": list(case.lines),
@@ -155,15 +151,15 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
         "physics_step_ms": round(1e3 * config.clock.physics_timestep_s, 9),
         "duration_s": config.duration_s,
         "command": case.case.command,
+        **measured,
     }
-    if case.kind == "speed" or "failed" in measured:
-        return {**known, **measured}
-    compared = {
-        name: errors(measured["summary"], reference["summary"])
-        for name, reference in references.items()
-        if name != case.name and "failed" not in reference
-    }
-    return {**known, **measured, "errors": compared}
+    if case.kind != "speed" and "failed" not in measured:
+        entry["errors"] = {
+            name: errors(measured["summary"], reference["summary"])
+            for name, reference in references.items()
+            if name != case.name and "failed" not in reference
+        }
+    return entry
 
 
 def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, float | None]:
@@ -174,23 +170,12 @@ def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, flo
     }
     if len(points) < 2:
         return {}
-    ranges = dict.fromkeys([(min(points), max(points)), SCALED_SEGMENTS])
     found = {}
-    for low, high in ranges:
+    for low, high in dict.fromkeys([(min(points), max(points)), SCALED_SEGMENTS]):
         within = [n for n in sorted(points) if low <= n <= high]
         if within and (within[0], within[-1]) == (low, high):
             found[f"{low}-{high}"] = exponent(within, [points[n] for n in within])
     return found
-
-
-def _front(entries: Sequence[Mapping[str, Any]], reference: str) -> list[str]:
-    """The front of the ordered runs: the period of any other is no measure of it."""
-    points = {
-        entry["name"]: (entry["real_time_factor"], entry["errors"][reference]["largest"])
-        for entry in entries
-        if entry["rhythm"]["verdict"] == "ordered" and entry["errors"][reference]["largest"] is not None
-    }
-    return front(points)
 
 
 def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[str, Any]:
@@ -202,9 +187,9 @@ def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[st
 
     Returns:
         Relative errors, as fractions, of the shortest ring, of each segment's elongation and the largest of these, and
-        of the period; ``travel_m``, the difference of the travel, m; and ``largest``, of the
-        largest elongation's and the period's, which decides. Each is None where
-        one of the two runs lacks the quantity, or the reference's is zero.
+        of the period; ``travel_m``, the difference of the travel, m; and ``largest``, of the largest elongation's and
+        the period's, which decides. Each is None where one of the two runs lacks the quantity, or the reference's is
+        zero.
     """
     elongations = measured["elongation_mean_max_m"], reference["elongation_mean_max_m"]
     elongation = None if None in elongations else [_relative(*pair) for pair in zip(*elongations, strict=True)]
@@ -235,8 +220,7 @@ def front(points: Mapping[str, tuple[float, float]]) -> list[str]:
     Returns:
         Names of those for which no other point is at least as good in both and better in one.
     """
-    best = []
-    least = float("inf")
+    best, least = [], float("inf")
     for name, (_, error) in sorted(points.items(), key=lambda item: (-item[1][0], item[1][1])):
         if error < least:
             best.append(name)

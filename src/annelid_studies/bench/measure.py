@@ -31,7 +31,14 @@ def main() -> None:
     request: dict[str, Any] = json.loads(sys.stdin.readline())
     end_after(lambda: os.read(sys.stdin.fileno(), 1))
     try:
-        _say(measured=_measured(request))
+        if "config" in request:
+            from annelid.config import load_config
+
+            _say(measured=measure(load_config(request["config"])))
+        else:
+            from annelid_studies.bench.peer import peer
+
+            _say(measured=peer())
     except AnnelidError as error:
         _say(error=str(error))
 
@@ -43,10 +50,7 @@ def keep_to_one_core() -> None:
 
 
 def measure(config: RunConfig) -> dict[str, Any]:
-    """Runs a closed loop with its recording and returns its times, shares, memory and results.
-
-    Args:
-        config: A 3D worm.
+    """Runs the closed loop of a 3D worm with its recording and returns its times, shares, memory and results.
 
     Returns:
         Numbers with their units in the keys, ready for JSON. A run that a guard stopped is measured as far as it came.
@@ -57,6 +61,7 @@ def measure(config: RunConfig) -> dict[str, Any]:
     import numpy as np
 
     from annelid.analysis import rhythm_score, summary
+    from annelid.body import build_spec, compile_spec
     from annelid.simulation import WormPlant, build_controller, open_run, simulate, start
     from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares
 
@@ -65,14 +70,16 @@ def measure(config: RunConfig) -> dict[str, Any]:
     controller = build_controller(config, plant)
     stepping = Stopwatch(plant, "step", "stride", reading=lambda: plant.data.time)
     watching, controlling = Stopwatch(plant, "alarm"), Stopwatch(controller, "step", "stride")
-
-    def progress(simulated_s: float, _: float) -> None:
-        _say(share=0.9 * simulated_s / config.duration_s)
-
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run"
         try:
-            run = simulate(config, path, plant=plant, controller=controller, progress=progress)
+            run = simulate(
+                config,
+                path,
+                plant=plant,
+                controller=controller,
+                progress=lambda simulated_s, _: _say(share=0.9 * simulated_s / config.duration_s),
+            )
         except SimulationStopped:
             run = open_run(path)
         peak = peak_memory_bytes()
@@ -86,7 +93,11 @@ def measure(config: RunConfig) -> dict[str, Any]:
     laps_ms = 1e3 * laps_s(stepping.ends, stepping.readings, config.clock.physics_timestep_s)
     again = start(config, plant, controller, None)
     engine = engine_times(again, plant, stepping, min(ENGINE_S, config.duration_s), ENGINE_WALL_S)
-    build_s, compile_s = _building(config)
+    began = perf_counter()
+    spec = build_spec(config)
+    built = perf_counter()
+    compile_spec(spec)
+    compiled = perf_counter()
     return {
         "status": run.status,
         "message": run.message,
@@ -97,8 +108,8 @@ def measure(config: RunConfig) -> dict[str, Any]:
         "step_mean_ms": float(np.mean(laps_ms)) if laps_ms.size else None,
         "shares": shares(total_s, plant_s, control_s, engine),
         "peak_memory_MB": None if peak is None else peak / _MB,
-        "build_s": build_s,
-        "compile_s": compile_s,
+        "build_s": built - began,
+        "compile_s": compiled - built,
         "velocities": int(plant.model.nv),
         "constraint_rows_mean": float(np.mean(engine.constraints or 0)),
         "solver_iterations_mean": float(np.mean(engine.iterations or 0)),
@@ -125,27 +136,6 @@ def peak_memory_bytes() -> int | None:
     except ImportError:
         return None
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-
-
-def _measured(request: dict[str, Any]) -> dict[str, Any]:
-    if "config" not in request:
-        from annelid_studies.bench.peer import peer
-
-        return peer()
-    from annelid.config import load_config
-
-    return measure(load_config(request["config"]))
-
-
-def _building(config: RunConfig) -> tuple[float, float]:
-    """Times the making of the specification and its compilation by the engine, s."""
-    from annelid.body import build_spec, compile_spec
-
-    began = perf_counter()
-    spec = build_spec(config)
-    built = perf_counter()
-    compile_spec(spec)
-    return built - began, perf_counter() - built
 
 
 def _say(**content: Any) -> None:

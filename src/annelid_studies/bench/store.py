@@ -14,13 +14,12 @@ from typing import Any
 
 from annelid.errors import AnnelidError
 from annelid.experiment import case_key, code_fingerprint
-from annelid.output import whole_file
+from annelid.output import write_text
 from annelid.textfiles import read_json
 from annelid_studies.bench.cases import BenchCase
 
-MEASURING = "annelid_studies.bench.measure"
-"""The code that a measurement depends on beside the physics."""
-PEER_CODE = "annelid_studies.bench.peer"
+MEASURING, PEER_CODE = "annelid_studies.bench.measure", "annelid_studies.bench.peer"
+"""The code that a measurement depends on beside the physics, and that of the peer."""
 
 Share = Callable[[float], object]
 """Called with the share of a case that is done."""
@@ -31,10 +30,9 @@ class MeasurementFailed(AnnelidError):
 
 
 class Measurements:
-    """A folder of measurements."""
+    """A folder of measurements of cases, and of the peer for None; it is made with the first."""
 
     def __init__(self, folder: Path) -> None:
-        """Opens it; it is made with the first measurement."""
         self.folder = folder
 
     def find(self, case: BenchCase | None) -> dict[str, Any] | None:
@@ -45,7 +43,7 @@ class Measurements:
             return None
 
     def measure(self, case: BenchCase | None, progress: Share) -> dict[str, Any]:
-        """Measures a case, or the peer for None, and keeps the numbers.
+        """Measures a case, and keeps the numbers.
 
         Raises:
             MeasurementFailed: The process died, or the case cannot be built.
@@ -55,34 +53,33 @@ class Measurements:
         # A peer that is missing may be installed before the next call.
         if measured.get("installed", True):
             self.folder.mkdir(parents=True, exist_ok=True)
-            with whole_file(self._path(case)) as draft:
-                draft.write_text(json.dumps(measured, indent=1, allow_nan=False), encoding="utf-8")
+            write_text(self._path(case), json.dumps(measured, indent=1, allow_nan=False))
         return measured
 
     def _path(self, case: BenchCase | None) -> Path:
-        key = (
-            _digest(code_fingerprint(PEER_CODE))
-            if case is None
-            else _digest(case_key(case.case) + code_fingerprint(MEASURING))
-        )
+        code = code_fingerprint(PEER_CODE) if case is None else case_key(case.case) + code_fingerprint(MEASURING)
         stem = "peer" if case is None else case.name.replace(", ", "-").replace(" ", "-")
-        return self.folder / f"{stem}-{key}.json"
+        return self.folder / f"{stem}-{hashlib.sha256(code.encode()).hexdigest()[:12]}.json"
 
 
 def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
-    command = [sys.executable, "-m", "annelid_studies.bench.measure"]
     with tempfile.TemporaryFile("w+", encoding="utf-8") as complaints:
         child = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, text=True, encoding="utf-8"
+            [sys.executable, "-m", MEASURING],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
+            text=True,
+            encoding="utf-8",
         )
         assert child.stdin is not None
         assert child.stdout is not None
+        answer: dict[str, Any] = {}
         try:
             # A process that dies at once leaves its reason on stderr. Its stdin stays open: it ends when that closes.
             with suppress(BrokenPipeError):
                 child.stdin.write(json.dumps(request) + "\n")
                 child.stdin.flush()
-            answer: dict[str, Any] = {}
             for line in child.stdout:
                 # A library may print too.
                 if line.startswith("{"):
@@ -103,7 +100,3 @@ def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
         complaints.seek(0)
         last = (complaints.read().strip().splitlines() or [f"the process ended with status {child.returncode}"])[-1]
         raise MeasurementFailed(answer.get("error", last))
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from annelid.errors import SimulationStopped
 
 if TYPE_CHECKING:
-    import mujoco
-
     from annelid.simulation import Simulation, WormPlant
 
 ENGINE_PHASES = ("position", "velocity", "actuation", "constraint", "advance")
@@ -39,39 +37,30 @@ class Stopwatch:
         reading: Callable[[], float] | None = None,
         clock: Callable[[], float] = perf_counter,
     ) -> None:
-        """Puts itself in the methods' places.
-
-        Args:
-            owner: The object.
-            *methods: Names of its methods; one that it lacks is left out.
-            reading: What to read after each call; None for nothing.
-            clock: Tells the time, s.
-        """
+        """Puts itself in the places of those methods that the owner has."""
         self.seconds = 0.0
         self.ends, self.readings = array("d"), array("d")
-        self._clock, self._reading = clock, reading
-        self._within = False
-        for method in methods:
-            if hasattr(owner, method):
-                setattr(owner, method, self._timed(getattr(owner, method)))
+        within = False
 
-    def _timed(self, method: Callable[..., Any]) -> Callable[..., Any]:
-        def timed(*arguments: Any) -> Any:
-            if self._within:
+        def timed(method: Callable[..., Any], *arguments: Any) -> Any:
+            nonlocal within
+            if within:
                 return method(*arguments)
-            self._within = True
-            began = self._clock()
+            within = True
+            began = clock()
             try:
                 return method(*arguments)
             finally:
-                ended = self._clock()
-                self._within = False
+                ended = clock()
+                within = False
                 self.seconds += ended - began
-                if self._reading is not None:
+                if reading is not None:
                     self.ends.append(ended)
-                    self.readings.append(self._reading())
+                    self.readings.append(reading())
 
-        return timed
+        for method in methods:
+            if hasattr(owner, method):
+                setattr(owner, method, partial(timed, getattr(owner, method)))
 
 
 def laps_s(ends: Sequence[float], times: Sequence[float], step_s: float) -> np.ndarray:
@@ -87,8 +76,7 @@ def laps_s(ends: Sequence[float], times: Sequence[float], step_s: float) -> np.n
     return np.diff(np.asarray(ends)[moved]) / n_steps
 
 
-@dataclass(frozen=True, slots=True)
-class EngineTimes:
+class EngineTimes(NamedTuple):
     """What the engine spent on a stretch of steps.
 
     Attributes:
@@ -109,10 +97,10 @@ class EngineTimes:
 def engine_times(
     simulation: Simulation, plant: WormPlant, stepping: Stopwatch, simulated_s: float, longest_s: float
 ) -> EngineTimes:
-    """Runs a closed loop with the engine's timers on, which by default stand still.
+    """Runs a closed loop from its start with the engine's timers on, which by default stand still.
 
     Args:
-        simulation: The loop, at its start.
+        simulation: The loop.
         plant: Its worm.
         stepping: Stopwatch round the worm's steps.
         simulated_s: How long to run, s of simulated time.
@@ -124,7 +112,7 @@ def engine_times(
     iterations, constraints = [], []
     mujoco.set_mjcb_time(perf_counter)
     try:
-        before, plant_before_s = _timers(data), stepping.seconds
+        before, plant_before_s = np.array(data.timer.duration), stepping.seconds
         began, time = perf_counter(), data.time
         while simulation.sensation.time_s < simulated_s and perf_counter() - began < longest_s:
             try:
@@ -135,44 +123,23 @@ def engine_times(
                 time = data.time
                 iterations.append(int(data.solver_niter[: max(1, int(data.nisland))].max()))
                 constraints.append(int(data.nefc))
-        spent = _timers(data) - before
+        spent = np.array(data.timer.duration) - before
     finally:
         mujoco.set_mjcb_time(None)
-    return EngineTimes(
-        tuple(float(spent[_timer(phase)]) for phase in ENGINE_PHASES),
-        float(spent[_timer("step")]),
-        stepping.seconds - plant_before_s,
-        tuple(iterations),
-        tuple(constraints),
+    *phases, step = (
+        float(spent[int(getattr(mujoco.mjtTimer, f"mjTIMER_{name.upper()}"))]) for name in (*ENGINE_PHASES, "step")
     )
+    plant_s = stepping.seconds - plant_before_s
+    return EngineTimes(tuple(phases), step, plant_s, tuple(iterations), tuple(constraints))
 
 
 def shares(total_s: float, plant_s: float, control_s: float, engine: EngineTimes) -> dict[str, float]:
-    """Splits the time of a run into `PHASES`.
+    """Splits the wall-clock time of a run, s, into shares of `PHASES`, which add up to 1.
 
-    Args:
-        total_s: Wall-clock time of the run, s.
-        plant_s: Time of it in the plant, s.
-        control_s: Time of it in the controller, s.
-        engine: How the engine divides the time in the plant.
-
-    Returns:
-        The share of each phase; they add up to 1.
+    The engine's times say how that in the plant is divided.
     """
-    of_plant = plant_s / total_s
+    of_plant, control = plant_s / total_s, control_s / total_s
     phases = [of_plant * seconds / engine.plant_s for seconds in engine.phase_s]
     rest = of_plant * (engine.step_s - sum(engine.phase_s)) / engine.plant_s
     around = of_plant * (1.0 - engine.step_s / engine.plant_s)
-    control = control_s / total_s
-    parts: Sequence[float] = [*phases, rest, around, control, 1.0 - of_plant - control]
-    return dict(zip(PHASES, parts, strict=True))
-
-
-def _timers(data: mujoco.MjData) -> np.ndarray:
-    return np.array(data.timer.duration)
-
-
-def _timer(name: str) -> int:
-    import mujoco
-
-    return int(getattr(mujoco.mjtTimer, f"mjTIMER_{name.upper()}"))
+    return dict(zip(PHASES, [*phases, rest, around, control, 1.0 - of_plant - control], strict=True))

@@ -21,7 +21,12 @@ if TYPE_CHECKING:
         score_detections,
     )
     from annelid.analysis.elongation import end_difference, interior_deficit, middle_deficit
-    from annelid.analysis.paper import ROBOT_ELONGATION_M, published
+    from annelid.analysis.paper import (
+        PAPER_ELONGATION_M,
+        PAPER_END_DIFFERENCE,
+        PAPER_MIDDLE_DEFICIT,
+        ROBOT_ELONGATION_M,
+    )
     from annelid.analysis.passage import Passage, passage_of
     from annelid.analysis.rhombi import (
         Deformation,
@@ -42,6 +47,9 @@ if TYPE_CHECKING:
 __all__ = [
     "CONTRACTED",
     "DESIGN_INTERVAL_S",
+    "PAPER_ELONGATION_M",
+    "PAPER_END_DIFFERENCE",
+    "PAPER_MIDDLE_DEFICIT",
     "ROBOT_ELONGATION_M",
     "SHORTEST_S",
     "Deformation",
@@ -68,7 +76,6 @@ __all__ = [
     "passage_of",
     "plane_means",
     "precision_recall",
-    "published",
     "rhombus_diagonals",
     "rhombus_plane",
     "rhythm_score",

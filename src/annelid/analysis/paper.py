@@ -19,6 +19,11 @@ ROBOT_ELONGATION_M = (0.0615, 0.0382, 0.0478, 0.0598)
 and the right stretch sensor. Riddle et al. 2023, section 4, from data of Wang. Its Fig. 9 shows the readings over
 time as a graph; numbers are given of these maxima only.
 """
+PAPER_ELONGATION_M = (0.0420, 0.0255, 0.0402)
+"""Largest elongation of the segments of the paper's worm of three, m. Riddle et al. 2023, section 3."""
+PAPER_MIDDLE_DEFICIT, PAPER_END_DIFFERENCE = 0.394, 0.0445
+"""How far segment 2 stays below segment 1 by these, and segment 3, as the paper states them."""
+
 PAPER_2023 = "Riddle et al. 2023"
 PAPER_2022 = "Riddle et al. 2022"
 FORMULATION = "riddle2023"
@@ -169,10 +174,10 @@ def _is_of_2023(config: RunConfig) -> bool:
 
 _RIDDLE_2023 = {
     "order": Published("1-2-3", PAPER_2023, "Fig. 7"),
-    "elongation_first_helix_pp_m": Published((0.0420, 0.0255, 0.0402), PAPER_2023, "section 3"),
+    "elongation_first_helix_pp_m": Published(PAPER_ELONGATION_M, PAPER_2023, "section 3"),
     # Segment 2 below segment 1, and segment 1 versus 3.
-    "middle_deficit": Published(0.394, PAPER_2023, "section 3"),
-    "end_difference": Published(0.0445, PAPER_2023, "section 3"),
+    "middle_deficit": Published(PAPER_MIDDLE_DEFICIT, PAPER_2023, "section 3"),
+    "end_difference": Published(PAPER_END_DIFFERENCE, PAPER_2023, "section 3"),
     "contraction_force_median_N": Published("up to 2.5 N", PAPER_2023, "section 2.2"),
     "travel_m": Published("negligible", PAPER_2023, "section 5"),
     # 5000 steps of 1 ms in 3.5 min.

@@ -15,7 +15,7 @@ from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.body.actuators import ActuatorKind
-    from annelid.body.actuators.muscle import Rings
+    from annelid.body.actuators.muscle import Rings, muscle_force
     from annelid.body.actuators.servo import ServoRings
     from annelid.body.assemble import build_spec, compile_spec, mesh_of
     from annelid.body.formulations import FormulationKind
@@ -35,6 +35,7 @@ __all__ = [
     "build_spec",
     "compile_spec",
     "mesh_of",
+    "muscle_force",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

@@ -9,11 +9,11 @@ from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
 from annelid.analysis import ROBOT_ELONGATION_M
-from annelid.body import Rings, WormBody, mesh_of
+from annelid.body import Rings, WormBody, mesh_of, muscle_force
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Hold, Outcome, Store
-from annelid_studies.riddle2023.figures.muscle_surface import closed_form_flv, scaled_length
+from annelid_studies.riddle2023.figures.muscle_surface import scaled_length
 from annelid_studies.worms import RODS
 
 PRESET = "wang"
@@ -138,7 +138,7 @@ def muscle_activation(force_N: float, ring_length_m: float) -> float:
     """Activation at which the paper's muscle, standing still, pulls with a force at a length of its ring."""
     rings = papers_muscle()
     length = scaled_length(ring_length_m, rings.length_ranges(1)[0])
-    return float(force_N / (rings.forces(1)[0] * closed_form_flv(length, 0.0, rings)))
+    return float(force_N / (rings.forces(1)[0] * muscle_force(length, 0.0, rings)))
 
 
 def pull(segment: int, actuator: Actuator, changes: Mapping[str, Any] | None = None) -> Case:

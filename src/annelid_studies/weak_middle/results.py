@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.analysis import ROBOT_ELONGATION_M, interior_deficit, published
-from annelid.config import load_config
+from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M, interior_deficit
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid.output import write_csv
@@ -28,7 +27,6 @@ from annelid_studies.weak_middle.sweeps import (
     Reading,
     deficits,
 )
-from annelid_studies.worms import CHAIN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,9 +82,7 @@ def robot_deficit() -> float:
 
 def papers_deficit() -> float:
     """The same of the paper's simulation, its first helix read peak to peak."""
-    elongation = published(load_config(CHAIN))["elongation_first_helix_pp_m"].value
-    assert isinstance(elongation, tuple)
-    return interior_deficit(elongation)
+    return interior_deficit(PAPER_ELONGATION_M)
 
 
 def weak_middle_figure(readings: Sequence[Reading], stem: Path) -> Path:

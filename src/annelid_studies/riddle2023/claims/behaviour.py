@@ -24,7 +24,7 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.gate import VARIANTS, variant
-from annelid_studies.riddle2023.examinations.words import in_unit, span
+from annelid_studies.riddle2023.words import in_unit, span
 from annelid_studies.worms import FAST, fast, rods
 
 _of_control = partial(Claim, "Sensing and control")
@@ -34,11 +34,11 @@ GATES = "the worm and how its gates start"
 def control_claims(evidence: Evidence) -> list[Claim]:
     """Judges the claims about sensing and the network."""
     own = [outcome for outcome, _ in evidence.runs]
-    others = [evidence.results[case] for case in (PLANAR_CASES[300], fast(), rods())]
+    others = [evidence.store[case] for case in (PLANAR_CASES[300], fast(), rods())]
     rhythms = [outcome.rhythm for outcome in (*own, *others)]
     gates = {
         start: [
-            evidence.results[variant(worm, *pair)].rhythm.is_one_wave
+            evidence.store[variant(worm, *pair)].rhythm.is_one_wave
             for worm, pairs in VARIANTS[evidence.effort].items()
             for pair in pairs
             if pair[0] == start
@@ -202,7 +202,7 @@ def _by_reading(ours: np.ndarray, unit: str, digits: int = 2) -> str:
 
 def cost_claim(evidence: Evidence) -> Claim:
     """Judges the claim about the cost of computing."""
-    spent, fast = evidence.runs[0][0].cpu_time_s, evidence.results[Case(FAST)].cpu_time_s
+    spent, fast = evidence.runs[0][0].cpu_time_s, evidence.store[Case(FAST)].cpu_time_s
     return _of_results(
         f"{PAPER_STEPS} steps take 3.5 minutes.",
         "section 3",

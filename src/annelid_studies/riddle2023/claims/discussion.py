@@ -31,7 +31,7 @@ from annelid_studies.riddle2023.claims.evidence import (
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY, frictions_of
-from annelid_studies.riddle2023.examinations.words import span
+from annelid_studies.riddle2023.words import span
 from annelid_studies.worms import chain, fast, one_after_the_other, rods
 
 _of_discussion = partial(Claim, "Discussion")
@@ -42,8 +42,8 @@ def discussion_claims(evidence: Evidence, main: Run) -> list[Claim]:
     """Judges the claims about propagation, the weak middle, the robot and travel."""
     from annelid_studies.riddle2023.figures.propagation import measure_propagation
 
-    held = evidence.results[chain(one_after_the_other())] if evidence.effort == "full" else None
-    held = held or evidence.results[fast(one_after_the_other())]
+    held = evidence.store[chain(one_after_the_other())] if evidence.effort == "full" else None
+    held = held or evidence.store[fast(one_after_the_other())]
     worm = "riddle2023" if evidence.effort == "full" else "riddle2023-fast"
     first, second = held.holds[0].elongation_mean_m, held.holds[1].elongation_mean_m
     # Shape (n_runs, 3, n_readings).
@@ -109,7 +109,7 @@ def _speed_claim(evidence: Evidence, main: Run) -> Claim:
     body_m = float(main.data.attrs["body_length_m"])
     ours = [_travel_in_a_cycle(run, outcome.rhythm.period_s or nan) for outcome, run in evidence.runs]
     others = {
-        case.preset: _travel_in_a_cycle(evidence.store.run(case), evidence.results[case].rhythm.period_s or nan)
+        case.preset: _travel_in_a_cycle(evidence.store.run(case), evidence.store[case].rhythm.period_s or nan)
         for case in (fast(), rods())
     }
     listed = ", ".join(f"{1e3 * travel:+.0f} mm ({name})" for name, travel in others.items())
@@ -118,10 +118,9 @@ def _speed_claim(evidence: Evidence, main: Run) -> Claim:
         "section 5",
         "negligibly small",
         f"{span(ours, 1e3, 0)} mm forwards in the last cycle, {span(ours, 100 / body_m, 1)} % of the body",
-        f"Centre of mass over one period. Negligible means below "
-        f"{100 * NEGLIGIBLE:.0f} % of the body here; the paper gives no number. Other worms in the same gait: "
-        f"{listed}. Travel depends on pins, contact settings and time step more than on anything the paper states; "
-        "friction and time step are examined.",
+        f"Centre of mass over one period. Negligible means below {100 * NEGLIGIBLE:.0f} % of the body here; the paper "
+        f"gives no number. Other worms in the same gait: {listed}. Travel depends on pins, contact settings and time "
+        "step more than on anything the paper states; friction and time step are examined.",
         MAIN.command,
         *judged((abs(travel) < NEGLIGIBLE * body_m for travel in ours), "the run"),
     )
@@ -262,7 +261,7 @@ MUCH = 2.0
 
 def outlook_claims(evidence: Evidence) -> list[Claim]:
     """Judges the claims about noise, friction and what is to come."""
-    rhythms = {tau: evidence.results[case].rhythm for tau, case in PLANAR_CASES.items()}
+    rhythms = {tau: evidence.store[case].rhythm for tau, case in PLANAR_CASES.items()}
     periods = {tau: rhythm.period_s or nan for tau, rhythm in rhythms.items()}
     factor = max(periods.values()) / min(periods.values())
     adaptive = judged([*(rhythm.is_one_wave for rhythm in rhythms.values()), factor > MUCH], "the time constant")
@@ -348,11 +347,10 @@ def _slip_claim(evidence: Evidence) -> Claim:
         "shown by Wang on the robot",
         f"precision {span((one.precision for one in found), digits=2)}, recall "
         f"{span((one.recall for one in found), digits=2)} over {len(found)} runs ({'; '.join(cases)})",
-        f"Our detector reads stretch and load only, and is judged by the slip that the simulator knows of; it holds if "
-        f"precision and recall are at least {RELIABLE:g}. It tells "
-        f"{span((one.found for one in found), 100, 0)} % of the slips sooner or later, and is seldom late, but its "
-        "constants were chosen on one of these runs, and another detector may do better. The worm is the later "
-        "six-segment one (riddle2025-muscles).",
+        "Our detector reads stretch and load only, and is judged by the slip that the simulator knows of; it holds if "
+        f"precision and recall are at least {RELIABLE:g}. It tells {span((one.found for one in found), 100, 0)} % of "
+        "the slips sooner or later, and is seldom late, but its constants were chosen on one of these runs, and "
+        "another detector may do better. The worm is the later six-segment one (riddle2025-muscles).",
         "annelid experiment slip-detector",
         *judged((min(one.precision, one.recall) >= RELIABLE for one in found), "the gait and the friction"),
     )

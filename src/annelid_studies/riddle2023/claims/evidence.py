@@ -13,10 +13,9 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
-from annelid_studies.riddle2023.contents import Verdict
-from annelid_studies.riddle2023.examination import Effort, Findings, Results
+from annelid_studies.riddle2023.contents import Findings, Verdict
 from annelid_studies.riddle2023.examinations.design import WORMS
-from annelid_studies.worms import CHAIN, FAST, PLANAR, chain, fast, one_after_the_other, rods
+from annelid_studies.worms import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
 EQUAL_RANGES = {"body.rings.length_range_m": [0.566, 1.067]}
@@ -48,14 +47,12 @@ class Evidence:
     """What the claims are judged by.
 
     Attributes:
-        store: The runs.
-        results: Their outcomes.
+        store: The runs and their outcomes.
         effort: Quick or full.
         findings: What each examination found, by its name.
     """
 
     store: Store
-    results: Results
     effort: Effort
     findings: dict[str, Findings]
 
@@ -76,7 +73,7 @@ class Evidence:
     def runs(self) -> Sequence[tuple[Outcome, Run]]:
         """The runs of the paper's own worm, as it is first."""
         cases = [MAIN, *(spread_cases(self.effort) if self.effort == "full" else ())]
-        return [(self.results[case], self.store.run(case)) for case in cases]
+        return [(self.store[case], self.store.run(case)) for case in cases]
 
     @property
     def worms(self) -> Sequence[str]:
@@ -98,7 +95,7 @@ def rule(evidence: Evidence) -> list[str]:
     swings, periods = [], []
     for case in perturbed:
         swings.append(readings_m(evidence.store.run(case)))
-        periods.append(evidence.results[case].rhythm.period_s or nan)
+        periods.append(evidence.store[case].rhythm.period_s or nan)
     preset = perturbed[0].preset
     swings = [readings_m(evidence.store.run(Case(preset))), *swings]
     apart = float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0)))

@@ -26,7 +26,7 @@ from annelid_studies.riddle2023.claims.evidence import (
 from annelid_studies.riddle2023.contents import Claim
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.discretization import HELD, QUANTITIES
-from annelid_studies.riddle2023.examinations.words import span
+from annelid_studies.riddle2023.words import span
 from annelid_studies.worms import fast, one_after_the_other, rods
 
 _of_structure = partial(Claim, "Structure")
@@ -144,7 +144,7 @@ def _springs_claim(evidence: Evidence) -> Claim:
     worm = next(worm for worm in WORMS if worm.name in evidence.worms)
     pulling, both = (100 * readings_m(evidence.store.run(worm.case(changes)))[0] for changes in (TENSION_ONLY, {}))
     walks = [
-        evidence.results[each.case(TENSION_ONLY)].rhythm.is_one_wave for each in WORMS if each.name in evidence.worms
+        evidence.store[each.case(TENSION_ONLY)].rhythm.is_one_wave for each in WORMS if each.name in evidence.worms
     ]
     return _of_structure(
         "The axial springs act in tension only.",
@@ -155,8 +155,7 @@ def _springs_claim(evidence: Evidence) -> Claim:
         f"{worm.label})",
         "The authors' files have springs that push as well, and so has our preset. What is compared is the elongation "
         "of segment 1 with the springs of the text: where it is far from the paper's, the paper's numbers do not come "
-        "from such springs. "
-        f"{sum(walks)} of the {len(walks)} worms that were run with them keep the order 1-2-3.",
+        f"from such springs. {sum(walks)} of the {len(walks)} worms that were run with them keep the order 1-2-3.",
         "annelid run riddle2023 --set body.springs.tension_only=true",
         *near(pulling, 4.20, "how the elongation is read"),
     )
@@ -179,7 +178,7 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
     slope, reach = (field_value(main.config, f"controller.{name}") for name in ("activation_slope_per_mV", "range_mV"))
     printed, meant = (1 / (1 + np.exp(sign * slope * reach)) for sign in (1, -1))
     usual, short = (
-        [hold.ring_length_m for worm in (fast, rods) for hold in evidence.results[worm(changes)].holds]
+        [hold.ring_length_m for worm in (fast, rods) for hold in evidence.store[worm(changes)].holds]
         for changes in (one_after_the_other(), SHORT_MINIMUM)
     )
     return [
@@ -208,11 +207,10 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
             "section 2.2",
             "up to 2.5 N",
             f"largest {span(peaks, digits=1)} N; median while contracted {span(medians)} N",
-            "The largest force of each run is compared, as the claim is about a largest one. Of RK4 the "
-            "engine tells the force of the last of its four stages, which alternates from step to step: the largest is "
-            "one of these, and depends on the time step. The muscle settles near its shortest length, where "
-            "little is left of the "
-            f"{max(body.muscles.forces(body.n_segments)):.0f} N that it could pull with: it limits length rather "
+            "The largest force of each run is compared, as the claim is about a largest one. Of RK4 the engine tells "
+            "the force of the last of its four stages, which alternates from step to step: the largest is one of "
+            "these, and depends on the time step. The muscle settles near its shortest length, where little is left of "
+            f"the {max(body.muscles.forces(body.n_segments)):.0f} N that it could pull with: it limits length rather "
             "than force. The paper's number is nearer to that settled force.",
             MAIN.command,
             *near(peaks, 2.5, "the run"),
@@ -232,9 +230,8 @@ def actuation_claims(evidence: Evidence, main: Run) -> list[Claim]:
             "0.58",
             f"rings held at {span(usual, 100, 1)} cm with 0.58, at {span(short, 100, 1)} cm with 0.5",
             f"Every ring of the rods, with soft and with rigid crossings, {len(usual)} contractions in open loop with "
-            "each value. The paper "
-            "does not say from what length on a mesh is over-contracted; what is compared is whether 0.58 keeps rings "
-            "longer, which the law of the force all but says: a weak test.",
+            "each value. The paper does not say from what length on a mesh is over-contracted; what is compared is "
+            "whether 0.58 keeps rings longer, which the law of the force all but says: a weak test.",
             rods(SHORT_MINIMUM).command,
             *judged((ours < theirs for ours, theirs in zip(short, usual, strict=True)), "the segment"),
         ),

@@ -32,11 +32,7 @@ _SETTLING_TIME_S = 3.0
 
 
 def contracted_outline(config: RunConfig, contracted: int) -> Array:
-    """Lets a planar plant contract one segment until it rests.
-
-    Args:
-        config: A configuration with a planar body.
-        contracted: Index of the segment, from 0.
+    """Lets a planar plant contract one segment, from 0, until it rests.
 
     Returns:
         Upper half of each segment from front to rear, shape ``(n_segments, n_corners, 2)``, m; the front tip at x = 0.
@@ -61,31 +57,12 @@ def contracted_outline(config: RunConfig, contracted: int) -> Array:
 
 
 def rigid_outline(height_m: Array, length_m: Array) -> Array:
-    """Places hinged rhombi in a row; their lower halves are the mirror images of the upper.
-
-    Args:
-        height_m: Shape ``(n_segments,)``.
-        length_m: Shape ``(n_segments,)``.
-
-    Returns:
-        Upper half of each, shape ``(n_segments, 3, 2)``: front joint on the axis, top, rear joint, m.
-    """
+    """Upper halves of hinged rhombi in a row, from the front joint over the top to the rear one, ``(n, 3, 2)``, m."""
     return rhombi(length_m, height_m)[:, :3] + [np.sum(length_m) / 2.0, 0.0]
 
 
 def zigzag(start: Array, end: Array, amplitude: float, n_teeth: int = 9, lead: float = 0.2) -> Array:
-    """Path of a linear spring's symbol.
-
-    Args:
-        start: Shape ``(2,)``.
-        end: Shape ``(2,)``.
-        amplitude: Height of a tooth.
-        n_teeth: Number of teeth.
-        lead: Share of the length at each end that stays straight.
-
-    Returns:
-        Shape ``(n_teeth + 4, 2)``.
-    """
+    """Path of a linear spring's symbol, ``(n_teeth + 4, 2)``; a share ``lead`` at each end stays straight."""
     along = np.concatenate([[0.0], np.linspace(lead, 1.0 - lead, n_teeth + 2), [1.0]])
     across = np.zeros(n_teeth + 4)
     across[2:-2] = amplitude * (-1.0) ** np.arange(n_teeth)
@@ -102,14 +79,7 @@ def spiral(center: Array, radius: float, turns: float = 2.25) -> Array:
 
 
 def figure_1_planar_models(stem: Path) -> str:
-    """Draws the three models with the middle segment contracted, each from its own plant.
-
-    Args:
-        stem: Path of the two files without their suffixes.
-
-    Returns:
-        The caption.
-    """
+    """Draws the three models with the middle segment contracted, each from its own plant; returns the caption."""
     contracted = N_SEGMENTS // 2
     outlines = {
         title: contracted_outline(load_config(preset, {"body.n_segments": N_SEGMENTS}), contracted)

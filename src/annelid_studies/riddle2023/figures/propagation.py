@@ -13,6 +13,7 @@ from annelid.analysis import actuated, deformation, distance_from_ring_m, plane_
 from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
 from annelid.draw import rhombi as flat_rhombi
 from annelid.morphology import Array, MeshGeometry
+from annelid.simulation import Run
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,
@@ -25,9 +26,6 @@ from annelid_studies.riddle2023.figures.renderings import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from annelid.simulation import Run
-
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
@@ -55,16 +53,20 @@ class Measured:
     width_m: tuple[float, float]
 
     def __str__(self) -> str:
-        (length0, length), (width0, width) = self.length_m, self.width_m
-        return (
-            f"length {_CM * length0:.1f} → {_CM * length:.1f} cm ({_change(length0, length)})\n"
-            f"width {_CM * width0:.1f} → {_CM * width:.1f} cm ({_change(width0, width)})"
+        return "\n".join(
+            f"{name} {_CM * before:.1f} → {_CM * after:.1f} cm ({_change(after / before)})"
+            for name, (before, after) in (("length", self.length_m), ("width", self.width_m))
         )
+
+    @property
+    def changes(self) -> tuple[str, str]:
+        """Changes of length and width in words."""
+        return _change(self.length_m[1] / self.length_m[0]), _change(self.width_m[1] / self.width_m[0])
 
 
 @dataclass(frozen=True)
 class Propagation:
-    """What figures 2 and 8 measure.
+    """What figure 8 measures.
 
     Attributes:
         time_s: Time of the posture.
@@ -97,12 +99,7 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
 
 
 def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
-    """Sets rhombi that deform alone beside the same row of the compliant worm, with one segment contracted.
-
-    Args:
-        run: The run of a 3D worm.
-        stem: Path of the two files to write, without suffix.
-        time_s: Time of the posture, s.
+    """Draws rhombi that deform alone beside the same row of the compliant worm, with one segment contracted.
 
     Returns:
         The caption.
@@ -111,50 +108,56 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
     posture = recorded_posture(run, time_s)
-    rows = _side_by_side(posture)
+    geometry, segment = posture.geometry, _contracted(posture)
+    rings_own = np.flatnonzero(rhombus_plane(geometry) == geometry.ring_planes[segment])
+    # Seen from -y, the first segment is on the left.
+    outward = _outward(geometry.crossings_m, geometry)[rings_own]
+    start, away = int(rings_own[np.argmin(outward[:, 1])]), outward[np.argmin(outward[:, 1])]
+    row = _row(geometry, start)
+    own = int(np.flatnonzero(row == start)[0])
+    # Axial and lateral diagonals, m, each (2, n): at rest, in the mesh, and alone with rigid sides.
+    rest, mesh = (
+        np.stack(rhombus_diagonals(crossings, geometry.rhombi[row]))
+        for crossings in (geometry.crossings_m, posture.crossings_m)
+    )
+    width = np.where(np.arange(len(row)) == own, mesh[1], rest[1])
+    rigid = np.stack([np.sqrt((rest**2).sum(axis=0) - width**2), width])
+    change_alone, change = rigid[0] / rest[0], mesh[0] / rest[0]
     with canvas(3.0) as figure:
-        rigid, compliant = figure.subplots(1, 2, sharex=True, sharey=True)
-        place = draw_worm(compliant, posture, rows.facing_deg, strength=0.45)
-        corners = place(posture.crossings_m[posture.geometry.rhombi[rows.rhombi]])
-        alone = _CM * flat_rhombi(rows.rigid_m[0], rows.rigid_m[1])
-        alone += corners[rows.own].mean(axis=0) - alone[rows.own].mean(axis=0)
-        foot = float(compliant.get_ylim()[0])
-        _draw_row(rigid, alone, rows.own, rows.rigid_m[0] / rows.rest_m[0] - 1.0, foot)
-        _draw_row(compliant, corners, rows.own, rows.compliant_m[0] / rows.rest_m[0] - 1.0, foot)
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        place = draw_worm(right, posture, (90.0, float(np.degrees(np.arcsin(-away[2])))), strength=0.45)
+        corners = place(posture.crossings_m[geometry.rhombi[row]])
+        alone = _CM * flat_rhombi(rigid[0], rigid[1])
+        alone += corners[own].mean(axis=0) - alone[own].mean(axis=0)
+        foot = float(right.get_ylim()[0])
+        _draw_row(left, alone, own, change_alone, foot)
+        _draw_row(right, corners, own, change, foot)
         reach = np.concatenate([alone, corners])[..., 0]
-        compliant.set_xlim(min(compliant.get_xlim()[0], reach.min() - 1), max(compliant.get_xlim()[1], reach.max() + 1))
-        compliant.set_ylim(foot - 8.0, None)
-        figure.set_figheight(_height_over_width(compliant) * WIDTH_IN / 2 + 0.3)
-        _scale_bar(rigid, alone)
-        panel_title(rigid, "a) without propagation: each rhombus alone")
-        panel_title(compliant, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
+        right.set_xlim(min(right.get_xlim()[0], reach.min() - 1), max(right.get_xlim()[1], reach.max() + 1))
+        right.set_ylim(foot - 8.0, None)
+        figure.set_figheight(_height_over_width(right) * WIDTH_IN / 2 + 0.3)
+        # 10 cm above the left end.
+        bar, above = alone[..., 0].min(), alone[..., 1].max() + 2.5
+        left.plot([bar, bar + 10.0], [above, above], color="black", linewidth=2.0, solid_capstyle="butt")
+        left.text(bar + 5.0, above + 0.6, "10 cm", ha="center", va="bottom", fontsize=8)
+        panel_title(left, "a) without propagation: each rhombus alone")
+        panel_title(right, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
         save_both(figure, stem)
-    return _caption_2(posture, rows)
-
-
-def _caption_2(posture: Posture, rows: _Rows) -> str:
-    rest, alone, mesh = (float(lengths[0].sum()) for lengths in (rows.rest_m, rows.rigid_m, rows.compliant_m))
-    own_alone, own_mesh = (float(m[0][rows.own] / rows.rest_m[0][rows.own]) for m in (rows.rigid_m, rows.compliant_m))
-    beside = [k for k in (rows.own - 1, rows.own + 1) if 0 <= k < len(rows.rhombi)]
-    neighbours = float((rows.compliant_m[0] / rows.rest_m[0])[beside].mean())
+    beside = [k for k in (own - 1, own + 1) if 0 <= k < len(row)]
     return (
-        f"One row of rhombi along the body while segment {rows.segment + 1} contracts (orange, hatched; all others "
+        f"One row of rhombi along the body while segment {segment + 1} contracts (orange, hatched; all others "
         "black); below each rhombus the change of its length. a) Kinematic, with rigid sides: made as narrow as the "
-        f"contracted rhombus of b), that one lengthens by {_change(1.0, own_alone)} and its neighbours keep their "
-        f"shape. b) The compliant worm at {posture.time_s:.2f} s, drawn facing that row, the rest of the mesh pale: "
-        f"the contracted rhombus lengthens by {_change(1.0, own_mesh)}, and its neighbours in the row by "
-        f"{_change(1.0, neighbours)} on average. The row of {_CM * rest:.1f} cm becomes {_CM * alone:.1f} cm long in "
-        f"a) and {_CM * mesh:.1f} cm in b).{_pin_remark(posture, rows.segment)}"
+        f"contracted rhombus of b), that one lengthens by {_change(float(change_alone[own]))} and its neighbours keep "
+        f"their shape. b) The compliant worm at {posture.time_s:.2f} s, drawn facing that row, the rest of the mesh "
+        f"pale: the contracted rhombus lengthens by {_change(float(change[own]))}, and its neighbours in the row by "
+        f"{_change(float(change[beside].mean()))} on average. The row of {_CM * rest[0].sum():.1f} cm becomes "
+        f"{_CM * rigid[0].sum():.1f} cm long in a) and {_CM * mesh[0].sum():.1f} cm in b)."
+        f"{_pin_remark(posture, segment)}"
     )
 
 
 def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Shows the worm with one segment contracted, a near and a far rhombus, and the deformation of all of them.
-
-    Args:
-        run: The run of a 3D worm.
-        stem: Path of the two files to write, without suffix.
-        time_s: Time of the posture, s.
 
     Returns:
         The caption.
@@ -198,15 +201,13 @@ def _caption_8(posture: Posture, measured: Propagation) -> str:
     most, last = int(np.argmax(np.abs(axial))), int(np.argmax(distance))
     return (
         f"a) The compliant worm with segment {measured.segment + 1} contracted, at {measured.time_s:.2f} s ({how}; the "
-        "contracted ring is thick and red). The near rhombus (green, solid), "
-        f"{_CM * abs(near.distance_m):.1f} cm from the ring at rest, {_muscle(posture, near)}, changes its "
-        f"length by {_change(*near.length_m)} and its width by {_change(*near.width_m)}; the far one (pink, dashed), "
-        f"{_CM * abs(far.distance_m):.1f} cm away, {_muscle(posture, far)}, by {_change(*far.length_m)} and "
-        f"{_change(*far.width_m)}. b, c) The same for every rhombus (straight lines between opposite pins) with the "
-        f"mean of each plane, front on the left: the mean change of length is largest, "
-        f"{_change(1.0, 1.0 + float(axial[most]))}, {_CM * distance[most]:.1f} cm from the ring, and "
-        f"{_change(1.0, 1.0 + float(axial[last]))} at {_CM * distance[last]:.1f} cm."
-        f"{_pin_remark(posture, measured.segment)}"
+        f"contracted ring is thick and red). The near rhombus (green, solid), {_CM * abs(near.distance_m):.1f} cm from "
+        f"the ring at rest, {_muscle(posture, near)}, changes its length by {near.changes[0]} and its width by "
+        f"{near.changes[1]}; the far one (pink, dashed), {_CM * abs(far.distance_m):.1f} cm away, "
+        f"{_muscle(posture, far)}, by {far.changes[0]} and {far.changes[1]}. b, c) The same for every rhombus "
+        "(straight lines between opposite pins) with the mean of each plane, front on the left: the mean change of "
+        f"length is largest, {_change(1.0 + float(axial[most]))}, {_CM * distance[most]:.1f} cm from the ring, and "
+        f"{_change(1.0 + float(axial[last]))} at {_CM * distance[last]:.1f} cm.{_pin_remark(posture, measured.segment)}"
     )
 
 
@@ -224,36 +225,6 @@ def _pin_remark(posture: Posture, segment: int) -> str:
     if gap_m < _GAP_M:
         return ""
     return f" The contracted ring's pins, which are tied softly, stand {_CM * gap_m:.1f} cm off their strands."
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """A row of rhombi tip to tip, alone and in the mesh: each ``(axial, lateral)``, m, of shape ``(2, n)``."""
-
-    segment: int
-    rhombi: NDArray[np.int64]
-    own: int
-    facing_deg: tuple[float, float]
-    rest_m: Array
-    compliant_m: Array
-    rigid_m: Array
-
-
-def _side_by_side(posture: Posture) -> _Rows:
-    geometry = posture.geometry
-    segment = _contracted(posture)
-    rings_own = np.flatnonzero(rhombus_plane(geometry) == geometry.ring_planes[segment])
-    # Seen from -y, the first segment is on the left.
-    outward = _outward(geometry.crossings_m, geometry)[rings_own]
-    start, away = int(rings_own[np.argmin(outward[:, 1])]), outward[np.argmin(outward[:, 1])]
-    row = _row(geometry, start)
-    own = int(np.flatnonzero(row == start)[0])
-    rest = np.stack(rhombus_diagonals(geometry.crossings_m, geometry.rhombi[row]))
-    compliant = np.stack(rhombus_diagonals(posture.crossings_m, geometry.rhombi[row]))
-    lateral = rest[1].copy()
-    lateral[own] = compliant[1, own]
-    rigid = np.stack([np.sqrt((rest**2).sum(axis=0) - lateral**2), lateral])
-    return _Rows(segment, row, own, (90.0, float(np.degrees(np.arcsin(-away[2])))), rest, compliant, rigid)
 
 
 def _row(geometry: MeshGeometry, start: int) -> NDArray[np.int64]:
@@ -276,7 +247,7 @@ def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) 
     for k, quad in enumerate(corners):
         style = {"edgecolor": ORANGE, "linewidth": 2.6, "hatch": "////"} if k == own else {"edgecolor": "black"}
         axes.add_patch(Polygon(quad, closed=True, facecolor="none", zorder=6 if k == own else 5, **style))
-        text = _change(1.0, 1.0 + float(change[k])).removesuffix(" %")
+        text = _change(float(change[k])).removesuffix(" %")
         axes.text(quad[:, 0].mean(), foot - 1.0, text, ha="center", va="top", fontsize=8)
     middle = (corners[..., 0].min() + corners[..., 0].max()) / 2
     axes.text(middle, foot - 5.0, "change of length (%)", ha="center", va="top", fontsize=8)
@@ -285,13 +256,6 @@ def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) 
 def _height_over_width(axes: Axes) -> float:
     """Shape of what the limits of axes hold, where both axes have one scale."""
     return abs(float(np.diff(axes.get_ylim())[0] / np.diff(axes.get_xlim())[0]))
-
-
-def _scale_bar(axes: Axes, corners: Array) -> None:
-    """Draws 10 cm above a row's left end."""
-    left, above = corners[..., 0].min(), corners[..., 1].max() + 2.5
-    axes.plot([left, left + 10.0], [above, above], color="black", linewidth=2.0, solid_capstyle="butt")
-    axes.text(left + 5.0, above + 0.6, "10 cm", ha="center", va="bottom", fontsize=8)
 
 
 def _outline(
@@ -371,6 +335,6 @@ def _outward(crossings_m: Array, geometry: MeshGeometry) -> Array:
     return away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
-def _change(before: float, after: float) -> str:
-    percent = round(_PERCENT * (after / before - 1.0))
+def _change(ratio: float) -> str:
+    percent = round(_PERCENT * (ratio - 1.0))
     return f"{percent:+d} %".replace("-", "\N{MINUS SIGN}") if percent else "0 %"

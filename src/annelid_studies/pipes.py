@@ -70,66 +70,38 @@ BEND_SPEED_M_PER_S = 0.1
 
 
 class Trial(NamedTuple):
-    """One worm in one pipe.
+    """One worm in one pipe."""
 
-    Attributes:
-        arena: Kind of pipe: ``"bend"``, or a key of `NARROW_ARENAS`.
-        gait: Key of `BEND_GAITS` or `NARROW_GAITS`.
-        radius_m: Radius of the bend's centre line; 0 for a straight pipe.
-        case: Its run.
-    """
-
-    arena: str
-    gait: str
-    radius_m: float
-    case: Case
+    arena: str  # Kind of pipe: ``"bend"``, or a key of `NARROW_ARENAS`
+    gait: str  # Key of `BEND_GAITS` or `NARROW_GAITS`
+    radius_m: float  # Radius of the bend's centre line; 0 for a straight pipe
+    case: Case  # Its run
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What the run of a trial says; NaN and None where it cannot.
+    """What the run of a trial says; NaN and None where it cannot."""
 
-    Attributes:
-        arena: As the trial's.
-        gait: As the trial's.
-        radius_m: As the trial's.
-        passed: Whether the middle of the worm came out of what bends or narrows.
-        speed_m_per_s: Speed of the foremost ring along the centre line through there.
-        front_m: Arc length that the foremost ring came to.
-        in_order: Whether segments contracted in the order 1-2-..-N throughout.
-        work_J_per_m: Net work of the muscles per metre of the middle's path, over the whole run.
-        slip_ratio: Distance that segments slide over that of the centre of mass.
-        command: The command line that makes the run.
-    """
-
-    arena: str
-    gait: str
-    radius_m: float
-    passed: bool
-    speed_m_per_s: float
-    front_m: float
-    in_order: bool | None
-    work_J_per_m: float | None
-    slip_ratio: float | None
-    command: str
+    arena: str  # As the trial's
+    gait: str  # As the trial's
+    radius_m: float  # As the trial's
+    passed: bool  # Whether the middle of the worm came out of what bends or narrows
+    speed_m_per_s: float  # Speed of the foremost ring along the centre line through there
+    front_m: float  # Arc length that the foremost ring came to
+    in_order: bool | None  # Whether segments contracted in the order 1-2-..-N throughout
+    work_J_per_m: float | None  # Net work of the muscles per metre of the middle's path, over the whole run
+    slip_ratio: float | None  # Distance that segments slide over that of the centre of mass
+    command: str  # The command line that makes the run
 
 
 class Course(NamedTuple):
-    """What is drawn of one run in a pipe that narrows, at the times of its postures, each ``(n,)``.
+    """What is drawn of one run in a pipe that narrows, at the times of its postures, each ``(n,)``."""
 
-    Attributes:
-        front_m: Where the foremost ring is along the centre line, m.
-        bore_m: Radius of the bore there, m.
-        speed_m_per_s: Speed of the middle, m/s.
-        drive: Activity of the descending neuron; zeros without one.
-        first_ring_m: Length of the foremost ring, m.
-    """
-
-    front_m: Array
-    bore_m: Array
-    speed_m_per_s: Array
-    drive: Array
-    first_ring_m: Array
+    front_m: Array  # Where the foremost ring is along the centre line, m
+    bore_m: Array  # Radius of the bore there, m
+    speed_m_per_s: Array  # Speed of the middle, m/s
+    drive: Array  # Activity of the descending neuron; zeros without one
+    first_ring_m: Array  # Length of the foremost ring, m
 
 
 Courses = Mapping[tuple[str, str], Course]

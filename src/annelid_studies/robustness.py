@@ -57,23 +57,14 @@ TIMED = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One point of the sample.
+    """One point of the sample."""
 
-    Attributes:
-        noise_m: Standard deviation of the noise on every reading of a stretch sensor, m.
-        friction: Friction of the floor.
-        physics_timestep_ms: Step of the body, whole ms.
-        n_segments: Number of segments.
-        young_modulus_Pa: Of the strands, Pa.
-        seed: Of the noise, and of how the network starts.
-    """
-
-    noise_m: float
-    friction: float
-    physics_timestep_ms: int
-    n_segments: int
-    young_modulus_Pa: float
-    seed: int
+    noise_m: float  # Standard deviation of the noise on every reading of a stretch sensor, m
+    friction: float  # Friction of the floor
+    physics_timestep_ms: int  # Step of the body, whole ms
+    n_segments: int  # Number of segments
+    young_modulus_Pa: float  # Of the strands, Pa
+    seed: int  # Of the noise, and of how the network starts
 
     @property
     def design_period_s(self) -> float:
@@ -113,29 +104,17 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """How one point went under one controller.
+    """How one point went under one controller."""
 
-    Attributes:
-        point: Number of the point, from 0 in the order drawn.
-        controller: One of `CONTROLLERS`.
-        n_segments: Segments of the worm that was run.
-        reason: What the score says, or why the run ended before its time.
-        period_s: Mean period, s; None if no segment repeats.
-        walked: Ordered, in one wave from front to rear, to the end.
-        in_time: Walked, with a period within 10 % of design.
-        lengthened: The segments lengthened in one wave from front to rear as well.
-        code: Digests of its run, with its configuration, code and engine, and of the code that judged it.
-    """
-
-    point: int
-    controller: str
-    n_segments: int
-    reason: str
-    period_s: float | None
-    walked: bool
-    in_time: bool
-    lengthened: bool
-    code: str
+    point: int  # Number of the point, from 0 in the order drawn
+    controller: str  # One of `CONTROLLERS`
+    n_segments: int  # Segments of the worm that was run
+    reason: str  # What the score says, or why the run ended before its time
+    period_s: float | None  # Mean period, s; None if no segment repeats
+    walked: bool  # Ordered, in one wave from front to rear, to the end
+    in_time: bool  # Walked, with a period within 10 % of design
+    lengthened: bool  # The segments lengthened in one wave from front to rear as well
+    code: str  # Digests of its run, with its configuration, code and engine, and of the code that judged it
 
 
 def points() -> tuple[Point, ...]:

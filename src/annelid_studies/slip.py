@@ -65,17 +65,12 @@ COLUMNS = (
 
 
 class Reading(NamedTuple):
-    """One run with one of `FEEDBACKS` on one friction.
-
-    Attributes:
-        cost: Speed and loss; None where there are no whole cycles to judge.
-        one_wave: Whether the segments contract in order, in one wave from front to rear.
-    """
+    """One run with one of `FEEDBACKS` on one friction."""
 
     feedback: str
     friction: float
-    cost: SlipCost | None
-    one_wave: bool
+    cost: SlipCost | None  # Speed and loss; None where there are no whole cycles to judge
+    one_wave: bool  # Whether the segments contract in order, in one wave from front to rear
 
 
 def case(feedback: str, friction: float, preset: str = PRESET) -> Case:

@@ -28,23 +28,14 @@ LARGEST_RADIUS_M = 20.0
 
 @dataclass(frozen=True)
 class Gait:
-    """A pattern on a body.
+    """A pattern on a body."""
 
-    Attributes:
-        name: What tables and figures call it.
-        preset: Preset of body and pattern.
-        cycle_s: Time of a cycle; of a nervous system about that, and its rhythm has the exact one.
-        cycles: Cycles that a run takes; the first is left out.
-        changes: Fields that differ from the preset.
-        shares: Shares of the segments in the modulation; None for all alike.
-    """
-
-    name: str
-    preset: str
-    cycle_s: float
-    cycles: int
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    shares: tuple[float, ...] | None = None
+    name: str  # What tables and figures call it
+    preset: str  # Preset of body and pattern
+    cycle_s: float  # Time of a cycle; of a nervous system about that, and its rhythm has the exact one
+    cycles: int  # Cycles that a run takes; the first is left out
+    changes: Mapping[str, Any] = field(default_factory=dict)  # Fields that differ from the preset
+    shares: tuple[float, ...] | None = None  # Shares of the segments in the modulation; None for all alike
 
     def case(self, modulation: float) -> Case:
         """Returns its run under a constant modulation."""
@@ -66,29 +57,18 @@ GAITS = (
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What one run under a constant modulation says.
+    """What one run under a constant modulation says."""
 
-    Attributes:
-        gait: Name of the gait.
-        modulation: Positive to the left, and so are the turn and its curvature.
-        wave: Whether segments contracted in the order 1-2-..-N throughout; None if the run is too short to tell.
-        cycle_s: Time of a cycle.
-        speed_m_per_s: Path of the body's middle from cycle to cycle, over time.
-        turn_deg_per_cycle: Change of the heading.
-        curvature_per_m: The same over the path.
-        radius_m: Radius of the circle; infinite for a straight path.
-        command: The command line that makes the run.
-    """
-
-    gait: str
-    modulation: float
+    gait: str  # Name of the gait
+    modulation: float  # Positive to the left, and so are the turn and its curvature
+    # Whether segments contracted in the order 1-2-..-N throughout; None if the run is too short to tell
     wave: bool | None
-    cycle_s: float
-    speed_m_per_s: float
-    turn_deg_per_cycle: float
-    curvature_per_m: float
-    radius_m: float
-    command: str
+    cycle_s: float  # Time of a cycle
+    speed_m_per_s: float  # Path of the body's middle from cycle to cycle, over time
+    turn_deg_per_cycle: float  # Change of the heading
+    curvature_per_m: float  # The same over the path
+    radius_m: float  # Radius of the circle; infinite for a straight path
+    command: str  # The command line that makes the run
 
 
 def turning(

@@ -44,19 +44,13 @@ _LEAST_INTERVAL_S = 0.005
 
 @dataclass(frozen=True)
 class BenchCase:
-    """One run of the benchmark.
+    """One run of the benchmark."""
 
-    Attributes:
-        name: What it is, in a few words; no two cases share it.
-        kind: ``"judged"`` is compared with the ``"converged"`` runs, ``"speed"`` only timed.
-        case: Its preset and what is changed in it.
-        lines: The lines that it lies on.
-    """
-
-    name: str
+    name: str  # What it is, in a few words; no two cases share it
+    # ``"judged"`` is compared with the ``"converged"`` runs, ``"speed"`` only timed
     kind: Literal["judged", "converged", "speed"]
-    case: Case
-    lines: tuple[str, ...]
+    case: Case  # Its preset and what is changed in it
+    lines: tuple[str, ...]  # The lines that it lies on
 
     @property
     def body(self) -> WormBody:

@@ -77,21 +77,13 @@ def laps_s(ends: Sequence[float], times: Sequence[float], step_s: float) -> np.n
 
 
 class EngineTimes(NamedTuple):
-    """What the engine spent on a stretch of steps.
+    """What the engine spent on a stretch of steps."""
 
-    Attributes:
-        phase_s: Time in each of `ENGINE_PHASES`, s.
-        step_s: Time in whole steps, s.
-        plant_s: Time in the plant's own steps, which call the engine, s.
-        iterations: Iterations of the constraint solver, at each movement of the body.
-        constraints: Rows of the constraint problem, likewise.
-    """
-
-    phase_s: tuple[float, ...]
-    step_s: float
-    plant_s: float
-    iterations: tuple[int, ...]
-    constraints: tuple[int, ...]
+    phase_s: tuple[float, ...]  # Time in each of `ENGINE_PHASES`, s
+    step_s: float  # Time in whole steps, s
+    plant_s: float  # Time in the plant's own steps, which call the engine, s
+    iterations: tuple[int, ...]  # Iterations of the constraint solver, at each movement of the body
+    constraints: tuple[int, ...]  # Rows of the constraint problem, likewise
 
 
 def engine_times(

@@ -20,29 +20,17 @@ Number = float | str | None
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper and what became of it.
+    """One claim of the paper and what became of it."""
 
-    Attributes:
-        topic: Structure, sensing, actuation, results, discussion, future work.
-        claim: What the paper says, in our words.
-        place: Where it says so.
-        paper: The paper's number or words.
-        ours: Our number or words.
-        evidence: Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it.
-        command: The command that makes our number.
-        verdict: Whether it holds.
-        within: How nearly, for example "4.5 %", where it holds within something; what it rests on.
-    """
-
-    topic: str
-    claim: str
-    place: str
-    paper: str
-    ours: str
-    evidence: str
-    command: str
-    verdict: Verdict
-    within: str = ""
+    topic: str  # Structure, sensing, actuation, results, discussion, future work
+    claim: str  # What the paper says, in our words
+    place: str  # Where it says so
+    paper: str  # The paper's number or words
+    ours: str  # Our number or words
+    evidence: str  # Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it
+    command: str  # The command that makes our number
+    verdict: Verdict  # Whether it holds
+    within: str = ""  # How nearly, for example "4.5 %", where it holds within something; what it rests on
 
 
 def tally(claims: Sequence[Claim]) -> str:
@@ -70,20 +58,13 @@ class Numbers(dict[str, Number]):
 
 @dataclass(frozen=True)
 class Findings:
-    """What an examination found.
+    """What an examination found."""
 
-    Attributes:
-        answer: The answer to its question in one to four sentences, with numbers; shown in bold at its top.
-        caption: What one sees in the figure.
-        table: The numbers.
-        remarks: Paragraphs for those who want to know more; may be empty.
-        numbers: Single results by name, for the claims; NaN and infinities become None, since JSON lacks them.
-    """
-
-    answer: str
-    caption: str
-    table: Table
-    remarks: Sequence[str] = ()
+    answer: str  # The answer to its question in one to four sentences, with numbers; shown in bold at its top
+    caption: str  # What one sees in the figure
+    table: Table  # The numbers
+    remarks: Sequence[str] = ()  # Paragraphs for those who want to know more; may be empty
+    # Single results by name, for the claims; NaN and infinities become None, since JSON lacks them
     numbers: Mapping[str, Number] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -96,20 +77,13 @@ class Findings:
 
 @dataclass(frozen=True)
 class Examination:
-    """A small reproducible study.
+    """A small reproducible study."""
 
-    Attributes:
-        name: One word, for file names and ``annelid paper --only``.
-        title: Its heading.
-        question: What it asks, in one or two sentences.
-        cases: The runs that it needs at an effort.
-        examine: Draws its figure as ``<stem>.svg`` and ``<stem>.png`` and returns what it found in a store of its runs.
-    """
-
-    name: str
-    title: str
-    question: str
-    cases: Callable[[Effort], Sequence[Case]]
+    name: str  # One word, for file names and ``annelid paper --only``
+    title: str  # Its heading
+    question: str  # What it asks, in one or two sentences
+    cases: Callable[[Effort], Sequence[Case]]  # The runs that it needs at an effort
+    # Draws its figure as ``<stem>.svg`` and ``<stem>.png`` and returns what it found in a store of its runs
     examine: Callable[[Store, Effort, Path], Findings]
 
 
@@ -124,24 +98,13 @@ class Examined:
 
 @dataclass(frozen=True)
 class Report:
-    """The whole report.
+    """The whole report."""
 
-    Attributes:
-        effort: Quick or full.
-        summary: Paragraphs that say what was found, for those who read no further.
-        main_table: Our main numbers beside the paper's.
-        figures: The paper's figures from our own runs.
-        claims: The paper's claims.
-        examinations: The examinations in the order of the report.
-        provenance: Versions, number of runs, processor time: label and value.
-        rule: Paragraphs that say how the claims are judged.
-    """
-
-    effort: Effort
-    summary: Sequence[str]
-    main_table: Table
-    figures: Sequence[Figure]
-    claims: Sequence[Claim]
-    examinations: Sequence[Examined]
-    provenance: Mapping[str, str]
-    rule: Sequence[str] = ()
+    effort: Effort  # Quick or full
+    summary: Sequence[str]  # Paragraphs that say what was found, for those who read no further
+    main_table: Table  # Our main numbers beside the paper's
+    figures: Sequence[Figure]  # The paper's figures from our own runs
+    claims: Sequence[Claim]  # The paper's claims
+    examinations: Sequence[Examined]  # The examinations in the order of the report
+    provenance: Mapping[str, str]  # Versions, number of runs, processor time: label and value
+    rule: Sequence[str] = ()  # Paragraphs that say how the claims are judged

@@ -162,23 +162,14 @@ def pull(segment: int, actuator: Actuator, changes: Mapping[str, Any] | None = N
 
 @dataclass(frozen=True, slots=True)
 class Pulled:
-    """What is read of one pulled segment.
+    """What is read of one pulled segment."""
 
-    Attributes:
-        segment: The segment, from 1.
-        elongation_m: Mean of its left and right sensor above their rest length, m; NaN where there is no reading.
-        ring_length_m: Length of its ring, m.
-        force_N: Tension all round its ring, N.
-        drift_m: How much it lengthened in the last half second, m.
-        problem: Why the reading does not count; empty if it does.
-    """
-
-    segment: int
-    elongation_m: float
-    ring_length_m: float
-    force_N: float
-    drift_m: float
-    problem: str
+    segment: int  # The segment, from 1
+    elongation_m: float  # Mean of its left and right sensor above their rest length, m; NaN where there is no reading
+    ring_length_m: float  # Length of its ring, m
+    force_N: float  # Tension all round its ring, N
+    drift_m: float  # How much it lengthened in the last half second, m
+    problem: str  # Why the reading does not count; empty if it does
 
 
 def read_pull(segment: int, outcome: Outcome) -> Pulled:
@@ -223,19 +214,12 @@ Key = tuple[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """How strongly the kinds of actuators pull where an end is to elongate by `END_M`.
+    """How strongly the kinds of actuators pull where an end is to elongate by `END_M`."""
 
-    Attributes:
-        length_m: Cable of the length-limited actuator, m.
-        ring_length_m: Length of the ring that this gives, m.
-        force_N: Limit of the force-limited actuator, N.
-        activation: Activation of the muscle that has the tension of the wound cable at the same length.
-    """
-
-    length_m: float
-    ring_length_m: float
-    force_N: float
-    activation: float
+    length_m: float  # Cable of the length-limited actuator, m
+    ring_length_m: float  # Length of the ring that this gives, m
+    force_N: float  # Limit of the force-limited actuator, N
+    activation: float  # Activation of the muscle that has the tension of the wound cable at the same length
 
     def actuators(self) -> dict[str, Actuator]:
         """Returns one actuator of each kind; the servo is the base worm's, whatever the setting."""

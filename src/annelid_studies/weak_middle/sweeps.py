@@ -35,23 +35,14 @@ from annelid_studies.worms import Effort
 
 
 class Quantity(NamedTuple):
-    """What one sweep varies.
+    """What one sweep varies."""
 
-    Attributes:
-        name: In one word, for the CSV.
-        label: For the axis of a panel and the head of a table, with its unit.
-        values: Values of the full study, in that unit.
-        changes: Fields of the base worm for a value.
-        quick: Values of the quick study.
-        title: In a few words, for a panel.
-    """
-
-    name: str
-    label: str
-    values: tuple[float, ...]
-    changes: Callable[[float], dict[str, Any]]
-    quick: tuple[float, ...] = ()
-    title: str = ""
+    name: str  # In one word, for the CSV
+    label: str  # For the axis of a panel and the head of a table, with its unit
+    values: tuple[float, ...]  # Values of the full study, in that unit
+    changes: Callable[[float], dict[str, Any]]  # Fields of the base worm for a value
+    quick: tuple[float, ...] = ()  # Values of the quick study
+    title: str = ""  # In a few words, for a panel
 
 
 def stiffness_changes(young_GPa: float) -> dict[str, Any]:
@@ -132,24 +123,16 @@ CHECKED_KG = (0.77, 1.87, 3.0)
 
 @dataclass(frozen=True)
 class Point:
-    """One worm with one kind of actuator.
+    """One worm with one kind of actuator."""
 
-    Attributes:
-        quantity: Name of the quantity that is varied.
-        value: Its value.
-        n_segments: Number of segments.
-        actuator: What pulls.
-        changes: Fields in which worm, ground and resolution differ from the base.
-        resolution: The resolution in words; empty for the study's own.
-        only: Segments that are pulled; empty for the front half, of which the rear half is the mirror image.
-    """
-
-    quantity: str
+    quantity: str  # Name of the quantity that is varied
     value: float
-    n_segments: int
-    actuator: Actuator
+    n_segments: int  # Number of segments
+    actuator: Actuator  # What pulls
+    # Fields in which worm, ground and resolution differ from the base
     changes: Mapping[str, Any] = field(default_factory=dict)
-    resolution: str = ""
+    resolution: str = ""  # The resolution in words; empty for the study's own
+    # Segments that are pulled; empty for the front half, of which the rear half is the mirror image
     only: tuple[int, ...] = ()
 
     @property
@@ -286,19 +269,12 @@ END_FORCES_N = (12.8, 13.1, 13.4)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What one cause alone would have to be.
+    """What one cause alone would have to be."""
 
-    Attributes:
-        label: The cause in words, with its unit.
-        weak: Its value where an interior segment elongates as the robot's weaker one; NaN if none was found.
-        strong: The same for the stronger one.
-        tried: Smallest and largest elongation of the interior segment over the values tried, m.
-    """
-
-    label: str
-    weak: float
-    strong: float
-    tried: tuple[float, float]
+    label: str  # The cause in words, with its unit
+    weak: float  # Its value where an interior segment elongates as the robot's weaker one; NaN if none was found
+    strong: float  # The same for the stronger one
+    tried: tuple[float, float]  # Smallest and largest elongation of the interior segment over the values tried, m
 
     @property
     def difference(self) -> float:
@@ -309,19 +285,14 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Asymmetry:
-    """What the robot's differences between segments would take.
+    """What the robot's differences between segments would take."""
 
-    Attributes:
-        answers: For every cause, the servo's force first, then the length that the ring has at that force.
-        limits_N: Force limits of the four servos at which the worm elongates as the robot; NaN where none was found.
-        confirmed: The four segments of that one worm, each pulled alone; None without all limits.
-        readings: All pulls.
-    """
-
+    # For every cause, the servo's force first, then the length that the ring has at that force
     answers: tuple[Answer, ...]
+    # Force limits of the four servos at which the worm elongates as the robot; NaN where none was found
     limits_N: tuple[float, ...]
-    confirmed: Reading | None
-    readings: tuple[Reading, ...]
+    confirmed: Reading | None  # The four segments of that one worm, each pulled alone; None without all limits
+    readings: tuple[Reading, ...]  # All pulls
 
 
 def value_at(values: ArrayLike, elongation_m: ArrayLike, wanted_m: float) -> float:

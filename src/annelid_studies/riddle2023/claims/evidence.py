@@ -44,17 +44,11 @@ TUBE_AREA_M2, POLYETHYLENE_KG_PER_M3 = 1.7e-5, 940.0
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the claims are judged by.
+    """What the claims are judged by."""
 
-    Attributes:
-        store: The runs and their outcomes.
-        effort: Quick or full.
-        findings: What each examination found, by its name.
-    """
-
-    store: Store
-    effort: Effort
-    findings: dict[str, Findings]
+    store: Store  # The runs and their outcomes
+    effort: Effort  # Quick or full
+    findings: dict[str, Findings]  # What each examination found, by its name
 
     def number(self, examination: str, name: str) -> float:
         """Returns a single result of an examination; NaN where a run did not come that far.

@@ -27,25 +27,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Worm:
-    """One of the worms that stand side by side.
+    """One of the worms that stand side by side."""
 
-    Attributes:
-        name: One word, for names of numbers.
-        label: For legends and tables.
-        short: For narrow places.
-        case: Makes its case from changed fields.
-        marker: Its marker in figures.
-        line: Its line style.
-        color: Its colour where colours do not tell segments.
-    """
-
-    name: str
-    label: str
-    short: str
-    case: Callable[[Mapping[str, Any] | None], Case]
-    marker: str
-    line: str
-    color: str
+    name: str  # One word, for names of numbers
+    label: str  # For legends and tables
+    short: str  # For narrow places
+    case: Callable[[Mapping[str, Any] | None], Case]  # Makes its case from changed fields
+    marker: str  # Its marker in figures
+    line: str  # Its line style
+    color: str  # Its colour where colours do not tell segments
 
     @property
     def look(self) -> dict[str, Any]:
@@ -65,19 +55,12 @@ WORMS = (PAPERS, SOFT, RIGID)
 
 
 class Point(NamedTuple):
-    """One worm at one value of what an examination varies, with the runs that are made of it.
-
-    Attributes:
-        worm: The worm.
-        value: The value.
-        walk: Its closed-loop run.
-        hold: Its open-loop run, in which each segment is held contracted in turn.
-    """
+    """One worm at one value of what an examination varies, with the runs that are made of it."""
 
     worm: Worm
     value: float
-    walk: Case | None = None
-    hold: Case | None = None
+    walk: Case | None = None  # Its closed-loop run
+    hold: Case | None = None  # Its open-loop run, in which each segment is held contracted in turn
 
 
 def cases_of(points: Iterable[Point]) -> list[Case]:
@@ -88,19 +71,12 @@ def cases_of(points: Iterable[Point]) -> list[Case]:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What was found at a point; numbers are NaN where there is no run, or it ended before.
-
-    Attributes:
-        worm: The worm.
-        value: The value of what is varied.
-        walk: Outcome in closed loop.
-        hold: Outcome in open loop.
-    """
+    """What was found at a point; numbers are NaN where there is no run, or it ended before."""
 
     worm: Worm
-    value: float
-    walk: Outcome | None = None
-    hold: Outcome | None = None
+    value: float  # The value of what is varied
+    walk: Outcome | None = None  # Outcome in closed loop
+    hold: Outcome | None = None  # Outcome in open loop
 
     @property
     def closed(self) -> Outcome:

@@ -86,22 +86,15 @@ _LOOKS: Mapping[str, dict[str, Any]] = {
 
 
 class Convergence(NamedTuple):
-    """How held contractions of one worm converge.
-
-    Attributes:
-        worm: The worm.
-        elements: Numbers of elements, the finest mesh last.
-        difference: For each quantity its relative difference from the finest, root mean square over the segments, shape
-            ``(n_meshes - 1,)``.
-        of_presets: For each quantity that with the presets' mesh.
-        order: For each quantity the fitted order of convergence.
-    """
+    """How held contractions of one worm converge."""
 
     worm: Worm
-    elements: Sequence[int]
+    elements: Sequence[int]  # Numbers of elements, the finest mesh last
+    # For each quantity its relative difference from the finest, root mean square over the segments, shape ``(n_meshes -
+    # 1,)``
     difference: Mapping[str, Array]
-    of_presets: Mapping[str, float]
-    order: Mapping[str, float | None]
+    of_presets: Mapping[str, float]  # For each quantity that with the presets' mesh
+    order: Mapping[str, float | None]  # For each quantity the fitted order of convergence
 
 
 def measure_convergence(readings: Sequence[Reading]) -> Convergence:

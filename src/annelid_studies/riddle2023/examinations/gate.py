@@ -53,22 +53,14 @@ def variant(worm: Worm, start: str, scheme: str) -> Case:
 
 
 class Beat(NamedTuple):
-    """The contractions of a run, with a start of the gates and an update order of the network.
-
-    Attributes:
-        worm: The worm.
-        start: How its gates started.
-        scheme: Update order of its network.
-        rhythm: Its score.
-        onsets_s: Onsets of all contractions, s.
-        contractions_s: Onset and release of each contraction of each segment, s; infinite where it does not end.
-    """
+    """The contractions of a run, with a start of the gates and an update order of the network."""
 
     worm: Worm
-    start: str
-    scheme: str
-    rhythm: RhythmScore
-    onsets_s: Sequence[float]
+    start: str  # How its gates started
+    scheme: str  # Update order of its network
+    rhythm: RhythmScore  # Its score
+    onsets_s: Sequence[float]  # Onsets of all contractions, s
+    # Onset and release of each contraction of each segment, s; infinite where it does not end
     contractions_s: tuple[Array, ...]
 
     @property

@@ -36,19 +36,12 @@ ONE_WAVE: Callable[[RhythmScore], bool] = attrgetter("is_one_wave")
 
 @dataclass(frozen=True)
 class NoiseMap:
-    """A worm's map.
-
-    Attributes:
-        worm: The worm.
-        tolerances_m: Tolerances of its sensors, m.
-        noises_m: Standard deviations of the noise on every reading, m.
-        n_seeds: Runs of each cell with noise.
-    """
+    """A worm's map."""
 
     worm: Worm
-    tolerances_m: Sequence[float]
-    noises_m: Sequence[float]
-    n_seeds: int
+    tolerances_m: Sequence[float]  # Tolerances of its sensors, m
+    noises_m: Sequence[float]  # Standard deviations of the noise on every reading, m
+    n_seeds: int  # Runs of each cell with noise
 
     def cell(self, tolerance_m: float, noise_m: float) -> list[Case]:
         """Returns the runs of one cell: one for each seed, or a single one without noise, which is deterministic."""

@@ -95,17 +95,11 @@ def velocity_limit(config: RunConfig, segment: int = 0) -> float:
 
 
 class Start(NamedTuple):
-    """The beginning of the first segment's contraction.
+    """The beginning of the first segment's contraction."""
 
-    Attributes:
-        time_s: Sample times, s.
-        ring_m: Length of its ring, m, same shape.
-        limit_m_per_s: Speed at which its force vanishes, m/s.
-    """
-
-    time_s: Array
-    ring_m: Array
-    limit_m_per_s: float
+    time_s: Array  # Sample times, s
+    ring_m: Array  # Length of its ring, m, same shape
+    limit_m_per_s: float  # Speed at which its force vanishes, m/s
 
     def at(self, time_s: float) -> float:
         """Length of the ring at a time, m; NaN where the run ended before."""

@@ -38,19 +38,12 @@ _GAP_M = 0.002
 
 @dataclass(frozen=True)
 class Measured:
-    """A rhombus at one moment against rest.
+    """A rhombus at one moment against rest."""
 
-    Attributes:
-        rhombus: Its index.
-        distance_m: Along the resting body from the contracted ring, negative towards the front.
-        length_m: Axial diagonal, at rest and now.
-        width_m: Lateral diagonal, at rest and now.
-    """
-
-    rhombus: int
-    distance_m: float
-    length_m: tuple[float, float]
-    width_m: tuple[float, float]
+    rhombus: int  # Its index
+    distance_m: float  # Along the resting body from the contracted ring, negative towards the front
+    length_m: tuple[float, float]  # Axial diagonal, at rest and now
+    width_m: tuple[float, float]  # Lateral diagonal, at rest and now
 
     def __str__(self) -> str:
         return "\n".join(
@@ -66,25 +59,15 @@ class Measured:
 
 @dataclass(frozen=True)
 class Propagation:
-    """What figure 8 measures.
+    """What figure 8 measures."""
 
-    Attributes:
-        time_s: Time of the posture.
-        segment: The most contracted segment, counted from 0.
-        near: An unactuated rhombus next to the contracted ring, without a corner on it.
-        far: The unactuated rhombus farthest from that ring, at the other side of it where both ends are as far.
-        plane_distance_m: Distance of every plane of rhombi from the contracted ring, shape ``(n_planes - 2,)``.
-        plane_axial: Mean relative change of the axial diagonals on each of them, same shape.
-        plane_lateral: The same of the lateral diagonals.
-    """
-
-    time_s: float
-    segment: int
-    near: Measured
-    far: Measured
-    plane_distance_m: Array
-    plane_axial: Array
-    plane_lateral: Array
+    time_s: float  # Time of the posture
+    segment: int  # The most contracted segment, counted from 0
+    near: Measured  # An unactuated rhombus next to the contracted ring, without a corner on it
+    far: Measured  # The unactuated rhombus farthest from that ring, at the other side of it where both ends are as far
+    plane_distance_m: Array  # Distance of every plane of rhombi from the contracted ring, shape ``(n_planes - 2,)``
+    plane_axial: Array  # Mean relative change of the axial diagonals on each of them, same shape
+    plane_lateral: Array  # The same of the lateral diagonals
 
 
 def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:

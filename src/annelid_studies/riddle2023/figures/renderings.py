@@ -57,25 +57,15 @@ _PIECES = 6
 
 @dataclass(frozen=True)
 class Posture:
-    """A 3D worm at one moment.
+    """A 3D worm at one moment."""
 
-    Attributes:
-        config: Its configuration.
-        geometry: Its mesh at rest.
-        time_s: Time of the posture; NaN at rest.
-        crossings_m: Positions of the pins, m, shape ``(n_crossings, 3)``.
-        strands_m: Points of the strands, m, shape ``(n_strands, n_vertices, 3)``.
-        qpos: The engine's coordinates; None at rest.
-        activation: Of every ring muscle; None where all are to be shown in red.
-    """
-
-    config: RunConfig
-    geometry: MeshGeometry
-    time_s: float
-    crossings_m: Array
-    strands_m: Array
-    qpos: Array | None = None
-    activation: Array | None = None
+    config: RunConfig  # Its configuration
+    geometry: MeshGeometry  # Its mesh at rest
+    time_s: float  # Time of the posture; NaN at rest
+    crossings_m: Array  # Positions of the pins, m, shape ``(n_crossings, 3)``
+    strands_m: Array  # Points of the strands, m, shape ``(n_strands, n_vertices, 3)``
+    qpos: Array | None = None  # The engine's coordinates; None at rest
+    activation: Array | None = None  # Of every ring muscle; None where all are to be shown in red
 
 
 def rest_posture(config: RunConfig) -> Posture:

@@ -14,8 +14,7 @@ from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import case_key
 from annelid.simulation.loop import simulate
-from annelid_studies.riddle2023.claims.behaviour import cost_claim
-from annelid_studies.riddle2023.claims.discussion import cause_claim, friction_claim, noise_claim
+from annelid_studies.riddle2023.claims.discussion import cause_claim, cost_claim, friction_claim, noise_claim
 from annelid_studies.riddle2023.claims.evidence import Evidence, judged, near
 from annelid_studies.riddle2023.claims.model import elements_claim, pins_claim, velocity_claim
 from annelid_studies.riddle2023.contents import Examination, Findings, Table

@@ -22,13 +22,7 @@ PHASES = (*ENGINE_PHASES, "engine, rest", "plant", "network and control", "recor
 
 
 class Stopwatch:
-    """Times the calls of some methods of one object; one that another of them calls is not counted twice.
-
-    Attributes:
-        seconds: Time spent in the calls, s.
-        ends: When each call ended, s on the clock.
-        readings: What was read after each call.
-    """
+    """Times the calls of some methods of one object; one that another of them calls is not counted twice."""
 
     def __init__(
         self,
@@ -39,6 +33,7 @@ class Stopwatch:
     ) -> None:
         """Puts itself in the places of those methods that the owner has."""
         self.seconds = 0.0
+        # When each call ended, s on the clock, and what was read after it.
         self.ends, self.readings = array("d"), array("d")
         within = False
 
@@ -89,7 +84,7 @@ class EngineTimes(NamedTuple):
 def engine_times(
     simulation: Simulation, plant: WormPlant, stepping: Stopwatch, simulated_s: float, longest_s: float
 ) -> EngineTimes:
-    """Runs a closed loop from its start with the engine's timers on, which by default stand still.
+    """Runs the closed loop of a worm from its start with the engine's timers on, which by default stand still.
 
     Args:
         simulation: The loop.

@@ -96,10 +96,9 @@ _QUICK_CABLE = {"body.rings.damping_Ns_per_m": 1.0}
 
 
 def force_limited(*force_N: float) -> Actuator:
-    """A servo that winds until it stalls: its shortest cable is out of reach.
+    """A servo that winds until it stalls at a tension all round the ring, N, one for all segments or one a segment.
 
-    Args:
-        force_N: Tension all round the ring, N; one for all segments, or one a segment.
+    Its shortest cable is out of reach.
     """
     changes = {
         **_QUICK_CABLE,
@@ -144,10 +143,7 @@ def muscle_activation(force_N: float, ring_length_m: float) -> float:
 def pull(segment: int, actuator: Actuator, changes: Mapping[str, Any] | None = None) -> Case:
     """Returns the run in which one segment, from 1, is pulled and all others rest.
 
-    Args:
-        segment: The segment.
-        actuator: What pulls.
-        changes: Fields of worm, ground or resolution that differ from the base worm and this study's settings.
+    Worm, ground and resolution are the base worm's and this study's but for the changes.
     """
     contractions = [
         {"segment": segment, "start_s": 0.0, "stop_s": stop, "activation": actuator.activation} for stop in READ_S
@@ -244,12 +240,8 @@ def settings(
         worms: Fields in which each worm differs from the base worm, by any key.
         guesses_m: Cable lengths that the search for each worm begins with, m.
 
-    Returns:
-        A setting for every worm.
-
     Raises:
         ConfigError: An end does not come near `END_M`.
-        AnnelidError: A run cannot be built or written.
     """
     found = {}
     for key, readings in _search(store, worms, length_limited, guesses_m, _next_lengths).items():

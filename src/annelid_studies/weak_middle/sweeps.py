@@ -60,11 +60,7 @@ def stiffness_changes(young_GPa: float) -> dict[str, Any]:
 
 
 def weight_changes(mass_kg: float) -> dict[str, Any]:
-    """Fields for a mass of the worm, kg, that its pins carry; 0 is a worm of the base worm's mass without weight.
-
-    Raises:
-        ConfigError: The strands alone weigh more.
-    """
+    """Fields for a mass of the worm, kg, that its pins carry; 0 is a worm of the base worm's mass without weight."""
     if mass_kg == 0:
         return {"arena.gravity_m_per_s2": 0.0}
     body = base_body()
@@ -221,9 +217,6 @@ def weak_middle(store: Store, effort: Effort) -> tuple[dict[Key, Setting], list[
 
     Returns:
         The settings by `worm_key`, the base worm's first, and the readings of all sweeps, then of the checks.
-
-    Raises:
-        AnnelidError: A run cannot be built or written.
     """
     set_to = settings(store, {BASE_KEY: {}}, {BASE_KEY: GUESSES_M})
     # Softer rods sag; elsewhere the base worm's length is nearly right.
@@ -298,14 +291,8 @@ class Asymmetry:
 def value_at(values: ArrayLike, elongation_m: ArrayLike, wanted_m: float) -> float:
     """Returns the value at which an elongation that rises or falls steadily with it has a wanted size.
 
-    Args:
-        values: Shape ``(n,)``.
-        elongation_m: Shape ``(n,)``, m; NaN where there is no reading.
-        wanted_m: Within the readings, m.
-
-    Returns:
-        By straight lines between the readings; NaN where the wanted elongation lies outside them or they are not
-        in order.
+    By straight lines between the readings, of which some may be NaN; NaN where the wanted elongation lies outside them
+    or they are not in order.
     """
     points = np.array([values, elongation_m], dtype=float)
     x, y = points[:, np.isfinite(points[1])]
@@ -324,12 +311,7 @@ def asymmetry(store: Store, force_N: float) -> Asymmetry:
     Segment 2 of the base worm is pulled alone, force-limited, at several values of every cause; then the four segments
     of one worm with the four force limits that were found, each alone.
 
-    Args:
-        store: Where runs are kept.
-        force_N: Force limit of all causes but the force itself, N.
-
-    Raises:
-        AnnelidError: A run cannot be built or written.
+    The force limit of all causes but the force itself is ``force_N``.
     """
     n_segments, stage = base_body().n_segments, "two interior segments"
     points = [

@@ -69,11 +69,6 @@ class Evidence:
         cases = [MAIN, *(spread_cases(self.effort) if self.effort == "full" else ())]
         return [(self.store[case], self.store.run(case)) for case in cases]
 
-    @property
-    def worms(self) -> Sequence[str]:
-        """Names of the worms that have examinations of their own at this effort, nearest to the paper's first."""
-        return list(LABELS) if self.effort == "full" else list(LABELS)[1:]
-
 
 def spread_cases(effort: Effort) -> list[Case]:
     """The perturbed runs: of the paper's own worm, or in a quick report fewer, of the one that takes seconds."""
@@ -86,12 +81,9 @@ def rule(evidence: Evidence) -> list[str]:
     """Says how all claims are judged."""
     perturbed = spread_cases(evidence.effort)
     n, n_seeds = len(perturbed), sum("seed" in case.changes for case in perturbed)
-    swings, periods = [], []
-    for case in perturbed:
-        swings.append(readings_m(evidence.store.run(case)))
-        periods.append(evidence.store[case].rhythm.period_s or nan)
     preset = perturbed[0].preset
-    swings = [readings_m(evidence.store.run(Case(preset))), *swings]
+    swings = [readings_m(evidence.store.run(case)) for case in (Case(preset), *perturbed)]
+    periods = [evidence.store[case].rhythm.period_s or nan for case in perturbed]
     apart = float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0)))
     spread = (
         f"Between the {n + 1} runs, {preset} as it is and the {n}, an elongation differs by up to {100 * apart:.1f} % "

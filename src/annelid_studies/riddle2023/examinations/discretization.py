@@ -49,19 +49,11 @@ _OWN_INTEGRATOR = PAPERS.case({"body.mesh.elements_per_side": PRESETS_ELEMENTS, 
 
 
 def convergence_order(elements: ArrayLike, difference: ArrayLike, finest: float) -> float | None:
-    """Fits the order of convergence to differences from the finest mesh.
+    """Fits the order of convergence to the magnitudes of differences from the finest mesh.
 
     An error ``c n**-p`` makes a difference ``c (n**-p - N**-p)`` from the finest mesh of N elements. The order p, in
-    0.1 .. 8, is the one whose logarithm fits best in the mean square.
-
-    Args:
-        elements: Numbers of elements n below the finest, shape ``(n_meshes,)``.
-        difference: Magnitudes of the differences from the finest, same shape.
-        finest: N.
-
-    Returns:
-        The order; None with fewer than two differences, with one that is zero or no number, or if none within
-        the range fits best.
+    0.1 .. 8, is the one whose logarithm fits best in the mean square; None with fewer than two differences, with one
+    that is zero or no number, or if none within the range fits best.
     """
     n, e = np.asarray(elements, dtype=float), np.asarray(difference, dtype=float)
     if n.size < 2 or not (np.isfinite(e) & (e > 0)).all():

@@ -46,12 +46,6 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     A soft constraint with time constant T and impedance d at critical damping pulls with ``K = k d / R`` per
     violation, where ``k = 1 / (d T)^2`` and ``R = (1 - d) / d`` times the inverse mass of the pair. Where strands are
     tied to each other without a pin between them, one tie does the work of two in series and counts double.
-
-    Args:
-        case: A case of a 3D worm.
-
-    Raises:
-        ConfigError: The case has no pins.
     """
     config = case.config
     if not isinstance(config.body, WormBody):

@@ -78,15 +78,7 @@ def _points(effort: Effort) -> list[Point]:
 
 
 def velocity_limit(config: RunConfig, segment: int = 0) -> float:
-    """Returns the speed at which a ring muscle's force vanishes: vmax L0, with L0 = (r1 - r0) / 0.3, m/s.
-
-    Args:
-        config: Configuration of a 3D worm.
-        segment: Counted from 0.
-
-    Raises:
-        ValueError: The worm is planar.
-    """
+    """Returns the speed at which a ring muscle's force vanishes: vmax L0, with L0 = (r1 - r0) / 0.3, m/s."""
     if not isinstance(config.body, WormBody):
         raise ValueError("a planar worm has no ring muscles")
     rings = config.body.muscles

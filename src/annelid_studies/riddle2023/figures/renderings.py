@@ -117,11 +117,7 @@ def rendering_works() -> bool:
 def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], width_in: float) -> Place:
     """Shows a posture on empty axes: rendered with OpenGL, or drawn with lines where there is none.
 
-    Args:
-        axes: The axes.
-        posture: The worm.
-        angles_deg: Azimuth and elevation of the line of sight.
-        width_in: Width of the axes, inches, which decides the resolution.
+    The angles are azimuth and elevation of the line of sight; the width of the axes, inches, decides the resolution.
 
     Returns:
         Where points in space lie on the axes.

@@ -29,14 +29,9 @@ CAPTION = (
 
 
 def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) -> str:
-    """Draws the elongations of the robot, of the paper's model and of simulations as groups of bars.
+    """Draws the elongations, m, of the robot, of the paper's model and of simulations as groups of bars.
 
-    Args:
-        series: For each simulation its label and the elongation of every segment, m.
-        stem: Path of the two files without their suffixes.
-
-    Returns:
-        The caption.
+    Returns the caption.
     """
     groups = {"robot (Wang)": ROBOT_ELONGATION_M, "the paper's model": PAPER_ELONGATION_M, **series}
     most = max(groups.values(), key=len)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from rich.table import Table as TerminalTable
 
 from annelid.body import WormBody
 from annelid.config import load_config
@@ -17,9 +18,6 @@ from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import grouped, terminal_table
 from annelid_studies.worms import Effort
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""
@@ -141,9 +139,6 @@ def write_figure(readings: Sequence[Reading], stem: Path) -> Path:
     """Draws a column for each quantity, and in it a panel for speed, cost of transport and slip, a line a gait.
 
     A cross on the lower edge marks where a gait does not walk.
-
-    Returns:
-        The path of the picture in pixels; as vectors it lies beside it.
     """
     with canvas(7.0) as figure:
         grid = figure.subplots(len(PANELS), len(VALUES), squeeze=False, sharex="col", sharey="row")

@@ -6,21 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from rich.table import Table as TerminalTable
 
 from annelid.analysis import Passage, gait, passage_of
 from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
+from annelid.simulation import Run
 from annelid_studies.tables import grouped, tabulated, terminal_table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from rich.table import Table as TerminalTable
-
-    from annelid.simulation import Run
 
 PRESET = "riddle2025-muscles"
 CM = 100.0
@@ -179,11 +176,7 @@ def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
 
 
 def pipes_picture(readings: Sequence[Reading], courses: Courses, stem: Path) -> Path:
-    """Draws why adaptation pays, a column for every narrowing pipe, and speed against the bends' radius below.
-
-    Returns:
-        The path of the picture in pixels; as vectors it lies beside it.
-    """
+    """Draws why adaptation pays, a column for every narrowing pipe, and speed against the bends' radius below."""
     pipes = grouped(courses, lambda of: of[0])
     with canvas(8.4) as figure:
         grid = figure.add_gridspec(4, max(len(pipes), 1), height_ratios=[1.0, 1.0, 1.0, 1.4])

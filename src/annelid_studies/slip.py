@@ -12,9 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from rich.table import Table as TerminalTable
 
 from annelid.analysis import (
     Detection,
@@ -32,9 +33,6 @@ from annelid.experiment import Case, Store
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import terminal_table
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 PRESET = "riddle2025-muscles"
 GAITS = (PRESET, "crawler")
@@ -151,11 +149,7 @@ def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> Termina
 
 
 def feedback_figure(readings: Sequence[Reading], preset: str, stem: Path) -> Path:
-    """Draws loss per metre and speed against friction; dotted lines where the preset's feedback was tuned.
-
-    Returns:
-        The path of the picture in pixels; as vectors it lies beside it.
-    """
+    """Draws loss per metre and speed against friction; dotted lines where the preset's feedback was tuned."""
     found = [
         (feedback, [(one.friction, one.cost) for one in readings if one.feedback == feedback and one.cost is not None])
         for feedback in FEEDBACKS
@@ -246,11 +240,7 @@ def detection_table(found: Mapping[str, DetectionScore]) -> TerminalTable:
 
 
 def detector_figure(detections: Mapping[str, Detection], stem: Path) -> Path:
-    """Draws precision against recall of every run over `LIMITS_M_PER_S`, and of all at the detector's own limit.
-
-    Returns:
-        The path of the picture in pixels; as vectors it lies beside it.
-    """
+    """Draws precision against recall of every run over `LIMITS_M_PER_S`, and of all at the detector's own limit."""
     together = score_detections(list(detections.values()), LIMIT_M_PER_S)
     with canvas(3.6) as figure:
         axes = figure.subplots()

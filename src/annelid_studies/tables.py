@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
+
+from rich.table import Table as TerminalTable
 
 from annelid.markdown import Table
 from annelid.output import write_csv
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 T, K = TypeVar("T"), TypeVar("K")
 
@@ -38,8 +37,6 @@ def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str =
         n_words: Columns of words, set flush left, before those of numbers.
         caption: What stands below it.
     """
-    from rich.table import Table as TerminalTable
-
     shown = TerminalTable(title=title, caption=caption or None)
     for i, head in enumerate(table.header):
         # Heads of numbers stand one word a line: on a narrow terminal words fold before numbers do.

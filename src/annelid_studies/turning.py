@@ -6,17 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from rich.table import Table as TerminalTable
 
 from annelid.analysis import Track, track_of, turn_of
 from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
 from annelid.experiment import Case, Store
 from annelid_studies.tables import grouped, tabulated, terminal_table
-
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
@@ -125,9 +123,6 @@ def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: 
     """Draws curvature and radius of every gait against modulation, and the tracks of the second gait.
 
     The tracks are the middles of the body, every one from the same start, with the outline at the end.
-
-    Returns:
-        The path of the picture in pixels; as vectors it lies beside it.
     """
     curvatures = {
         gait: ([one.modulation for one in own], np.array([one.curvature_per_m for one in own]))

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
+from rich.table import Table as TerminalTable
 
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid_studies.tables import terminal_table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import SubFigure
-    from rich.table import Table as TerminalTable
 
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""
@@ -68,9 +67,6 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
     one colour for each number of elements, one marker for each step, hollow where the rhythm is not ordered; the dotted
     line joins the cases that no other beats. Below: time of a step against the number of segments with the slope, and
     its shares by phase. Panels for which nothing was measured stay out.
-
-    Returns:
-        Path of the picture in pixels; as vectors it lies beside it.
     """
     measured = [entry for entry in report["cases"] if "failed" not in entry]
     judged = [entry for entry in measured if entry["kind"] == "judged"]
@@ -93,8 +89,6 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
 
 
 def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -> None:
-    from matplotlib.lines import Line2D
-
     references = list(report["fronts"])
     elements = sorted({entry["elements_per_side"] for entry in judged})
     steps = sorted({entry["physics_step_ms"] for entry in judged})

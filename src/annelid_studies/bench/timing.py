@@ -6,14 +6,13 @@ from array import array
 from collections.abc import Callable, Sequence
 from functools import partial
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+import mujoco
 import numpy as np
 
 from annelid.errors import SimulationStopped
-
-if TYPE_CHECKING:
-    from annelid.simulation import Simulation, WormPlant
+from annelid.simulation import Simulation, WormPlant
 
 ENGINE_PHASES = ("position", "velocity", "actuation", "constraint", "advance")
 """The engine's timers that together make up a step, but for a rest."""
@@ -93,8 +92,6 @@ def engine_times(
         simulated_s: How long to run, s of simulated time.
         longest_s: How long to run at most, s of wall-clock time.
     """
-    import mujoco
-
     data = plant.data
     iterations, constraints = [], []
     mujoco.set_mjcb_time(perf_counter)

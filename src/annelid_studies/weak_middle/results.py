@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from rich.table import Table as TerminalTable
 
 from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M, interior_deficit
 from annelid.draw import canvas, panel_title, save_both, segment_colors
@@ -27,10 +29,6 @@ from annelid_studies.weak_middle.sweeps import (
     Reading,
     deficits,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from rich.table import Table as TerminalTable
 
 PERCENT = 100.0
 FADED = "0.35"
@@ -86,11 +84,7 @@ def papers_deficit() -> float:
 
 
 def weak_middle_figure(readings: Sequence[Reading], stem: Path) -> Path:
-    """Draws the deficit over every quantity, a panel each, one line for every kind of actuator.
-
-    Returns:
-        The path of the picture in pixels; as vectors it lies beside it.
-    """
+    """Draws the deficit over every quantity, a panel each, one line for every kind of actuator."""
     marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
     largest = max([*marks.values(), *(one.deficit for one in readings if isfinite(one.deficit))])
     with canvas(6.0) as figure:

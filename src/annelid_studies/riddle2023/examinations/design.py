@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from annelid.analysis import RhythmScore, middle_deficit
 from annelid.draw import panel_title, segment_colors
@@ -18,11 +21,6 @@ from annelid_studies.riddle2023.contents import Number
 from annelid_studies.riddle2023.words import number
 from annelid_studies.tables import grouped
 from annelid_studies.worms import chain, fast, rods
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 
 @dataclass(frozen=True)
@@ -222,7 +220,6 @@ def draw_rhythms(axes: Axes, readings: Iterable[Reading]) -> list[Line2D]:
     Returns:
         Handles for a legend of the kinds that occur.
     """
-    from matplotlib.lines import Line2D
 
     def look(kind: str) -> dict[str, Any]:
         return {"linestyle": "none", "color": _DARK, "markersize": 6.5, **_RHYTHMS[kind]}
@@ -268,8 +265,6 @@ def segment_handles(n_segments: int = 3) -> list[Line2D]:
 
 def look_handle(label: str, *, hollow: bool = False, color: Any = "0.25", **look: Any) -> Line2D:
     """Returns a handle for a legend of markers and line styles."""
-    from matplotlib.lines import Line2D
-
     face = "white" if hollow else color
     return Line2D([], [], label=label, color=color, **{"markersize": 5.0, "markerfacecolor": face, **look})
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from annelid.analysis import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore, contractions, segment_activation
 from annelid.draw import canvas, panel_title, save_both, segment_colors
@@ -21,9 +22,6 @@ from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, 
 from annelid_studies.riddle2023.words import MS
 from annelid_studies.tables import grouped, tabulated
 from annelid_studies.worms import PLANAR, Effort
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 FLAT = Worm("planar", "planar worm, kinematic", "planar", lambda changes: Case(PLANAR, changes or {}), "D", "-", "0.5")
 STARTS = ("toolbox", "steady")

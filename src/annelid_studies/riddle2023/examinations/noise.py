@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from math import sqrt
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch, Rectangle
 
 from annelid.analysis import RhythmScore
 from annelid.config import field_value
@@ -22,9 +24,6 @@ from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, 
 from annelid_studies.riddle2023.words import MM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import CHAIN, Effort
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 EVEN = 0.9
 """Least regularity of a wave that does not limp."""
@@ -297,8 +296,6 @@ def _sensor_in_words(most_m: float) -> str:
 
 
 def _draw(maps: Sequence[_Read], stem: Path) -> None:
-    from matplotlib.patches import Patch
-
     tolerances = sorted({tolerance for one in maps for tolerance in one.chart.tolerances_m})
     noises = sorted({noise for one in maps for noise in one.chart.noises_m})
     with canvas(1.35 + 0.38 * len(noises)) as figure:
@@ -323,8 +320,6 @@ def _draw(maps: Sequence[_Read], stem: Path) -> None:
 
 def _draw_cell(axes: Axes, x: int, y: int, scores: Sequence[RhythmScore]) -> None:
     """Shades a cell by its rhythm and writes into it how many runs walk, and how regularly."""
-    from matplotlib.patches import Rectangle
-
     kind = majority(scores)
     fill = _FILLS[kind]
     axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, linewidth=0.8, **fill))

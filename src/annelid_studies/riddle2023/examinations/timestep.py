@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from annelid.body import WormBody
 from annelid.config import RunConfig
@@ -22,9 +23,6 @@ from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, 
 from annelid_studies.riddle2023.words import CM, MS
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, chain, one_after_the_other
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 TRANSIENT_S = 0.1
 """How much of a contraction's beginning is resolved, s."""

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from annelid.body import Rings, muscle_force
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.morphology import Array
 from annelid_studies.riddle2023.words import span
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 SCALED_RANGE = (0.75, 1.05)
 """Scaled lengths between which a ring's operating range lies: MuJoCo's default."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyArrowPatch
 
 from annelid.config import RunConfig, load_config
 from annelid.draw import bent_rhombi, canvas, panel_title, rhombi, save_both, segment_colors
@@ -13,10 +14,6 @@ from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.protocols import Records
 from annelid.simulation import build_plant
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 CAPTION = (
     "Three planar models of worm segments, each as its planar plant rests with the middle segment contracted: a) "
@@ -143,8 +140,6 @@ def _draw_hinge(axes: Axes, place: Array) -> None:
 
 
 def _draw_actuator(axes: Axes, start: Array, end: Array, *, active: bool) -> None:
-    from matplotlib.patches import FancyArrowPatch
-
     shape = {"arrowstyle": "simple,head_length=5,head_width=7,tail_width=2.4", "shrinkA": 0.0, "shrinkB": 0.0}
     look = {"facecolor": _ACTUATOR if active else "w", "edgecolor": _ACTUATOR, "linewidth": 0.9, "zorder": 3}
     axes.add_patch(FancyArrowPatch((start[0], start[1]), (end[0], end[1]), **shape, **look))

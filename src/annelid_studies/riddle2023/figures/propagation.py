@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from annelid.analysis import actuated, deformation, distance_from_ring_m, plane_means, rhombus_diagonals, rhombus_plane
@@ -23,9 +25,6 @@ from annelid_studies.riddle2023.figures.renderings import (
     rhombus_outline,
     show_worm,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
@@ -223,8 +222,6 @@ def _row(geometry: MeshGeometry, start: int) -> NDArray[np.int64]:
 
 def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) -> None:
     """Draws rhombi, shape ``(n, 4, 2)``, in cm, the contracted one apart, with their changes of length below."""
-    from matplotlib.patches import Polygon
-
     axes.set_axis_off()
     axes.set_aspect("equal")
     for k, quad in enumerate(corners):

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
 from annelid.analysis import nearest_frame
@@ -35,9 +38,6 @@ from annelid.draw import (
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run, compile_worm
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""
@@ -155,8 +155,6 @@ def draw_worm(
     Returns:
         Where points in space lie on the axes.
     """
-    from matplotlib.collections import LineCollection
-
     right, up, sight = picture_axes(*angles_deg)
     pieces, colors, widths = _lines(posture)
     target = (pieces.min(axis=(0, 1)) + pieces.max(axis=(0, 1))) / 2
@@ -246,8 +244,6 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
     Raises:
         RunFileError: The worm is planar.
     """
-    from matplotlib.lines import Line2D
-
     posture = rest_posture(config)
     with canvas(3.3) as figure:
         axial, isometric = figure.subplots(1, 2, width_ratios=[1.0, 1.42])

@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M
 from annelid.draw import canvas, panel_title, save_both, segment_colors
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _CM = 100.0
 _BAR = 0.8

@@ -29,9 +29,7 @@ QUICK_RADII_M = (0.3,)
 
 TURN_S = 0.27
 """Time from one segment to the next in bends: about that of the paper's network on this body on open ground."""
-TIMED = {
-    "controller": {"kind": "timed", "rise_s": TURN_S, "hold_s": TURN_S, "fall_s": TURN_S, "interval_s": TURN_S},
-}
+TIMED = {"controller": {"kind": "timed", "rise_s": TURN_S, "hold_s": TURN_S, "fall_s": TURN_S, "interval_s": TURN_S}}
 LIFT, LET_GO_S = 0.45, 0.35
 FIXED, ADAPTIVE = "fixed", "adaptive"
 SLOW_S, FAST_S = 45.0, 30.0

@@ -21,15 +21,7 @@ from typing import Any
 
 from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment import (
-    SHEAR_OVER_YOUNG,
-    Case,
-    Store,
-    StudyProgress,
-    Workers,
-    case_key,
-    code_fingerprint,
-)
+from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, Workers, case_key, code_fingerprint
 from annelid.markdown import plain_table
 from annelid.output import write_text
 from annelid.plausibility import tolerance_window_m

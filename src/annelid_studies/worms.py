@@ -49,7 +49,4 @@ def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: flo
     contractions = [
         {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
     ]
-    return {
-        "controller": {"kind": "program", "contractions": contractions},
-        "duration_s": contractions[-1]["stop_s"],
-    }
+    return {"controller": {"kind": "program", "contractions": contractions}, "duration_s": contractions[-1]["stop_s"]}

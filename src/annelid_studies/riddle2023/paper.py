@@ -11,12 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis import (
-    PAPER_ELONGATION_M,
-    PAPER_END_DIFFERENCE,
-    PAPER_MIDDLE_DEFICIT,
-    middle_deficit,
-)
+from annelid.analysis import PAPER_ELONGATION_M, PAPER_END_DIFFERENCE, PAPER_MIDDLE_DEFICIT, middle_deficit
 from annelid.body import WormBody
 from annelid.draw import figure7, network_figure
 from annelid.errors import ConfigError, suggest
@@ -32,13 +27,7 @@ from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Findings, Report, tally
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.examinations.design import walked_elongation
-from annelid_studies.riddle2023.figures import (
-    muscle_surface,
-    planar_models,
-    propagation,
-    renderings,
-    robot_lengths,
-)
+from annelid_studies.riddle2023.figures import muscle_surface, planar_models, propagation, renderings, robot_lengths
 from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 
@@ -207,10 +196,7 @@ FIGURES: Mapping[int, tuple[str, Callable[[Run, Series, Path], str]]] = {
     5: ("Force, length and velocity of the muscle", _figure_5),
     6: ("The control network", _figure_6),
     7: ("Potentials and stretch lengths", _figure_7),
-    8: (
-        "Propagation of deformation at 1500 ms",
-        lambda run, series, stem: propagation.figure_8_propagation(run, stem),
-    ),
+    8: ("Propagation of deformation at 1500 ms", lambda run, series, stem: propagation.figure_8_propagation(run, stem)),
     9: (
         "The robot's elongations beside ours",
         lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
@@ -240,8 +226,7 @@ def _main_table(variants: Mapping[str, Outcome]) -> Table:
         ("processor time (s)", "210 (of a clock)"): lambda o: words.in_unit(o.cpu_time_s or None, digits=0),
     }
     return Table(
-        ["quantity", "paper", *variants],
-        [[*head, *map(text, variants.values())] for head, text in rows.items()],
+        ["quantity", "paper", *variants], [[*head, *map(text, variants.values())] for head, text in rows.items()]
     )
 
 

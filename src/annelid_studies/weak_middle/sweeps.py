@@ -251,11 +251,7 @@ SPRINGS = Quantity(
     (14.0, 17.0, 20.0, 24.5, 29.0, 32.0),
     lambda rate: {"body.springs.stiffness_N_per_m": rate},
 )
-CAUSES = (
-    SPRINGS,
-    WEIGHT._replace(values=(0.6, *WEIGHT.values[1:])),
-    FRICTION._replace(values=(*FRICTION.values, 2.0)),
-)
+CAUSES = (SPRINGS, WEIGHT._replace(values=(0.6, *WEIGHT.values[1:])), FRICTION._replace(values=(*FRICTION.values, 2.0)))
 """Quantities of the whole worm: what they do is a bound to what the same difference in one segment could do."""
 END_FORCES_N = (12.8, 13.1, 13.4)
 

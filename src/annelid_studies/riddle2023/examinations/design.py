@@ -180,12 +180,7 @@ def numbered(readings: Iterable[Reading], readers: Mapping[str, Callable[[Readin
 
 
 def draw_over(
-    axes: Axes,
-    readings: Iterable[Reading],
-    numbers: Callable[[Reading], Any],
-    *,
-    hollow: bool = False,
-    **style: Any,
+    axes: Axes, readings: Iterable[Reading], numbers: Callable[[Reading], Any], *, hollow: bool = False, **style: Any
 ) -> None:
     """Draws numbers of readings over what is varied, a line a worm; one number a segment makes a line a segment.
 

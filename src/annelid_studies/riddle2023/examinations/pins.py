@@ -88,11 +88,7 @@ def _points(effort: Effort) -> list[Point]:
         Point(SOFT, k, fast(_tied(k)) if k in walked else None, fast({**one_after_the_other(), **_tied(k)}))
         for k in STIFFNESSES_N_PER_M
     ]
-    return [
-        *(Point(PAPERS, 0.0, hold=case) for case in chains),
-        *sprung,
-        Point(RIGID, 0.0, rods(), _HELD_TIGHT),
-    ]
+    return [*(Point(PAPERS, 0.0, hold=case) for case in chains), *sprung, Point(RIGID, 0.0, rods(), _HELD_TIGHT)]
 
 
 def _settling(effort: Effort) -> list[Case]:

@@ -136,12 +136,7 @@ def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], wid
 
 
 def draw_worm(
-    axes: Axes,
-    posture: Posture,
-    angles_deg: tuple[float, float],
-    *,
-    perspective: bool = False,
-    strength: float = 1.0,
+    axes: Axes, posture: Posture, angles_deg: tuple[float, float], *, perspective: bool = False, strength: float = 1.0
 ) -> Place:
     """Draws a posture on empty axes with lines; what lies behind is paler and crossed over.
 

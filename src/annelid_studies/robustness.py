@@ -12,7 +12,7 @@ from __future__ import annotations
 import csv
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.resources import files
@@ -22,12 +22,12 @@ from typing import Any
 from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, Workers, case_key, code_fingerprint
-from annelid.markdown import plain_table
+from annelid.markdown import Table, plain_table
 from annelid.output import write_text
 from annelid.plausibility import tolerance_window_m
 from annelid.simulation import locks
 from annelid.textfiles import read_json
-from annelid_studies.tables import grouped, tabulated
+from annelid_studies.tables import grouped
 from annelid_studies.worms import RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
@@ -266,14 +266,10 @@ def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
 
 def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
     """Returns what `shares` counted as a Markdown table."""
-    columns: Mapping[str, Callable[[tuple[str, Mapping[str, Any]]], str]] = {
-        "controller": lambda row: f"`{row[0]}`",
-        "points": lambda row: str(row[1]["points"]),
-        "walked 1-2-..-N": lambda row: str(row[1]["walked"]),
-        "in time: within 10 % of the period": lambda row: str(row[1]["in_time"]),
-        "and so lengthened": lambda row: str(row[1]["lengthened"]),
-        "share in time (%)": lambda row: "{:.0f} ({:.0f} .. {:.0f})".format(
-            *(100 * share for share in (row[1]["share"], *row[1]["interval"]))
-        ),
-    }
-    return plain_table(tabulated(found.items(), columns))
+    rows = []
+    for controller, of in found.items():
+        share, low, high = (100 * share for share in (of["share"], *of["interval"]))
+        counts = [str(of[name]) for name in ("points", "walked", "in_time", "lengthened")]
+        rows.append([f"`{controller}`", *counts, f"{share:.0f} ({low:.0f} .. {high:.0f})"])
+    counted = ["points", "walked 1-2-..-N", "in time: within 10 % of the period", "and so lengthened"]
+    return plain_table(Table(["controller", *counted, "share in time (%)"], rows))

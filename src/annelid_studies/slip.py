@@ -47,19 +47,6 @@ PLAIN, EXTENSION, PRESSURE = "none", "no pressure", "with pressure"
 LOSS_TICKS = (2, 5, 10, 20, 50, 100)
 FEEDBACKS = (PLAIN, EXTENSION, PRESSURE)
 """What is fed back beside the paper's stretch sensors: nothing, what of our design needs no touch, all of it."""
-COLUMNS = (
-    "feedback",
-    "friction",
-    "cycles",
-    "period_s",
-    "speed_m_per_s",
-    "loss_W",
-    "loss_J_per_m",
-    "faster_percent",
-    "saved_per_s_percent",
-    "saved_per_m_percent",
-    "one_wave",
-)
 
 
 class Reading(NamedTuple):
@@ -122,14 +109,15 @@ def compared(readings: Sequence[Reading], reading: Reading) -> tuple[float, floa
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
     """Writes one row a run as CSV with a header, and returns its path."""
+    costs, gains = ("period_s", "speed_m_per_s", "loss_W", "loss_J_per_m"), ("faster", "saved_per_s", "saved_per_m")
 
     def cells(one: Reading) -> list[object]:
-        cost, gains = one.cost, compared(readings, one) or (nan,) * 3
-        numbers = (cost.period_s, cost.speed_m_per_s, cost.loss_W, cost.loss_J_per_m) if cost else (nan,) * 4
-        texts = [f"{number:.5g}" for number in (*numbers, *gains)]
-        return [one.feedback, f"{one.friction:g}", cost.cycles if cost else 0, *texts, one.one_wave]
+        numbers = *(getattr(one.cost, name, nan) for name in costs), *(compared(readings, one) or (nan,) * 3)
+        texts = [f"{number:.5g}" for number in numbers]
+        return [one.feedback, f"{one.friction:g}", one.cost.cycles if one.cost else 0, *texts, one.one_wave]
 
-    return write_csv(path, COLUMNS, map(cells, readings))
+    header = ["feedback", "friction", "cycles", *costs, *(f"{gain}_percent" for gain in gains), "one_wave"]
+    return write_csv(path, header, map(cells, readings))
 
 
 def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> TerminalTable:
@@ -225,17 +213,11 @@ def write_scores(found: Mapping[str, DetectionScore], path: Path) -> Path:
 def detection_table(found: Mapping[str, DetectionScore]) -> TerminalTable:
     """Tabulates the scores."""
     header = ["run", "precision", "recall", "blind", "found", "episodes", "delay (ms)", "false (1/s)", "correlation"]
-    rows = [
-        [
-            name,
-            *(f"{share:.2f}" for share in (one.precision, one.recall, one.base_rate, one.found)),
-            f"{one.episodes}",
-            f"{1e3 * one.delay_s:.0f}",
-            f"{one.false_alarms_per_s:.1f}",
-            f"{one.correlation:.2f}",
-        ]
-        for name, one in found.items()
-    ]
+    rows = []
+    for name, one in found.items():
+        shares = [f"{share:.2f}" for share in (one.precision, one.recall, one.base_rate, one.found)]
+        others = [f"{one.episodes}", f"{1e3 * one.delay_s:.0f}", f"{one.false_alarms_per_s:.1f}"]
+        rows.append([name, *shares, *others, f"{one.correlation:.2f}"])
     return terminal_table(Table(header, rows), f"slip reported above {100 * LIMIT_M_PER_S:g} cm/s")
 
 

@@ -14,13 +14,21 @@ from hypothesis import strategies as st
 
 from annelid.config import LEVELS, load_config
 from annelid.errors import ConfigError
+from annelid_studies.bench import benchmark as store_module
 from annelid_studies.bench import peer as peer_module
-from annelid_studies.bench import store as store_module
-from annelid_studies.bench.benchmark import JSON_NAME, bench, errors, exponent, front, judge
+from annelid_studies.bench.benchmark import (
+    JSON_NAME,
+    MeasurementFailed,
+    Measurements,
+    bench,
+    errors,
+    exponent,
+    front,
+    judge,
+)
 from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
 from annelid_studies.bench.measure import measure, peak_memory_bytes
 from annelid_studies.bench.report import bench_figure, bench_table
-from annelid_studies.bench.store import MeasurementFailed, Measurements
 from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
 from annelid_studies.worms import CHAIN, RODS
 

@@ -133,7 +133,10 @@ def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
     limit = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "right", "color": "#c2410c"}
     axes.annotate(f"{TOLERATED_PERCENT:g} %", (1.0, TOLERATED_PERCENT), **limit, **words)
     axes.axvline(1.0, color=_FADED, linewidth=0.8, zorder=0)
-    outsiders = sorted(_outsiders(report).items())
+    # Speeds to compare with that have no error of the same kind: the paper's formulation and the peer.
+    chains = [one for one in report["cases"] if one["formulation"] == "chain" and one["n_segments"] == 3]
+    named = [*((one, "paper's chain") for one in chains), (report.get("peer") or {}, "PyElastica, free rods")]
+    outsiders = sorted({speed: name for one, name in named if (speed := one.get("real_time_factor"))}.items())
     for speed, _ in outsiders:
         axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
     # Words stand to the left of their lines, but for the faster outsider's: the two lines may be close.
@@ -146,18 +149,6 @@ def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
     axes.margins(x=0.08, y=0.12)
     axes.set_xlabel("times real time (one core, recording on)")
     panel_title(axes, title)
-
-
-def _outsiders(report: Mapping[str, Any]) -> dict[float, str]:
-    """Speeds to compare with that have no error of the same kind: the paper's formulation and the peer."""
-    found: dict[float, str] = {}
-    for entry in report["cases"]:
-        if entry.get("real_time_factor") and entry["formulation"] == "chain" and entry["n_segments"] == 3:
-            found[entry["real_time_factor"]] = "paper's chain"
-    peer = report.get("peer") or {}
-    if peer.get("real_time_factor"):
-        found[peer["real_time_factor"]] = "PyElastica, free rods"
-    return found
 
 
 def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mapping[str, float]]) -> None:

@@ -239,6 +239,11 @@ def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim])
     read = readings_m(run)
     every = " / ".join(words.span(of_segment, CM) for of_segment in read)
     deficits = words.span((middle_deficit(of_reading) for of_reading in read.T), PERCENT, 0)
+    # What differs most, and what the variants of the paper's own formulation make of it.
+    ours = {name: walked_elongation(o, first_helix=True) for name, o in variants.items() if name not in (FAST, RODS)}
+    errors = [m / paper - 1 for m, paper in zip(ours[MAIN.config.name], PAPER_ELONGATION_M, strict=True)]
+    worst = max(range(len(errors)), key=lambda segment: abs(errors[segment]))
+    others = [f"{words.in_cm(m[worst])} cm with {name}" for name, m in ours.items() if name != MAIN.config.name]
     paragraphs = [
         "The paper's worm, rebuilt in its own formulation and driven by its own network, has a rhythm that is "
         f"{main.rhythm.verdict or 'not settled'}: segments begin in the order {order_of(main)}, one cycle every "
@@ -248,7 +253,9 @@ def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim])
         f"{words.in_percent(PAPER_MIDDLE_DEFICIT, 1)} %). That reading comes nearest. By all six springs, and their "
         f"mean, the segments elongate by {every} cm, and segment 2 by {deficits} % less than segment 1; the claims are "
         "judged by all of these readings.",
-        _what_still_differs(variants),
+        f"On the first helix, segment {worst + 1} differs most, {PERCENT * errors[worst]:+.1f} % from the paper; the "
+        f"others are within {PERCENT * sorted(map(abs, errors))[-2]:.1f} %."
+        f"{f' It is {words.listed(others)}.' if others else ''}",
     ]
     if claims:
         paragraphs.append(f"Verdicts on the {len(claims)} claims of the paper that are examined here: {tally(claims)}.")
@@ -259,20 +266,3 @@ def _summary(variants: Mapping[str, Outcome], run: Run, claims: Sequence[Claim])
         f"of {MM * RODS_STEP_S:g} ms), whose strands cannot part at a pin."
     )
     return paragraphs
-
-
-def _what_still_differs(variants: Mapping[str, Outcome]) -> str:
-    """Names the segment farthest from the paper, and what the variants of the paper's own formulation make of it."""
-    read = {
-        label: walked_elongation(outcome, first_helix=True)
-        for label, outcome in variants.items()
-        if label not in (FAST, RODS)
-    }
-    errors = [ours / paper - 1 for ours, paper in zip(read[MAIN.config.name], PAPER_ELONGATION_M, strict=True)]
-    worst = max(range(len(errors)), key=lambda segment: abs(errors[segment]))
-    others = [f"{words.in_cm(m[worst])} cm with {label}" for label, m in read.items() if label != MAIN.config.name]
-    return (
-        f"On the first helix, segment {worst + 1} differs most, {PERCENT * errors[worst]:+.1f} % from the paper; the "
-        f"others are within {PERCENT * max(abs(error) for i, error in enumerate(errors) if i != worst):.1f} %."
-        f"{f' It is {words.listed(others)}.' if others else ''}"
-    )

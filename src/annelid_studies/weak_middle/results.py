@@ -30,62 +30,39 @@ from annelid_studies.weak_middle.sweeps import (
     deficits,
 )
 
+ROBOT_DEFICIT, PAPERS_DEFICIT = interior_deficit(ROBOT_ELONGATION_M), interior_deficit(PAPER_ELONGATION_M)
+"""How far the interior segments of the robot and of the paper's simulation stay below the ends, fractions."""
 PERCENT = 100.0
 FADED = "0.35"
-COLUMNS = (
-    "quantity",
-    "value",
-    "n_segments",
-    "actuator",
-    "setting",
-    "resolution",
-    "segment",
-    "elongation_cm",
-    "ring_length_m",
-    "force_N",
-    "drift_mm",
-    "deficit_percent",
-    "problem",
-)
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
     """Writes one row a pulled segment as CSV with a header, and returns its path; the deficit is that of its worm."""
-    rows = (
-        [
-            reading.point.quantity,
-            f"{reading.point.value:g}",
-            reading.point.n_segments,
-            reading.point.actuator.kind,
-            reading.point.actuator.setting,
-            reading.point.resolution,
-            one.segment,
-            _number(100 * one.elongation_m, 3),
-            _number(one.ring_length_m, 4),
-            _number(one.force_N, 3),
-            _number(1e3 * one.drift_m, 3),
-            _number(100 * reading.deficit, 2),
-            one.problem,
-        ]
+    rows = [
+        {
+            "quantity": reading.point.quantity,
+            "value": f"{reading.point.value:g}",
+            "n_segments": reading.point.n_segments,
+            "actuator": reading.point.actuator.kind,
+            "setting": reading.point.actuator.setting,
+            "resolution": reading.point.resolution,
+            "segment": one.segment,
+            "elongation_cm": _number(100 * one.elongation_m, 3),
+            "ring_length_m": _number(one.ring_length_m, 4),
+            "force_N": _number(one.force_N, 3),
+            "drift_mm": _number(1e3 * one.drift_m, 3),
+            "deficit_percent": _number(100 * reading.deficit, 2),
+            "problem": one.problem,
+        }
         for reading in readings
         for one in reading.pulled
-    )
-    return write_csv(path, COLUMNS, rows)
-
-
-def robot_deficit() -> float:
-    """How far the robot's interior segments stay below its ends, a fraction."""
-    return interior_deficit(ROBOT_ELONGATION_M)
-
-
-def papers_deficit() -> float:
-    """The same of the paper's simulation, its first helix read peak to peak."""
-    return interior_deficit(PAPER_ELONGATION_M)
+    ]
+    return write_csv(path, rows[0], (row.values() for row in rows))
 
 
 def weak_middle_figure(readings: Sequence[Reading], stem: Path) -> Path:
     """Draws the deficit over every quantity, a panel each, one line for every kind of actuator."""
-    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
+    marks = {"robot": ROBOT_DEFICIT, "paper's\nmodel": PAPERS_DEFICIT}
     largest = max([*marks.values(), *(one.deficit for one in readings if isfinite(one.deficit))])
     with canvas(6.0) as figure:
         grid = figure.subplots(2, 2, sharey=True, squeeze=False)

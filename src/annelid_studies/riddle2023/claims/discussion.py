@@ -156,7 +156,8 @@ def discussion_claims(evidence: Evidence) -> list[Claim]:
     nearby = [one.near.length_m[1] / one.near.length_m[0] - 1 for one in seen]
     far = [one.far.length_m[1] / one.far.length_m[0] - 1 for one in seen]
     weight = float(evidence.runs[0][1].data.attrs["total_mass_kg"]) * 9.81
-    loads = [_load_N(run) for _, run in evidence.runs]
+    upward = [(run.data["contact_force"].sel(axis="z").values, run.data["time"].values) for _, run in evidence.runs]
+    loads = [float(force[time > 0.5].sum(axis=1).mean()) for force, time in upward]
     return [
         _of_discussion(
             "Contraction deforms unactuated neighbours, even with a rhombus between the rings, and leaves far ones "
@@ -198,12 +199,6 @@ def discussion_claims(evidence: Evidence) -> list[Claim]:
         ),
         _speed_claim(evidence),
     ]
-
-
-def _load_N(run: Run) -> float:
-    """Mean vertical force of the floor on the worm once it has settled, N."""
-    settled = run.data["time"].values > 0.5
-    return float(run.data["contact_force"].sel(axis="z").values[settled].sum(axis=1).mean())
 
 
 def _speed_claim(evidence: Evidence) -> Claim:

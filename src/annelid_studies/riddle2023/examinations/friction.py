@@ -77,6 +77,16 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         walk = numbers[f"frictions_that_walk_{worm.name}"] = words.listed(f"{one.value:g}" for one in own if one.walks)
         fail = words.listed(f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in own if not one.walks)
         orders.append(f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}, lost at {fail}.")
+    convergence = ""
+    if solved:
+        spread, scale = float(np.ptp(list(solved.values()))), float(np.mean(np.abs(list(solved.values()))))
+        artefact = "no artefact of step or friction cone" if spread < 0.2 * scale else "known to that accuracy only"
+        sizes = [f"{words.in_cm(t)} cm at {MM * dt:g} ms and impratio {ratio:g}" for (dt, ratio), t in solved.items()]
+        convergence = (
+            f"Convergence, rods with rigid crossings at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. "
+            f"The spread is {words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel is "
+            f"{artefact}."
+        )
     small = [one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M]
     parts = [rough.held_deficit - smooth.held_deficit for smooth, rough in design.by_worm(held).values()]
     travels = words.by_worm(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm")
@@ -114,22 +124,9 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         ),
         remarks=[
             *orders,
-            _convergence(solved)
-            if solved
-            else f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only.",
+            convergence or f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only.",
         ],
         numbers=numbers,
-    )
-
-
-def _convergence(solved: dict[tuple[float, float], float]) -> str:
-    travels = list(solved.values())
-    sizes = [f"{words.in_cm(t)} cm at {MM * step:g} ms and impratio {ratio:g}" for (step, ratio), t in solved.items()]
-    spread, scale = max(travels) - min(travels), float(np.mean(np.abs(travels)))
-    artefact = "is no artefact of step or friction cone" if spread < 0.2 * scale else "is known to that accuracy only"
-    return (
-        f"Convergence, rods with rigid crossings at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. The "
-        f"spread is {words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel {artefact}."
     )
 
 

@@ -20,10 +20,14 @@ RING_LENGTHS_M = (0.30, 0.96)
 SETTLED_FORCE_N = 2.5
 """Force at which the paper's contracted rings settle, N."""
 
-_VELOCITIES = (-0.75, -0.3, 0.0, 0.3)
 _BLUE, _ORANGE, _GREEN, _ = segment_colors(4)
-_CUT_COLORS = (_GREEN, _ORANGE, "0.1", _BLUE)
-_DASHES = ((0, (1, 1.2)), (0, (4, 1.5)), "-", (0, (6, 1.5, 1, 1.5)))
+_CUTS = (
+    (-0.75, (0, (1, 1.2)), _GREEN),
+    (-0.3, (0, (4, 1.5)), _ORANGE),
+    (0.0, "-", "0.1"),
+    (0.3, (0, (6, 1.5, 1, 1.5)), _BLUE),
+)
+"""Velocities of the cuts, with their lines and colours."""
 
 
 def engine_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activation: float = 1.0) -> Array:
@@ -107,7 +111,7 @@ def _draw_cuts(axes: Axes, rings: Rings, working: tuple[float, float]) -> None:
     lengths, _ = _grids(rings, 301)
     sparse = lengths[::15]
     axes.axvspan(*working, color="0.9", zorder=0)
-    for velocity, dashes, color in zip(_VELOCITIES, _DASHES, _CUT_COLORS, strict=True):
+    for velocity, dashes, color in _CUTS:
         label = f"${velocity:+.2f}\\ L_0$/s" if velocity else "isometric"
         axes.plot(lengths, engine_flv(lengths, velocity, rings), color=color, linestyle=dashes, label=label)
         axes.plot(sparse, muscle_force(sparse, velocity, rings), "o", color=color, markersize=3, fillstyle="none")

@@ -173,10 +173,6 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         handles, labels = axial.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), columnspacing=1.4)
         save_both(figure, stem)
-    return _caption_8(posture, measured)
-
-
-def _caption_8(posture: Posture, measured: Propagation) -> str:
     how = "rendered" if rendering_works() else "drawn from the recorded posture, not rendered"
     near, far = measured.near, measured.far
     distance, axial = np.abs(measured.plane_distance_m), measured.plane_axial

@@ -123,16 +123,7 @@ def points() -> tuple[Point, ...]:
 def judge(
     number: int, point: Point, controller: str, rhythm: RhythmScore, lengthening: RhythmScore, message: str = ""
 ) -> Judged:
-    """Judges the scores of one run.
-
-    Args:
-        number: Number of the point.
-        point: The point.
-        controller: One of `CONTROLLERS`.
-        rhythm: The score of its activation.
-        lengthening: The score of its segments' lengthening.
-        message: Why the run ended before its time; empty if it did not.
-    """
+    """Judges one run by the scores of its activation and of its segments' lengthening, and why it ended too early."""
     walked, period = not message and rhythm.is_one_wave, rhythm.period_s
     return Judged(
         point=number,

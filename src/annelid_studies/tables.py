@@ -29,14 +29,7 @@ def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> T
 
 
 def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str = "") -> TerminalTable:
-    """Returns a table for the terminal.
-
-    Args:
-        table: Its head and cells.
-        title: What stands above it.
-        n_words: Columns of words, set flush left, before those of numbers.
-        caption: What stands below it.
-    """
+    """Returns a table for the terminal, of columns of words, set flush left, and then columns of numbers."""
     shown = TerminalTable(title=title, caption=caption or None)
     for i, head in enumerate(table.header):
         # Heads of numbers stand one word a line: on a narrow terminal words fold before numbers do.

@@ -38,13 +38,7 @@ def fast(changes: Mapping[str, Any] | None = None) -> Case:
 
 
 def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: float = REST_S) -> dict[str, Any]:
-    """Returns the changes that make a run open-loop: each segment contracted in turn, the others at rest.
-
-    Args:
-        n_segments: Segments of the worm.
-        hold_s: How long each is contracted, s.
-        rest_s: How long all rest before the next, s.
-    """
+    """Returns the changes that make a run open-loop: each segment contracted in turn, then all at rest for a while."""
     starts = [round(i * (hold_s + rest_s), 9) for i in range(n_segments)]
     contractions = [
         {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)

@@ -180,7 +180,7 @@ def test_the_sweeps_meet_at_the_base_worm() -> None:
         [point for point in sweep_points(quantity, "quick", settings) if point.value == sweeps.BASE[quantity.name]]
         for quantity in QUANTITIES
     ]
-    commands = [[case.command for point in points for case in point.cases] for points in base]
+    commands = [[case.command for point in points for case in point.cases.values()] for points in base]
     assert [point.actuator.kind for point in base[0]] == list(ACTUATORS)
     assert all(of_one == commands[0] for of_one in commands)
     for quantity in QUANTITIES:
@@ -197,7 +197,7 @@ def test_the_sweeps_meet_at_the_base_worm() -> None:
 @pytest.mark.parametrize(("n_segments", "pulled"), [(3, (1, 2)), (4, (1, 2)), (5, (1, 2, 3)), (8, (1, 2, 3, 4))])
 def test_the_rear_half_is_the_mirror_image(n_segments: int, pulled: tuple[int, ...]) -> None:
     point = Point("segments", n_segments, n_segments, force_limited(FORCE_N))
-    assert point.segments == pulled
+    assert tuple(point.cases) == pulled
     reading = Reading(point, tuple(read(segment, 0.06 - 0.01 * segment) for segment in pulled))
     lengths = reading.elongation_m
     assert len(lengths) == n_segments
@@ -283,7 +283,7 @@ def readings() -> list[Reading]:
     settings = defaultdict(lambda: SETTING)
     points = [point for quantity in QUANTITIES for point in sweep_points(quantity, "quick", settings)]
     points += check_points(settings)[:2]
-    made = [Reading(point, tuple(read(i, 0.06 / i) for i in point.segments)) for point in points]
+    made = [Reading(point, tuple(read(i, 0.06 / i) for i in point.cases)) for point in points]
     made[1] = replace(made[1], pulled=(read(1, 0.06), read(2, nan, "collapsed")))
     return made
 

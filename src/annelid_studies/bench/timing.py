@@ -60,10 +60,8 @@ class Stopwatch:
 def laps_s(ends: Sequence[float], times: Sequence[float], step_s: float) -> np.ndarray:
     """Wall-clock time of a physics step, from each movement of the body to the next, s.
 
-    Args:
-        ends: When each call of the plant ended, s.
-        times: Simulated time of the engine after it, s; the same as before where the body did not move.
-        step_s: Physics step, s.
+    From the ends of the plant's calls, s on the clock, and the simulated times after them, s, which stay the same where
+    the body did not move.
     """
     moved = np.flatnonzero(np.diff(times, prepend=0.0) > 0.5 * step_s)
     n_steps = np.round(np.diff(np.asarray(times)[moved]) / step_s)
@@ -83,14 +81,9 @@ class EngineTimes(NamedTuple):
 def engine_times(
     simulation: Simulation, plant: WormPlant, stepping: Stopwatch, simulated_s: float, longest_s: float
 ) -> EngineTimes:
-    """Runs the closed loop of a worm from its start with the engine's timers on, which by default stand still.
+    """Runs a closed loop from its start with the engine's timers on, which by default stand still.
 
-    Args:
-        simulation: The loop.
-        plant: Its worm.
-        stepping: Stopwatch round the worm's steps.
-        simulated_s: How long to run, s of simulated time.
-        longest_s: How long to run at most, s of wall-clock time.
+    For a simulated time, but at most for a time on the clock, s; ``stepping`` is round the worm's steps.
     """
     data = plant.data
     iterations, constraints = [], []

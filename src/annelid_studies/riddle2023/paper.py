@@ -135,8 +135,7 @@ def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any
     """Returns what goes with a picture: as it was kept, or made anew where code, runs or picture have changed.
 
     Args:
-        stem: Path of the picture without suffix; ``<stem>.svg`` and ``<stem>.png`` are the picture, and
-            ``<stem>.json`` keeps what goes with it.
+        stem: Path of the picture, an SVG and a PNG, and of the JSON that keeps what goes with it, without suffix.
         made_of: All that the picture depends on beside annelid's code, of plain numbers, words and lists.
         make: Draws the picture and returns what goes with it, ready for JSON.
     """

@@ -95,29 +95,28 @@ def rest_ring_m() -> float:
 _QUICK_CABLE = {"body.rings.damping_Ns_per_m": 1.0}
 
 
+def _winding(force_N: float | list[float], stiffness_N_per_m: float, shortest_m: float) -> dict[str, Any]:
+    return {
+        **_QUICK_CABLE,
+        "body.rings.force_limit_N": force_N,
+        "body.rings.stiffness_N_per_m": stiffness_N_per_m,
+        "body.rings.length_range_m": [shortest_m, rest_ring_m()],
+    }
+
+
 def force_limited(*force_N: float) -> Actuator:
     """A servo that winds until it stalls at a tension all round the ring, N, one for all segments or one a segment.
 
     Its shortest cable is out of reach.
     """
-    changes = {
-        **_QUICK_CABLE,
-        "body.rings.force_limit_N": list(force_N) if len(force_N) > 1 else force_N[0],
-        "body.rings.stiffness_N_per_m": SOFT_N_PER_M,
-        "body.rings.length_range_m": [round(SHORTEST * rest_ring_m(), 6), rest_ring_m()],
-    }
+    forces = list(force_N) if len(force_N) > 1 else force_N[0]
+    changes = _winding(forces, SOFT_N_PER_M, round(SHORTEST * rest_ring_m(), 6))
     return Actuator("force-limited", f"{' / '.join(f'{one:.2f}' for one in force_N)} N", changes)
 
 
 def length_limited(length_m: float) -> Actuator:
     """A servo that winds a ring's whole cable to a slack length, m, whatever force that takes."""
-    changes = {
-        **_QUICK_CABLE,
-        "body.rings.force_limit_N": OUT_OF_REACH_N,
-        "body.rings.stiffness_N_per_m": STIFF_N_PER_M,
-        "body.rings.length_range_m": [length_m, rest_ring_m()],
-    }
-    return Actuator("length-limited", f"{length_m:.4f} m", changes)
+    return Actuator("length-limited", f"{length_m:.4f} m", _winding(OUT_OF_REACH_N, STIFF_N_PER_M, length_m))
 
 
 def servo() -> Actuator:
@@ -145,14 +144,13 @@ def pull(segment: int, actuator: Actuator, changes: Mapping[str, Any] | None = N
 
     Worm, ground and resolution are the base worm's and this study's but for the changes.
     """
-    contractions = [
-        {"segment": segment, "start_s": 0.0, "stop_s": stop, "activation": actuator.activation} for stop in READ_S
-    ]
-    ramp_s = RAMP_S if actuator.kind == "muscle" else 0.0
-    own: dict[str, Any] = {
-        "duration_s": DURATION_S,
-        "controller": {"kind": "program", "ramp_s": ramp_s, "contractions": contractions},
+    contraction = {"segment": segment, "start_s": 0.0, "activation": actuator.activation}
+    program = {
+        "kind": "program",
+        "ramp_s": RAMP_S if actuator.kind == "muscle" else 0.0,
+        "contractions": [{**contraction, "stop_s": stop} for stop in READ_S],
     }
+    own = {"duration_s": DURATION_S, "controller": program}
     return Case(PRESET, {**AUTHORS_MESH, **RESOLUTION, **STANDSTILL, **actuator.changes, **(changes or {}), **own})
 
 

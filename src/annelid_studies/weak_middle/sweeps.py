@@ -6,7 +6,7 @@ Beside them stands what it would take that two interior segments differ as the r
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from typing import Any, NamedTuple
 
@@ -132,14 +132,10 @@ class Point:
     only: tuple[int, ...] = ()
 
     @property
-    def segments(self) -> tuple[int, ...]:
-        """The segments that are pulled, each alone."""
-        return self.only or tuple(range(1, (self.n_segments + 1) // 2 + 1))
-
-    @property
-    def cases(self) -> list[Case]:
-        """The runs, one a pulled segment."""
-        return [pull(segment, self.actuator, self.changes) for segment in self.segments]
+    def cases(self) -> dict[int, Case]:
+        """The runs by the segment that is pulled alone."""
+        segments = self.only or range(1, (self.n_segments + 1) // 2 + 1)
+        return {segment: pull(segment, self.actuator, self.changes) for segment in segments}
 
 
 @dataclass(frozen=True)
@@ -168,11 +164,8 @@ class Reading:
 
 def compute(store: Store, points: Sequence[Point], stage: str) -> list[Reading]:
     """Pulls the segments of points, as far as the store does not have it."""
-    store.compute([case for point in points for case in point.cases], stage)
-    return [
-        Reading(point, tuple(read_pull(i, store[case]) for i, case in zip(point.segments, point.cases, strict=True)))
-        for point in points
-    ]
+    store.compute([case for point in points for case in point.cases.values()], stage)
+    return [Reading(one, tuple(read_pull(i, store[case]) for i, case in one.cases.items())) for one in points]
 
 
 def values_of(quantity: Quantity, effort: Effort) -> tuple[float, ...]:
@@ -203,11 +196,11 @@ def sweep_points(quantity: Quantity, effort: Effort, set_to: Mapping[Key, Settin
 
 def check_points(set_to: Mapping[Key, Setting]) -> list[Point]:
     """Returns the points at which the resolution is varied: force-limited, at several weights."""
+    usual = [one for one in sweep_points(WEIGHT, "full", set_to) if one.actuator.kind == "force-limited"]
     return [
-        Point(WEIGHT.name, mass, base_body().n_segments, actuator, {**worm, **resolution}, words)
-        for mass in CHECKED_KG
-        for worm in ({} if mass == BASE[WEIGHT.name] else weight_changes(mass),)
-        for actuator in (set_to[worm_key(WEIGHT, mass)].actuators()["force-limited"],)
+        replace(one, changes={**one.changes, **resolution}, resolution=words)
+        for one in usual
+        if one.value in CHECKED_KG
         for words, resolution in CHECKS.items()
     ]
 
@@ -236,11 +229,8 @@ def weak_middle(store: Store, effort: Effort) -> tuple[dict[Key, Setting], list[
 
 def deficits(readings: Sequence[Reading], quantity: Quantity, kind: str) -> tuple[Array, Array]:
     """Returns values and deficits of one sweep with one kind of actuator, NaN where there is none, each ``(n,)``."""
-    own = [
-        one
-        for one in readings
-        if (one.point.quantity, one.point.actuator.kind, one.point.resolution) == (quantity.name, kind, "")
-    ]
+    wanted = (quantity.name, kind, "")
+    own = [one for one in readings if (one.point.quantity, one.point.actuator.kind, one.point.resolution) == wanted]
     return np.array([one.point.value for one in own]), np.array([one.deficit for one in own])
 
 

@@ -165,9 +165,9 @@ def discussion_claims(evidence: Evidence) -> list[Claim]:
             "sections 3, 4",
             "Fig. 8",
             f"near rhombus {span(nearby, 100, 0)} % longer, far rhombus {span(far, 100, 0)} %",
-            f"It holds if the near rhombus changes by more than five times as much; both are those that our "
-            f"figure 8 shows. Segment 2 contracted at {seen[0].time_s:.2f} s; figure 8 shows how the deformation "
-            "decays with distance.",
+            "It holds if the near rhombus changes by more than five times as much; both are those that our figure 8 "
+            f"shows. Segment 2 contracted at {seen[0].posture.time_s:.2f} s; figure 8 shows how the deformation decays "
+            "with distance.",
             MAIN.command,
             *judged((abs(one) > 5 * abs(other) for one, other in zip(nearby, far, strict=True)), "the run"),
         ),

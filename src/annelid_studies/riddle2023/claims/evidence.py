@@ -51,11 +51,7 @@ class Evidence:
     findings: dict[str, Findings]  # What each examination found, by its name
 
     def number(self, examination: str, name: str) -> float:
-        """Returns a single result of an examination; NaN where a run did not come that far.
-
-        Raises:
-            KeyError: It has no number of that name; the error lists the valid ones.
-        """
+        """Returns a single result of an examination; NaN where a run did not come that far."""
         value = self.findings[examination].numbers[name]
         return nan if value is None else float(value)
 
@@ -156,13 +152,7 @@ def slip_runs(effort: Effort) -> Sequence[str]:
 
 
 def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:
-    """Judges readings by a number of the paper's; see `rule`.
-
-    Args:
-        ours: All of our readings; NaN is near nothing.
-        paper: The paper's number.
-        on: What tells readings that are near from others, should there be both.
-    """
+    """Judges all of our readings, of which some may be NaN, by a number of the paper's; see `rule` and `judged`."""
     apart = [abs(one / paper - 1.0) for one in ours]
     if all(one <= EXACT for one in apart):
         return "holds", ""
@@ -172,12 +162,7 @@ def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:
 
 
 def judged(has: Iterable[bool], on: str = "") -> tuple[Verdict, str]:
-    """Judges whether runs or readings have a property; see `rule`.
-
-    Args:
-        has: Whether each has it.
-        on: What tells those that have it from others, should there be both.
-    """
+    """Judges whether runs or readings have a property; see `rule`. Those that do and others differ in what is named."""
     found = [bool(one) for one in has]
     if all(found):
         return "holds", ""

@@ -184,12 +184,7 @@ def draw_over(
 ) -> None:
     """Draws numbers of readings over what is varied, a line a worm; one number a segment makes a line a segment.
 
-    Args:
-        axes: The panel.
-        readings: What was found.
-        numbers: Reads a number, or one a segment, ``(n_segments,)``.
-        hollow: Leaves the markers empty.
-        **style: Further properties of the lines, as matplotlib takes them.
+    Markers may be hollow, and lines have further properties as matplotlib takes them.
     """
     for worm, own in by_worm(readings).items():
         x, y = [one.value for one in own], np.array([numbers(one) for one in own], dtype=float)
@@ -210,11 +205,7 @@ _RHYTHMS: dict[str, dict[str, Any]] = {
 
 
 def draw_rhythms(axes: Axes, readings: Iterable[Reading]) -> list[Line2D]:
-    """Draws the kind of rhythm of closed loops over what is varied, one row a worm.
-
-    Returns:
-        Handles for a legend of the kinds that occur.
-    """
+    """Draws the kind of rhythm of closed loops, a row a worm; returns handles for a legend of the kinds that occur."""
 
     def look(kind: str) -> dict[str, Any]:
         return {"linestyle": "none", "color": _DARK, "markersize": 6.5, **_RHYTHMS[kind]}

@@ -11,7 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from annelid.analysis import actuated, deformation, distance_from_ring_m, plane_means, rhombus_diagonals, rhombus_plane
+from annelid.analysis import (
+    Deformation,
+    actuated,
+    deformation,
+    distance_from_ring_m,
+    plane_means,
+    rhombus_diagonals,
+    rhombus_plane,
+)
 from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
 from annelid.draw import rhombi as flat_rhombi
 from annelid.morphology import Array, MeshGeometry
@@ -58,15 +66,14 @@ class Measured:
 
 @dataclass(frozen=True)
 class Propagation:
-    """What figure 8 measures."""
+    """How far a contraction deforms the mesh."""
 
-    time_s: float  # Time of the posture
+    posture: Posture
     segment: int  # The most contracted segment, counted from 0
     near: Measured  # An unactuated rhombus next to the contracted ring, without a corner on it
     far: Measured  # The unactuated rhombus farthest from that ring, at the other side of it where both ends are as far
     plane_distance_m: Array  # Distance of every plane of rhombi from the contracted ring, shape ``(n_planes - 2,)``
-    plane_axial: Array  # Mean relative change of the axial diagonals on each of them, same shape
-    plane_lateral: Array  # The same of the lateral diagonals
+    change: Deformation  # Of every rhombus
 
 
 def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
@@ -77,14 +84,28 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
-    return _measure(recorded_posture(run, time_s))
+    posture = recorded_posture(run, time_s)
+    geometry, segment = posture.geometry, _contracted(posture)
+    distance = distance_from_ring_m(geometry, segment)
+    offset = np.abs(rhombus_plane(geometry) - geometry.ring_planes[segment])
+    facing = _outward(posture.crossings_m, geometry) @ -picture_axes(*FIGURE_8_DEG)[2]
+    free = np.flatnonzero(offset >= 2)
+    own_muscle = actuated(geometry)[free]
+    near = int(free[np.lexsort((-facing[free], offset[free], own_muscle))[0]])
+    same_side = np.sign(distance[free]) == np.sign(distance[near])
+    far = int(free[np.lexsort((-facing[free], same_side, -offset[free], own_muscle))[0]])
+    measured = []
+    for rhombus in (near, far):
+        corners = geometry.rhombi[[rhombus]]
+        both = [rhombus_diagonals(crossings, corners) for crossings in (geometry.crossings_m, posture.crossings_m)]
+        length, width = ((float(rest[0]), float(now[0])) for rest, now in zip(*both, strict=True))
+        measured.append(Measured(rhombus, float(distance[rhombus]), length, width))
+    change = deformation(posture.crossings_m, geometry)
+    return Propagation(posture, segment, *measured, plane_means(distance, geometry), change)
 
 
 def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
-    """Draws rhombi that deform alone beside the same row of the compliant worm, with one segment contracted.
-
-    Returns:
-        The caption.
+    """Draws rhombi that deform alone beside the same row of the compliant worm; returns the caption.
 
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
@@ -139,16 +160,13 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
 
 
 def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
-    """Shows the worm with one segment contracted, a near and a far rhombus, and the deformation of all of them.
-
-    Returns:
-        The caption.
+    """Shows a near and a far rhombus of the worm, and the deformation of all of them; returns the caption.
 
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
-    posture = recorded_posture(run, time_s)
-    measured = _measure(posture)
+    measured = measure_propagation(run, time_s)
+    posture = measured.posture
     with canvas(6.7) as figure:
         grid = figure.add_gridspec(2, 1)
         picture, below = figure.add_subfigure(grid[0]).subplots(), figure.add_subfigure(grid[1])
@@ -162,9 +180,8 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         _outline(picture, place, posture, measured.far, "far rhombus", PINK, "--", places[1])
         panel_title(picture, f"a) segment {measured.segment + 1} contracted, t = {posture.time_s:.2f} s")
         axial, lateral = below.subplots(1, 2, sharex=True)
-        change = deformation(posture.crossings_m, posture.geometry)
-        _scatter(axial, posture.geometry, measured, change.axial, measured.plane_axial)
-        _scatter(lateral, posture.geometry, measured, change.lateral, measured.plane_lateral)
+        _scatter(axial, measured, measured.change.axial)
+        _scatter(lateral, measured, measured.change.lateral)
         panel_title(axial, "b) length of each rhombus")
         panel_title(lateral, "c) width of each rhombus")
         axial.set_ylabel("change against rest (%)")
@@ -175,10 +192,10 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         save_both(figure, stem)
     how = "rendered" if rendering_works() else "drawn from the recorded posture, not rendered"
     near, far = measured.near, measured.far
-    distance, axial = np.abs(measured.plane_distance_m), measured.plane_axial
+    distance, axial = np.abs(measured.plane_distance_m), plane_means(measured.change.axial, posture.geometry)
     most, last = int(np.argmax(np.abs(axial))), int(np.argmax(distance))
     return (
-        f"a) The compliant worm with segment {measured.segment + 1} contracted, at {measured.time_s:.2f} s ({how}; the "
+        f"a) The compliant worm with segment {measured.segment + 1} contracted, at {posture.time_s:.2f} s ({how}; the "
         f"contracted ring is thick and red). The near rhombus (green, solid), {_CM * abs(near.distance_m):.1f} cm from "
         f"the ring at rest, {_muscle(posture, near)}, changes its length by {near.changes[0]} and its width by "
         f"{near.changes[1]}; the far one (pink, dashed), {_CM * abs(far.distance_m):.1f} cm away, "
@@ -248,8 +265,9 @@ def _outline(
     axes.annotate(f"{name}\n{measured}", tuple(tip), (share, -0.04), color=color, **below)
 
 
-def _scatter(axes: Axes, geometry: MeshGeometry, measured: Propagation, change: Array, mean: Array) -> None:
+def _scatter(axes: Axes, measured: Propagation, change: Array) -> None:
     """Change of every rhombus over its distance from the contracted ring."""
+    geometry = measured.posture.geometry
     distance = _CM * distance_from_ring_m(geometry, measured.segment)
     with_muscle = actuated(geometry)
     for mask, marker, color, face, name in (
@@ -258,41 +276,12 @@ def _scatter(axes: Axes, geometry: MeshGeometry, measured: Propagation, change: 
     ):
         look = {"color": color, "markerfacecolor": face, "markersize": 4, "label": name}
         axes.plot(distance[mask], _PERCENT * change[mask], marker, **look)
-    axes.plot(_CM * measured.plane_distance_m, _PERCENT * mean, "-", color="0.1", linewidth=1.2, label="mean")
+    mean = _PERCENT * plane_means(change, geometry)
+    axes.plot(_CM * measured.plane_distance_m, mean, "-", color="0.1", linewidth=1.2, label="mean")
     for one, marker, color, name in ((measured.near, "D", GREEN, "near"), (measured.far, "v", PINK, "far")):
         place = _CM * one.distance_m, _PERCENT * change[one.rhombus]
         axes.plot(*place, marker, color=color, markersize=8, markeredgecolor="black", label=name, zorder=5)
     axes.axhline(0.0, color="0.5", linewidth=0.8)
-
-
-def _measure(posture: Posture) -> Propagation:
-    geometry = posture.geometry
-    segment = _contracted(posture)
-    distance = distance_from_ring_m(geometry, segment)
-    offset = np.abs(rhombus_plane(geometry) - geometry.ring_planes[segment])
-    facing = _outward(posture.crossings_m, geometry) @ -picture_axes(*FIGURE_8_DEG)[2]
-    free = np.flatnonzero(offset >= 2)
-    own_muscle = actuated(geometry)[free]
-    near = int(free[np.lexsort((-facing[free], offset[free], own_muscle))[0]])
-    same_side = np.sign(distance[free]) == np.sign(distance[near])
-    far = int(free[np.lexsort((-facing[free], same_side, -offset[free], own_muscle))[0]])
-    change = deformation(posture.crossings_m, geometry)
-    return Propagation(
-        time_s=posture.time_s,
-        segment=segment,
-        near=_measured(posture, near, float(distance[near])),
-        far=_measured(posture, far, float(distance[far])),
-        plane_distance_m=plane_means(distance, geometry),
-        plane_axial=plane_means(change.axial, geometry),
-        plane_lateral=plane_means(change.lateral, geometry),
-    )
-
-
-def _measured(posture: Posture, rhombus: int, distance_m: float) -> Measured:
-    corners = posture.geometry.rhombi[[rhombus]]
-    both = [rhombus_diagonals(crossings, corners) for crossings in (posture.geometry.crossings_m, posture.crossings_m)]
-    length, width = ((float(rest[0]), float(now[0])) for rest, now in zip(*both, strict=True))
-    return Measured(rhombus, distance_m, length, width)
 
 
 def _contracted(posture: Posture) -> int:

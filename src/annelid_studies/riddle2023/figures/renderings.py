@@ -118,9 +118,6 @@ def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], wid
     """Shows a posture on empty axes: rendered with OpenGL, or drawn with lines where there is none.
 
     The angles are azimuth and elevation of the line of sight; the width of the axes, inches, decides the resolution.
-
-    Returns:
-        Where points in space lie on the axes.
     """
     axes.set_axis_off()
     axes.set_aspect("equal")
@@ -146,9 +143,6 @@ def draw_worm(
         angles_deg: Azimuth and elevation of the line of sight.
         perspective: As the renderer's camera sees it; by default in parallel projection, in cm.
         strength: Share of the colours that the nearest parts keep, in (0, 1].
-
-    Returns:
-        Where points in space lie on the axes.
     """
     right, up, sight = picture_axes(*angles_deg)
     pieces, colors, widths = _lines(posture)
@@ -231,10 +225,7 @@ def rhombus_outline(posture: Posture, rhombus: int) -> Array:
 
 
 def figure_4_model(config: RunConfig, stem: Path) -> str:
-    """Shows the model at rest, in the axial and the isometric view.
-
-    Returns:
-        The caption, with the numbers of the model.
+    """Shows the model at rest, in the axial and the isometric view; returns the caption.
 
     Raises:
         RunFileError: The worm is planar.

@@ -132,6 +132,10 @@ class Reading:
         return _of_holds(self.hold, lambda hold: number(getattr(hold, name)))
 
 
+Columns = Mapping[str, Callable[[Reading], str]]
+"""What the columns of a table write of a reading, by their heads."""
+
+
 def read(points: Iterable[Point], store: Store) -> list[Reading]:
     """Looks the outcomes of points up."""
     return [Reading(worm, value, *(case and store[case] for case in runs)) for worm, value, *runs in points]

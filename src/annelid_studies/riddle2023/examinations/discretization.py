@@ -15,7 +15,7 @@ from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other
@@ -142,27 +142,23 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
             f"{words.all_in_cm(own.held_m)} cm."
         )
     lines = {"-": "solid", "--": "dashed", ":": "dotted"}
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "elements a side": lambda one: f"{one.value:g}",
+        "ring held (m)": lambda one: words.each_in_unit(one.at_holds("ring_length_m"), digits=3),
+        "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
+        "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
+        "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
+        "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
+    }
     return Findings(
         answer=" ".join([*map(_convergence_in_words, held), _walks_in_words(walks)]),
-        caption=(
-            "Left: relative difference of held contractions from the finest mesh over the number of elements a rhombus "
-            f"side ({words.listed(f'{found.worm.label} against {found.elements[-1]}' for found in held)} elements; "
-            f"{words.listed(f'{found.worm.label} {lines[found.worm.line]}' for found in held)}), root mean square over "
-            f"the three segments. Right: largest elongation of each segment of {RIGID.label} in closed loop (mean of "
-            f"its springs), {len(walks)} runs; a cross over a marker: the run does not walk 1-2-3."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "elements a side": lambda one: f"{one.value:g}",
-                "ring held (m)": lambda one: words.each_in_unit(one.at_holds("ring_length_m"), digits=3),
-                "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
-                "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
-                "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
-                "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
-            },
-        ),
+        caption="Left: relative difference of held contractions from the finest mesh over the number of elements a "
+        f"rhombus side ({words.listed(f'{found.worm.label} against {found.elements[-1]}' for found in held)} elements; "
+        f"{words.listed(f'{found.worm.label} {lines[found.worm.line]}' for found in held)}), root mean square over the "
+        f"three segments. Right: largest elongation of each segment of {RIGID.label} in closed loop (mean of its "
+        f"springs), {len(walks)} runs; a cross over a marker: the run does not walk 1-2-3.",
+        table=tabulated(readings, columns),
         remarks=remarks,
         numbers=numbers,
     )

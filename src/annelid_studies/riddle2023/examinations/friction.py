@@ -12,7 +12,7 @@ from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other, rods
@@ -97,31 +97,25 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
             f"{slippery[one.worm]} % at {SLIPPERY:g} and {words.in_percent(one.held_deficit)} % at {one.value:g}"
         ),
     )
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "friction (1)": lambda one: f"{one.value:g}",
+        "travel forwards in 5 s (cm)": lambda one: words.in_cm(one.travel_m),
+        "elongation, mean of springs (cm)": lambda one: words.all_in_cm(one.walked_m),
+        "deficit (%)": lambda one: words.in_percent(one.deficit, 1),
+        "deficit, first helix (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit, 1),
+        "deficit, open loop (%)": lambda one: words.in_percent(one.held_deficit, 1),
+        "rhythm": lambda one: words.rhythm(one.rhythm),
+    }
     return Findings(
-        answer=(
-            f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is negligible "
-            f"for {words.labels(small)} of them. In open loop the deficit of segment 2 over all springs is {deficits}: "
-            f"friction makes {words.span(parts, PERCENT, 1)} percentage points of it."
-        ),
-        caption=(
-            "Closed loop, 5 s, over the coefficient of friction: travel of the centre of mass, positive towards the "
-            "front, against the wave; elongation of segments 1 and 2 (2 with empty markers), mean of six springs; the "
-            "deficit of segment 2 below 1 in the same reading, in closed loop (filled) and open loop (empty); rhythm. "
-            f"One run a point, {', '.join(str(len(own)) for own in design.by_worm(readings).values())} frictions."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "friction (1)": lambda one: f"{one.value:g}",
-                "travel forwards in 5 s (cm)": lambda one: words.in_cm(one.travel_m),
-                "elongation, mean of springs (cm)": lambda one: words.all_in_cm(one.walked_m),
-                "deficit (%)": lambda one: words.in_percent(one.deficit, 1),
-                "deficit, first helix (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit, 1),
-                "deficit, open loop (%)": lambda one: words.in_percent(one.held_deficit, 1),
-                "rhythm": lambda one: words.rhythm(one.rhythm),
-            },
-        ),
+        answer=f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is "
+        f"negligible for {words.labels(small)} of them. In open loop the deficit of segment 2 over all springs is "
+        f"{deficits}: friction makes {words.span(parts, PERCENT, 1)} percentage points of it.",
+        caption="Closed loop, 5 s, over the coefficient of friction: travel of the centre of mass, positive towards "
+        "the front, against the wave; elongation of segments 1 and 2 (2 with empty markers), mean of six springs; the "
+        "deficit of segment 2 below 1 in the same reading, in closed loop (filled) and open loop (empty); rhythm. One "
+        f"run a point, {', '.join(str(len(own)) for own in design.by_worm(readings).values())} frictions.",
+        table=tabulated(readings, columns),
         remarks=[
             *orders,
             convergence or f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only.",

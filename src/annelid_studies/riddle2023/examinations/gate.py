@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from pathlib import Path
 from typing import NamedTuple
@@ -92,28 +92,24 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         for beat in beats
         if beat.worm is FLAT
     )
+    columns: Mapping[str, Callable[[Beat], str]] = {
+        "worm": lambda beat: beat.worm.label,
+        "gate start": lambda beat: beat.start,
+        "update order": lambda beat: beat.scheme,
+        "rhythm": lambda beat: words.rhythm(beat.rhythm),
+        "period (s)": lambda beat: words.in_unit(beat.rhythm.period_s, digits=4),
+        "first onsets (s)": lambda beat: " ".join(map(words.in_unit, beat.onsets_s[:6])) or words.NOTHING,
+        "first contraction (s)": lambda beat: (
+            words.in_unit(beat.first_s) if np.isfinite(beat.first_s) else "to the end"
+        ),
+    }
     return Findings(
         answer=_answer(beats),
-        caption=(
-            f"When which segment contracts in the first {_SHOWN_S:g} s of closed loop, for each start of the sodium "
-            "gates (toolbox: as SNS-Toolbox starts them; steady: at the steady state of their neuron's potential) and "
-            "each update order of the network, one run a row. At the right, the period or, where there is none, "
-            "what became of the rhythm; rows without either were not run."
-        ),
-        table=tabulated(
-            beats,
-            {
-                "worm": lambda beat: beat.worm.label,
-                "gate start": lambda beat: beat.start,
-                "update order": lambda beat: beat.scheme,
-                "rhythm": lambda beat: words.rhythm(beat.rhythm),
-                "period (s)": lambda beat: words.in_unit(beat.rhythm.period_s, digits=4),
-                "first onsets (s)": lambda beat: " ".join(map(words.in_unit, beat.onsets_s[:6])) or words.NOTHING,
-                "first contraction (s)": lambda beat: (
-                    words.in_unit(beat.first_s) if np.isfinite(beat.first_s) else "to the end"
-                ),
-            },
-        ),
+        caption=f"When which segment contracts in the first {_SHOWN_S:g} s of closed loop, for each start of the "
+        "sodium gates (toolbox: as SNS-Toolbox starts them; steady: at the steady state of their neuron's potential) "
+        "and each update order of the network, one run a row. At the right, the period or, where there is none, what "
+        "became of the rhythm; rows without either were not run.",
+        table=tabulated(beats, columns),
         remarks=[
             f"The planar worm has no dynamics of its own, so its period is the network's: {flat}. By the design of "
             f"the network it is {3000.0 * DESIGN_INTERVAL_S:g} ms."

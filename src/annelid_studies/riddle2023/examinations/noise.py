@@ -199,21 +199,15 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         lambda one: f"{words.in_unit(handled_noise(one.cells), MM, 0)} of {MM * max(one.chart.noises_m):g} mm",
     )
     return Findings(
-        answer=(
-            "Without noise the worm walks in one wave 1-2-3 at tolerances of "
-            f"{words.by_worm(maps, lambda one: _in_mm(one.window))}, and evenly at "
-            f"{words.by_worm(maps, lambda one: _in_mm(one.even_window))}. "
-            f"{_fragility_in_words(maps, bool(common))} The largest noise under which some tolerance keeps every run "
-            f"in this wave is, of the largest tested, {handled}."
-        ),
-        caption=(
-            "Rhythm in closed loop over the tolerance of the stretch sensors and the standard deviation of their "
-            "noise. A cell's shade is the most frequent rhythm of its runs; the text says how many of them walk in a "
-            "single wave 1-2-3, and below it their mean regularity: 1 for a perfectly even wave; with less than "
-            f"{EVEN:g} it limps. With noise a cell is {maps[0].chart.n_seeds} runs of "
-            f"{PAPERS.case(None).config.duration_s:g} s, each with its own seed; without noise it is one run, which is "
-            "deterministic. Blank cells were not run."
-        ),
+        answer="Without noise the worm walks in one wave 1-2-3 at tolerances of "
+        f"{words.by_worm(maps, lambda one: _in_mm(one.window))}, and evenly at "
+        f"{words.by_worm(maps, lambda one: _in_mm(one.even_window))}. {_fragility_in_words(maps, bool(common))} The "
+        f"largest noise under which some tolerance keeps every run in this wave is, of the largest tested, {handled}.",
+        caption="Rhythm in closed loop over the tolerance of the stretch sensors and the standard deviation of their "
+        "noise. A cell's shade is the most frequent rhythm of its runs; the text says how many of them walk in a "
+        f"single wave 1-2-3, and below it their mean regularity: 1 for a perfectly even wave; with less than {EVEN:g} "
+        f"it limps. With noise a cell is {maps[0].chart.n_seeds} runs of {PAPERS.case(None).config.duration_s:g} s, "
+        "each with its own seed; without noise it is one run, which is deterministic. Blank cells were not run.",
         table=tabulated(
             [
                 (one, noise, [score for (_, level), cell in one.cells.items() if level == noise for score in cell])

@@ -17,7 +17,7 @@ from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
 from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
@@ -139,31 +139,25 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
             "their own: what the damping changes "
             f"{'passes; the readings are of meshes that still come to rest' if passes else 'lasts'}."
         )
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
+        "elongation of 1 / 2 / 3 (cm)": lambda one: words.all_in_cm(one.held_m),
+        "largest gap (cm)": lambda one: words.all_in_cm(one.at_holds("pin_gap_m")) if one is not tight else "0",
+        "ring (m)": lambda one: words.each_in_unit(_rings(one), digits=3),
+        "closed loop": lambda one: words.rhythm(one.rhythm),
+    }
     return Findings(
-        answer=(
-            f"The paper's pins give like springs of {paper.value:.0f} N/m: with segment 1 held contracted, strands "
-            f"part by up to {words.in_cm(gaps_m[0], 1)} cm at a pin, and the segment elongates by "
-            f"{words.in_cm(paper_m)} cm. Rigid crossings give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} "
-            f"times as much, at rings of {words.in_unit(ring_m)} and {words.in_unit(tight_ring_m)} m. Rods with ties "
-            f"of {sprung[-1].value:g} N/m reach {words.in_percent(sprung[-1].held_m[0] / tight_m)} % of that."
-        ),
-        caption=(
-            "Open loop: each of the three segments is held contracted for 0.8 s in turn. Its elongation (mean of six "
-            "springs), the largest gap at any pin, and its ring's length, over the stiffness of the tie between pin "
-            f"and strand. One run a point; {len(chains)} of the paper's chain, {len(sprung)} of rods with sprung pins, "
-            "one of rods with rigid crossings, drawn at the right edge. The rhythm is that of closed loops of 5 s."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
-                "elongation of 1 / 2 / 3 (cm)": lambda one: words.all_in_cm(one.held_m),
-                "largest gap (cm)": lambda one: words.all_in_cm(one.at_holds("pin_gap_m")) if one is not tight else "0",
-                "ring (m)": lambda one: words.each_in_unit(_rings(one), digits=3),
-                "closed loop": lambda one: words.rhythm(one.rhythm),
-            },
-        ),
+        answer=f"The paper's pins give like springs of {paper.value:.0f} N/m: with segment 1 held contracted, strands "
+        f"part by up to {words.in_cm(gaps_m[0], 1)} cm at a pin, and the segment elongates by {words.in_cm(paper_m)} "
+        f"cm. Rigid crossings give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} times as much, at rings of "
+        f"{words.in_unit(ring_m)} and {words.in_unit(tight_ring_m)} m. Rods with ties of {sprung[-1].value:g} N/m "
+        f"reach {words.in_percent(sprung[-1].held_m[0] / tight_m)} % of that.",
+        caption="Open loop: each of the three segments is held contracted for 0.8 s in turn. Its elongation (mean of "
+        "six springs), the largest gap at any pin, and its ring's length, over the stiffness of the tie between pin "
+        f"and strand. One run a point; {len(chains)} of the paper's chain, {len(sprung)} of rods with sprung pins, one "
+        "of rods with rigid crossings, drawn at the right edge. The rhythm is that of closed loops of 5 s.",
+        table=tabulated(readings, columns),
         remarks=remarks,
         numbers={
             "stiffness_paper_N_per_m": paper.value,

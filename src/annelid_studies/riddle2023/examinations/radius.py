@@ -11,7 +11,7 @@ from annelid.experiment import Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading
 from annelid_studies.riddle2023.words import CM, MM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other
@@ -69,31 +69,25 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     ]
     if effort == "quick":
         remarks.append(f"The quick effort varies the radius of {words.labels(thickest)} only.")
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "radius (mm)": lambda one: f"{one.value:g}",
+        "bending stiffness (1)": lambda one: f"{_stiffness(one.value):.2f}",
+        "open loop (cm)": lambda one: words.all_in_cm(one.held_m) if one.hold else words.NOTHING,
+        "closed loop (cm)": lambda one: words.all_in_cm(one.walked_m),
+        "deficit, first helix (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit),
+        "median force (N)": lambda one: words.in_unit(one.force_N),
+        "rhythm": lambda one: words.rhythm(one.rhythm),
+    }
     return Findings(
-        answer=(
-            f"Strands of {thick:g} in place of {thin:g} mm are {_stiffness(thick):.1f} times as stiff in bending. The "
-            f"elongation of segment 1 in open loop goes {held}. The median force in closed loop goes {forces}. At "
-            f"{thick:g} mm, {len(keep)} of {len(thickest)} worms keep the order 1-2-3: {words.labels(keep)}."
-        ),
-        caption=(
-            "Top: elongation (mean of six springs) over the strands' radius at the same mass, in closed loop (filled, "
-            "largest in 5 s) and in open loop (empty, each segment held by itself). Bottom: median muscle force while "
-            "contracted, and the rhythm, both in closed loop. One run a point. Bending stiffness goes with the fourth "
-            "power of the radius."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "radius (mm)": lambda one: f"{one.value:g}",
-                "bending stiffness (1)": lambda one: f"{_stiffness(one.value):.2f}",
-                "open loop (cm)": lambda one: words.all_in_cm(one.held_m) if one.hold else words.NOTHING,
-                "closed loop (cm)": lambda one: words.all_in_cm(one.walked_m),
-                "deficit, first helix (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit),
-                "median force (N)": lambda one: words.in_unit(one.force_N),
-                "rhythm": lambda one: words.rhythm(one.rhythm),
-            },
-        ),
+        answer=f"Strands of {thick:g} in place of {thin:g} mm are {_stiffness(thick):.1f} times as stiff in bending. "
+        f"The elongation of segment 1 in open loop goes {held}. The median force in closed loop goes {forces}. At "
+        f"{thick:g} mm, {len(keep)} of {len(thickest)} worms keep the order 1-2-3: {words.labels(keep)}.",
+        caption="Top: elongation (mean of six springs) over the strands' radius at the same mass, in closed loop "
+        "(filled, largest in 5 s) and in open loop (empty, each segment held by itself). Bottom: median muscle force "
+        "while contracted, and the rhythm, both in closed loop. One run a point. Bending stiffness goes with the "
+        "fourth power of the radius.",
+        table=tabulated(readings, columns),
         remarks=remarks,
         numbers={"bending_stiffness_ratio": _stiffness(thick), **numbers},
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -78,34 +78,28 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         f"{words.in_percent(in_closed.deficit() - in_open.deficit(), 1)} ({in_open.worm.label})"
         for (_, in_open), (_, in_closed) in zip(opened, closed, strict=True)
     )
+    columns: Mapping[str, Callable[[_Loop], str]] = {
+        "worm": lambda one: one.worm.label,
+        "loop": lambda one: one.loop,
+        "ranges": lambda one: {"compiled": "as compiled"}.get(one.ranges, one.ranges),
+        "first helix (cm)": lambda one: words.all_in_cm(one.elongation_m[0]),
+        "deficit on it (%)": lambda one: words.in_percent(one.deficit(0), 1),
+        "mean of springs (cm)": lambda one: words.all_in_cm(one.elongation_m[1]),
+        "deficit (%)": lambda one: words.in_percent(one.deficit(), 1),
+        "rhythm": lambda one: one.rhythm,
+    }
     return Findings(
-        answer=(
-            f"Deficit of {first.worm.label} in closed loop: {words.in_percent(first.deficit(0))} % on the first helix "
-            f"with the ranges as compiled and {words.in_percent(first_equal.deficit(0))} % with equal ones; over all "
-            f"springs, {words.in_percent(first.deficit())} % and {words.in_percent(first_equal.deficit())} %. In open "
-            f"loop, over all springs, equal ranges leave {_left(opened)}. So the ranges make "
-            f"{words.span(shares, PERCENT, 0)} % of the deficit of a contraction held by itself"
-            f"{', which is most of it' if min(shares) > 0.5 else ', and the rest has other causes'}."
-        ),
-        caption=(
-            "How far segment 2 elongates less than segment 1, with the three length ranges as the engine of the "
-            "paper's time compiled them and with equal ones. Left: first helix (closed loop: peak to peak), the "
-            f"paper's reading; the line is the paper's {words.in_percent(PAPER_MIDDLE_DEFICIT, 1)} %. Right: mean of "
-            "the six springs. One run a point, closed loop 5 s, open loop one contraction of 0.8 s a segment."
-        ),
-        table=tabulated(
-            loops,
-            {
-                "worm": lambda one: one.worm.label,
-                "loop": lambda one: one.loop,
-                "ranges": lambda one: {"compiled": "as compiled"}.get(one.ranges, one.ranges),
-                "first helix (cm)": lambda one: words.all_in_cm(one.elongation_m[0]),
-                "deficit on it (%)": lambda one: words.in_percent(one.deficit(0), 1),
-                "mean of springs (cm)": lambda one: words.all_in_cm(one.elongation_m[1]),
-                "deficit (%)": lambda one: words.in_percent(one.deficit(), 1),
-                "rhythm": lambda one: one.rhythm,
-            },
-        ),
+        answer=f"Deficit of {first.worm.label} in closed loop: {words.in_percent(first.deficit(0))} % on the first "
+        f"helix with the ranges as compiled and {words.in_percent(first_equal.deficit(0))} % with equal ones; over all "
+        f"springs, {words.in_percent(first.deficit())} % and {words.in_percent(first_equal.deficit())} %. In open "
+        f"loop, over all springs, equal ranges leave {_left(opened)}. So the ranges make "
+        f"{words.span(shares, PERCENT, 0)} % of the deficit of a contraction held by "
+        f"itself{', which is most of it' if min(shares) > 0.5 else ', and the rest has other causes'}.",
+        caption="How far segment 2 elongates less than segment 1, with the three length ranges as the engine of the "
+        "paper's time compiled them and with equal ones. Left: first helix (closed loop: peak to peak), the paper's "
+        f"reading; the line is the paper's {words.in_percent(PAPER_MIDDLE_DEFICIT, 1)} %. Right: mean of the six "
+        "springs. One run a point, closed loop 5 s, open loop one contraction of 0.8 s a segment.",
+        table=tabulated(loops, columns),
         remarks=[
             f"The ranges as compiled begin at {' / '.join(f'{value:g}' for value in low)} m and end at "
             f"{' / '.join(f'{value:g}' for value in high)} m for segments 1 / 2 / 3. A muscle's active force ends at a "

@@ -13,7 +13,7 @@ from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings, Number
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading
 from annelid_studies.riddle2023.words import CM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort
@@ -54,31 +54,25 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     shorten = words.listed(
         f"{below[one]} cm (bilateral: {below[both]} cm; {one.worm.label})" for one, both in bilateral.items()
     )
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "springs": lambda one: _SPRINGS[one.value],
+        "rhythm": lambda one: words.rhythm(one.rhythm),
+        "first helix, peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
+        "deficit (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit),
+        "mean of springs, longest above rest (cm)": lambda one: words.all_in_cm(reaches[one][1]),
+        "shortest below rest (cm)": lambda one: words.all_in_cm(-reaches[one][0]),
+        "median force (N)": lambda one: words.in_unit(one.force_N),
+    }
     return Findings(
-        answer=(
-            "With springs that only pull, these worms keep the order 1-2-3: "
-            f"{words.labels(one for one in pulling if one.walks)}; these do not: {words.listed(lost)}. The spring on "
-            f"the first helix of segment 1 then swings over {swings}. Segments shorten below their rest length by up "
-            f"to {shorten}."
-        ),
-        caption=(
-            f"Closed loop, 5 s, one run a group, {len(readings)} runs: from the shortest to the longest that each "
-            "segment becomes (mean of its six springs, against rest), and below each group its springs and rhythm. "
-            "Hatched: springs that only pull."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "springs": lambda one: _SPRINGS[one.value],
-                "rhythm": lambda one: words.rhythm(one.rhythm),
-                "first helix, peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
-                "deficit (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit),
-                "mean of springs, longest above rest (cm)": lambda one: words.all_in_cm(reaches[one][1]),
-                "shortest below rest (cm)": lambda one: words.all_in_cm(-reaches[one][0]),
-                "median force (N)": lambda one: words.in_unit(one.force_N),
-            },
-        ),
+        answer="With springs that only pull, these worms keep the order 1-2-3: "
+        f"{words.labels(one for one in pulling if one.walks)}; these do not: {words.listed(lost)}. The spring on the "
+        f"first helix of segment 1 then swings over {swings}. Segments shorten below their rest length by up to "
+        f"{shorten}.",
+        caption=f"Closed loop, 5 s, one run a group, {len(readings)} runs: from the shortest to the longest that each "
+        "segment becomes (mean of its six springs, against rest), and below each group its springs and rhythm. "
+        "Hatched: springs that only pull.",
+        table=tabulated(readings, columns),
         remarks=[f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else [],
         numbers=numbers,
     )

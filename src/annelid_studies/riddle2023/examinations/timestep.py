@@ -19,7 +19,7 @@ from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings, Number
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading, Worm
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, MS
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, chain, one_after_the_other
@@ -150,6 +150,16 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     speeds = [
         f"{words.in_unit(_speed(one))} times real time ({one.worm.label}, {one.value:g} ms)" for one in largest if one
     ]
+    columns: Columns = {
+        "worm and integrator": lambda one: one.worm.label,
+        "step, ms": lambda one: f"{one.value:g}",
+        "rhythm": lambda one: "flies apart" if _fate(one) == "flies apart" else words.rhythm(one.rhythm),
+        "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.NOTHING,
+        "first helix peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
+        "mean of six springs (cm)": lambda one: words.all_in_cm(one.walked_m),
+        "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
+        "times real time": lambda one: words.in_unit(_speed(one)),
+    }
     return Findings(
         answer=" ".join(
             [
@@ -158,25 +168,11 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
                 f"contraction the ring shortens, compared with that limit, {words.listed(early)}.",
             ]
         ),
-        caption=(
-            "Left: largest elongation of segment 1 (mean of its springs) in closed loop over the physics time step, "
-            f"one run a marker, {len(walks)} in all; a cross: the run does not walk 1-2-3. Right: ring of segment 1 "
-            f"over the first {MS * TRANSIENT_S:g} ms of its contraction in open loop, {sum(map(len, starts.values()))} "
-            "runs; the grey region cannot be reached by a muscle that has no force beyond its limit of velocity."
-        ),
-        table=tabulated(
-            walks,
-            {
-                "worm and integrator": lambda one: one.worm.label,
-                "step, ms": lambda one: f"{one.value:g}",
-                "rhythm": lambda one: "flies apart" if _fate(one) == "flies apart" else words.rhythm(one.rhythm),
-                "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.NOTHING,
-                "first helix peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
-                "mean of six springs (cm)": lambda one: words.all_in_cm(one.walked_m),
-                "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
-                "times real time": lambda one: words.in_unit(_speed(one)),
-            },
-        ),
+        caption="Left: largest elongation of segment 1 (mean of its springs) in closed loop over the physics time "
+        f"step, one run a marker, {len(walks)} in all; a cross: the run does not walk 1-2-3. Right: ring of segment 1 "
+        f"over the first {MS * TRANSIENT_S:g} ms of its contraction in open loop, {sum(map(len, starts.values()))} "
+        "runs; the grey region cannot be reached by a muscle that has no force beyond its limit of velocity.",
+        table=tabulated(walks, columns),
         remarks=[
             _settling_in_words(starts),
             f"At the largest step that walks, one core computes {words.listed(speeds)}, by the processor time of each "

@@ -4,28 +4,30 @@ The six-segment worm with muscles walks into a bend, and over rough ground, once
 time to build the model, the time of a physics step (planes are laid within it), contacts a step, the most contacts of
 one vertex, and the leak: how far the centre of a vertex, a strand's radius inside the skin, ever was outside.
 
-    python benchmarks/arena_contacts.py --seconds 4
+    python benchmarks/arena_contacts.py --seconds 4 --csv docs/results/arena_contacts.csv
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from pathlib import Path
 from time import perf_counter, process_time
 
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options, touching
+from annelid.arena.geoms import contact_options, touching
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.kinds.pipe import Pipe, add_pipe_panels
+from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind, RunConfig, load_config
+from annelid.output import write_csv
 from annelid.simulation.anatomy import Anatomy
-from annelid.simulation.assemble import build_controller
-from annelid.simulation.worm import Worm, WormPlant
+from annelid.simulation.stepping import build_controller
+from annelid.simulation.worm import WormPlant
 
 WORM = {
     "arena.friction": 0.7,
@@ -59,10 +61,8 @@ class StillGround(WormPlant):
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.delete(spec.geom("floor"))
         _add_contact_sensors(spec)
-        Worm.__init__(self, config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
+        super().__init__(config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
         self.ground = None
-        self.data = mujoco.MjData(self.model)
-        self._outputs = {name: getattr(self.data, name) for name in self.anatomy.outputs}
 
 
 def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
@@ -84,7 +84,7 @@ def panels(around: int) -> Ground:
 
     def add(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
         if isinstance(arena, Pipe):
-            add_pipe_panels(spec, arena, length_m, around)
+            arena.add_panels(spec, length_m, around)
         else:
             arena.add_panels(spec, length_m)
 
@@ -114,8 +114,8 @@ def mesh_field(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
     spec.worldbody.add_geom(name="wall", **geom)
 
 
-def measure(name: str, config: RunConfig, ground: Ground | None, n_moves: int) -> None:
-    """Walks and prints a line."""
+def measure(name: str, config: RunConfig, ground: Ground | None, n_moves: int) -> dict[str, object]:
+    """Walks, prints a line and returns its numbers."""
     assert config.arena is not None
     assert isinstance(config.body, WormBody)
     began = perf_counter()
@@ -146,6 +146,16 @@ def measure(name: str, config: RunConfig, ground: Ground | None, n_moves: int) -
         f"{name:34s} {built:6.1f} s {1e3 * spent / n_moves:8.2f} ms {np.mean(contacts):8.1f} {most:4d}"
         f" {1e3 * leak:8.2f} mm {100 * strain:7.2f} % {100 * travel:7.1f} cm"
     )
+    return {
+        "candidate": name,
+        "build_s": built,
+        "step_ms": 1e3 * spent / n_moves,
+        "contacts": np.mean(contacts),
+        "most": most,
+        "leak_mm": 1e3 * leak,
+        "edge_strain": strain,
+        "travel_m": travel,
+    }
 
 
 def _is_skin(model: mujoco.MjModel) -> np.ndarray:
@@ -160,7 +170,9 @@ def main() -> None:
     """Measures all candidates."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=4.0, help="simulated time of each candidate")
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--csv", type=Path, help="file for the numbers")
+    given = parser.parse_args()
+    seconds, rows = given.seconds, []
     heads = ("build", 8), ("step", 11), ("contacts", 8), ("most", 4), ("leak", 11), ("strain", 9), ("travel", 10)
     print(f"{'candidate':34s}", *(f"{word:>{width}s}" for word, width in heads))
     for name, worm in (("10 ms, soft", WORM | SOFT), ("5 ms, hard", WORM | HARD)):
@@ -168,13 +180,14 @@ def main() -> None:
         bend = load_config("riddle2025", worm | {"arena.straight_m": 0.0}, arena="pipe.bend")
         rough = load_config("riddle2025", worm | {"arena.start_m": 0.0}, arena="rough")
         moves = round(seconds / bend.clock.physics_timestep_s)
-        measure(f"{name}: level floor, one plane", level, None, moves)
-        measure(f"{name}: bend, moving planes", bend, None, moves)
-        measure(f"{name}: rough, moving planes", rough, None, moves)
-    for around in (16, 32, 64):
-        measure(f"{name}: bend, {around} panels around", bend, panels(around), moves)
-    measure(f"{name}: rough, height field of 2 cm", rough, panels(0), moves)
-    measure(f"{name}: bend, mesh, {SDF_STEPS} steps only", bend, mesh_field, SDF_STEPS)
+        rows.append(measure(f"{name}: level floor, one plane", level, None, moves))
+        rows.append(measure(f"{name}: bend, moving planes", bend, None, moves))
+        rows.append(measure(f"{name}: rough, moving planes", rough, None, moves))
+    rows += [measure(f"{name}: bend, {n} panels around", bend, panels(n), moves) for n in (16, 32, 64)]
+    rows.append(measure(f"{name}: rough, height field of 2 cm", rough, panels(0), moves))
+    rows.append(measure(f"{name}: bend, mesh, {SDF_STEPS} steps only", bend, mesh_field, SDF_STEPS))
+    if given.csv:
+        write_csv(given.csv, rows[0], (row.values() for row in rows))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Where the muscles' work goes, over the time step, and whether the books close.
+"""Where the muscles' work goes, over the time step, and whether the totals close.
 
 The numerical loss stands twice: as what is left of the muscles' work when all else is subtracted, which is what a run
 tells, and from the matrices with which the engine's integrator takes springs and dampers. The residual is the
@@ -6,12 +6,14 @@ difference, over the muscles' work.
 
     python benchmarks/energy_balance.py
     python benchmarks/energy_balance.py --presets riddle2025 --steps-ms 10 5 2 1 --seconds 4
+    python benchmarks/energy_balance.py --seconds 2 --csv docs/results/energy_balance.csv
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -22,8 +24,8 @@ from rich.table import Table
 
 from annelid.config import RunConfig, load_config
 from annelid.morphology import Array
+from annelid.output import write_csv
 from annelid.simulation import build_controller
-from annelid.simulation.energies import Engine
 from annelid.simulation.worm import WormPlant
 
 HELD = ("kinetic_energy", "elastic_energy", "potential_energy")
@@ -43,9 +45,9 @@ class AuditedWorm(WormPlant):
         self.integrator_J = self.spring_J = 0.0
         self._slides = self.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
 
-    def book(self, engine: Engine, drive: Array) -> None:
-        """Enters a step in the books and audits it."""
-        super().book(engine, drive)
+    def add_step(self, drive: Array) -> None:
+        """Adds a step to the energy totals and audits it."""
+        super().add_step(drive)
         data, h = self.data, float(self.model.opt.timestep)
         inertial = np.zeros(self.model.nv)
         mujoco.mj_mulM(self.model, data, inertial, data.qacc)
@@ -111,10 +113,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--presets", nargs="+", default=["riddle2025", "riddle2025-muscles", "riddle2023-rods"])
     parser.add_argument("--steps-ms", nargs="+", type=float, default=[10.0, 5.0, 2.0, 1.0])
     parser.add_argument("--seconds", type=float, default=4.0)
+    parser.add_argument("--csv", type=Path, help="file for the numbers")
     given = parser.parse_args(arguments)
     table = Table(
         "preset", "step", "work", "held", "slip", "contacts, edges", "damping", "left", "integrator", "residual"
     )
+    rows = []
     try:
         with Progress(transient=True) as progress:
             for preset in given.presets:
@@ -123,9 +127,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
                     books = balance(load_config(preset, changes), progress)
                     cells = [f"{books[name]:.3f} J" for name in list(books)[:-2]]
                     share = f"{books['integrator']:.3f} J ({100 * books['integrator'] / books['work']:.1f} %)"
+                    rows.append({"case": f"{preset} {step_ms:g} ms", "preset": preset, "step_ms": step_ms, **books})
                     table.add_row(preset, f"{step_ms:g} ms", *cells, share, f"{100 * books['residual']:.4f} %")
     finally:
         Console(width=160).print(table)
+    if given.csv:
+        write_csv(given.csv, rows[0], (row.values() for row in rows))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
     python benchmarks/environments.py throughput [worms] [steps] [rounds]
     python benchmarks/environments.py share [worms] [steps]
-    python benchmarks/environments.py fidelity
+    python benchmarks/environments.py fidelity [docs/results/environments.csv]
 
 The first compares one and two threads in turn within one process and gives the ratio of every round: absolute figures
 differ between machines and hours, so run it where nothing else computes. The second tells how much of a thread's CPU
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from time import perf_counter, process_time, thread_time
 from typing import Any
 
@@ -22,6 +23,7 @@ import numpy as np
 
 import annelid.environments  # noqa: F401 -- registers them
 from annelid.environments.single import INTERVAL_S
+from annelid.output import write_csv
 
 FIDELITIES = (("preset's own", None, {}), ("fast", "fast", {}), ("coarse", "coarse", {}), ("preview", "preview", {}))
 COARSER = ("coarse, 40 ms", "coarse", {"clock.physics_timestep_s": 0.04})
@@ -104,23 +106,29 @@ def wave_speed(env_id: str, **options: object) -> tuple[float, float, str]:
     return info["travel"] / info["time_s"], seconds / info["time_s"], word
 
 
-def fidelity() -> None:
-    """Prints what worms of different resolution do under the same wave."""
+def fidelity(path: str = "") -> None:
+    """Prints what worms of different resolution do under the same wave, and writes it as CSV where a path is given."""
+    rows: dict[str, dict[str, object]] = {}
     print(f"{'':32}{'body lengths/s':>15}{'CPU s per s':>13}")
     for name, level, changes in (*FIDELITIES, COARSER):
         speed, cost, word = wave_speed("annelid/Worm-v0", fidelity=level, changes=changes)
         print(f"{'open ground, ' + name:32}{speed:15.3f}{cost:13.3f}  {word}", flush=True)
+        rows[name] = {"worm": name, "open": speed, "cpu_s_per_s": cost}
     for name, level, changes in FIDELITIES[:3]:
         for arena in ("pipe.taper", "pipe.bend"):
             options = {"arena": arena, "changes": {"arena.radius": 0.8, **changes}, "episode_s": 30.0}
             speed, cost, word = wave_speed("annelid/WormPipe-v0", fidelity=level, **options)
             print(f"{arena + ', ' + name:32}{speed:15.3f}{cost:13.3f}  {word}", flush=True)
+            rows[name][arena] = speed
+    if path:
+        columns = ["worm", "open", "pipe.bend", "pipe.taper", "cpu_s_per_s"]
+        write_csv(Path(path), columns, ([row.get(column) for column in columns] for row in rows.values()))
 
 
 if __name__ == "__main__":
     what, *numbers = sys.argv[1:] or ["throughput"]
     if what == "fidelity":
-        fidelity()
+        fidelity(*numbers)
     elif what == "share":
         share(*map(int, [*numbers, *("8", "15")[len(numbers) :]]))
     else:

@@ -50,7 +50,7 @@ def main(preset: str = "riddle2023-rods", seconds: float = 15.0) -> None:
             page.goto(show.address)
             page.wait_for_selector("text=Nervous system", timeout=60_000)
             sleep(WARM_UP_S)
-            size = show.picture.strands.nbytes
+            size = show.stage.picture.strands.nbytes
 
             def reading() -> tuple[float, float, int, float, float]:
                 uploads = page.evaluate(f"window.uploads[{size}] || 0")

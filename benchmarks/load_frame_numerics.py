@@ -12,11 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import load_config
-from annelid.experiment.calibration.fit import places
-from annelid.experiment.calibration.frame import load_frame
-from annelid.experiment.calibration.loop import cable_force, read_loop
-from annelid.experiment.calibration.report import EQUAL_STIFFNESS
+from annelid.experiment.calibration import EQUAL_STIFFNESS, places
 from annelid.experiment.case import SHEAR_OVER_YOUNG
+from annelid.experiment.load_frame import cable_force, load_frame, read_loop
 
 YOUNG_MODULUS_PA, DRY_FRICTION_NM, CABLE_FRICTION = 0.437e9, 0.0083, 2.15
 """About those of the default fit."""

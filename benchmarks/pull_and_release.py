@@ -22,10 +22,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.body.damping import MaterialDamping, add_damper_rows
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.worm import Strands
-from annelid.simulation.damping import MaterialDamping, add_damper_rows
 
 Path = NDArray[np.float64]
 DAMPING_S = 0.005

@@ -1,19 +1,24 @@
 """The paper's network and the robust one under sensor signals that do not come from a body, from random states.
 
 Prints the two tables of docs/robust.md: how often the paper's network shows one wave 1-2-..-N all the same, and the
-robust network's periods relative to design. Run ``python benchmarks/robust_network.py``; it takes about two minutes.
+robust network's periods relative to design. Takes about two minutes.
+
+    python benchmarks/robust_network.py --csv docs/results/robust_network.csv
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.analysis.score import DESIGN_INTERVAL_S, RhythmScore, score
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S, RhythmScore, score
 from annelid.nervous import Network, peristalsis_network
 from annelid.nervous.robust import robust_network
+from annelid.output import write_csv
 
 SENSOR_NA = 20.0
 HALF_RANGE_MV = 10.0
@@ -83,26 +88,43 @@ def relative_period(found: RhythmScore, n_segments: int) -> float:
     return np.nan if found.period_s is None else found.period_s / (n_segments * DESIGN_INTERVAL_S)
 
 
-def show(title: str, network_of: Callable[[int], Network], sizes: tuple[int, ...], n_copies: int) -> None:
-    """Prints, for every signal and size, how many copies are a wave, and in time, and the periods of those that are."""
+def show(
+    title: str, network_of: Callable[[int], Network], sizes: tuple[int, ...], n_copies: int
+) -> list[dict[str, object]]:
+    """Prints and returns, for every signal and size, how many copies are a wave, and in time, and their periods."""
     print(f"{title}, {n_copies} copies: waves 1-2-..-N, of those within 10 % of design, periods over design")
+    rows = []
     for name in signals(1, 1, np.random.default_rng(0)):
+        row: dict[str, object] = {"signal": name, "network": title, "copies": n_copies}
         for n in sizes:
             signal = signals(n_copies, n, np.random.default_rng(n))[name]
             found = scores(network_of(n), n, signal, n_copies, seed=n + 1)
             periods = np.array([relative_period(one, n) for one in found if one.is_one_wave])
             in_time = int((np.abs(periods - 1.0) <= IN_TIME).sum())
             silent = sum(one.verdict == "silent" for one in found)
-            reach = f"{periods.min():.3f} .. {periods.max():.3f}" if len(periods) else ""
-            print(f"  {name:17} N = {n:2}  waves {len(periods):3}  in time {in_time:3}  silent {silent:3}  {reach}")
+            reach = (periods.min(), periods.max()) if len(periods) else (np.nan, np.nan)
+            print(
+                f"  {name:17} N = {n:2}  waves {len(periods):3}  in time {in_time:3}  silent {silent:3}"
+                f"  {reach[0]:.3f} .. {reach[1]:.3f}"
+            )
+            counts = {"waves": len(periods), "in_time": in_time, "silent": silent, "least": reach[0], "most": reach[1]}
+            row |= {f"{what}_{n}": value for what, value in counts.items()}
+        rows.append(row)
+    return rows
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--csv", type=Path, help="file for the numbers")
+    path = parser.parse_args().csv
     for n in (3, 6):
         [alone] = scores(robust_network(n), n, lambda _, n=n: np.zeros((1, n)))
         print(f"robust network without sensor signals, N = {n}: {alone.period_s:.3f} s, design {n * DESIGN_INTERVAL_S}")
-    show("the paper's network", peristalsis_network, (3, 6, 12), 64)
-    show("the robust network", robust_network, (3, 4, 6, 12), 32)
+    papers = show("the paper's network", peristalsis_network, (3, 6, 12), 64)
+    robust = show("the robust network", robust_network, (3, 4, 6, 12), 32)
+    if path:
+        columns = list(dict.fromkeys([*robust[0], *papers[0]]))
+        write_csv(path, columns, ([row.get(name) for name in columns] for row in (*papers, *robust)))
 
 
 if __name__ == "__main__":

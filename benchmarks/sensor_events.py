@@ -2,23 +2,28 @@
 
 Prints, for the paper's robot with rigid crossings, every switch of a stretch sensor and every contraction with the
 segments' lengthening, mm: as the preset is, with small and large tolerances, with stiff strands, and without the
-damping across the bend (docs/robust.md). Run ``python benchmarks/sensor_events.py``; it takes about two minutes.
-With ``--windows`` it measures, under a timed wave, what `annelid.plausibility.tolerance_window_m` estimates: how far
-neighbours lift a segment at rest, and the length at which the releasing and the next segment are equally long.
+damping across the bend (docs/robust.md). Takes about two minutes. With ``--windows`` it measures, under a timed wave,
+what `annelid.plausibility.tolerance_window_m` estimates: how far neighbours lift a segment at rest, and the length at
+which the releasing and the next segment are equally long.
+
+    python benchmarks/sensor_events.py
+    python benchmarks/sensor_events.py --windows --csv docs/results/tolerance_windows.csv
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from annelid import Run, load_config, simulate
 from annelid.analysis import rhythm_score
-from annelid.analysis.score import DESIGN_INTERVAL_S
+from annelid.analysis.rhythm import DESIGN_INTERVAL_S
 from annelid.experiment.case import SHEAR_OVER_YOUNG
+from annelid.output import write_csv
 from annelid.plausibility import tolerance_window_m
 from annelid_studies.robustness import TIMED
 from annelid_studies.worms import PAPERS_MESH
@@ -93,7 +98,8 @@ def window_mm(run: Run) -> tuple[float, float]:
     return max(lifts), min(passings)
 
 
-def print_windows() -> None:
+def print_windows(path: Path | None) -> None:
+    rows = []
     for modulus, friction, damping in WINDOWS:
         settings = {
             "body.mesh.elements_per_side": 2,
@@ -114,11 +120,19 @@ def print_windows() -> None:
             f"estimated {1e3 * estimated[0]:5.1f} to {1e3 * estimated[1]:5.1f} mm",
             flush=True,
         )
+        rows.append([modulus, friction, damping, *measured, *(1e3 * edge for edge in estimated)])
+    if path:
+        heads = ["modulus_GPa", "friction", "damping_time_s", "lift_mm", "passing_mm", "lower_mm", "upper_mm"]
+        write_csv(path, heads, rows)
 
 
 def main() -> None:
-    if "--windows" in sys.argv[1:]:
-        print_windows()
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--windows", action="store_true", help="measure windows of the tolerance")
+    parser.add_argument("--csv", type=Path, help="file for these")
+    given = parser.parse_args()
+    if given.windows:
+        print_windows(given.csv)
         return
     for name, changes in CASES.items():
         settings = {"clock.physics_timestep_s": 0.005, "duration_s": DURATION_S, "record.signals_interval_s": 0.005}

@@ -34,7 +34,7 @@ def main() -> None:
         pull, every = np.eye(plant.n_muscles)[0], plant.steps_to_move()
         spent.clear()
         began = process_time()
-        with patch.object(Skin, "felt", timed):
+        with patch.object(Skin, "touch", timed):
             for _ in range(MOVEMENTS):
                 plant.stride(pull, every)
         whole = (process_time() - began) / MOVEMENTS

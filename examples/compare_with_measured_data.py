@@ -15,8 +15,7 @@ import numpy as np
 
 from annelid import load_config
 from annelid.draw.canvas import canvas, save
-from annelid.experiment.calibration.frame import load_frame
-from annelid.experiment.calibration.loop import Loop, read_loop
+from annelid.experiment.load_frame import Loop, load_frame, read_loop
 
 WORM = {"body.mesh.n_segments": 3}
 

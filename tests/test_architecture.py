@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "morphology": set(),
     "plausibility": {"config", "morphology", "body"} | BASE,
     "nervous": {"errors", "text", "textfiles"},
-    "config": {"errors", "lazy", "text", "textfiles", "registry"},
+    "config": {"errors", "text", "textfiles", "registry"},
     "references": {"config"},
     "arena": {"config"} | BASE,
     "body": {"config", "morphology", "arena", "engine"} | BASE,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -15,32 +17,94 @@ from annelid.errors import ConfigError
 from annelid.planar.sections import PlanarWorm
 
 
-def leaves(tree: dict[str, Any], prefix: str = "") -> set[str]:
-    found: set[str] = set()
+def leaves(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
     for key, value in tree.items():
-        found |= leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}"}
+        found |= leaves(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return found
+
+
+def own_text(name: str) -> str:
+    return (resources.files("annelid") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def notes(text: str) -> dict[str, str]:
+    """The comment of every field, by its path."""
+    found, section = {}, ""
+    for line in text.splitlines():
+        if line.startswith("["):
+            section = line.strip("[]") + "."
+        elif line and not line.startswith("#"):
+            setting, _, note = line.partition("#")
+            found[section + setting.split(" = ")[0]] = note.strip()
     return found
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_a_preset_states_every_field_that_its_worm_has(name: str) -> None:
+def test_a_preset_or_its_ancestors_state_every_field_that_its_worm_has_with_its_source(name: str) -> None:
     """No default hides behind a preset: what `annelid presets NAME` prints is the whole truth."""
-    stated = leaves(tomllib.loads(preset_text(name)))
+    text = preset_text(name)
     config = load_config(name)
-    existing = leaves(config.model_dump(exclude_none=True))
-    optional = {"body.springs.rest_length_m"}
-    planar = {path for path in existing if path.startswith("guard.")} if isinstance(config.body, PlanarWorm) else set()
-    assert existing - stated - optional - planar == set()
+    stated = {path for path, value in leaves(tomllib.loads(text)).items() if value != "none"}
+    assert stated == set(leaves(config.model_dump(exclude_none=True)))
+    sources = notes(text)
+    unsourced = {path for path, note in sources.items() if note.rpartition(": ")[2] in ("", "default")}
+    planar = {path for path in sources if path.startswith("guard.")} if isinstance(config.body, PlanarWorm) else set()
+    assert unsourced == {"name", "summary"} | planar
+    origins = {note.partition(": ")[0] for note in sources.values()} & set(preset_names())
+    assert all(f"# Inherited from {origin}:" in text for origin in origins)
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_every_line_of_a_preset_s_physics_names_its_source_or_reason(name: str) -> None:
-    section = ""
-    for line in preset_text(name).splitlines():
-        if line.startswith("["):
-            section = line
-        elif "=" in line and section in ("[body.mesh]", "[body.strands]", "[body.rings]", "[controller]"):
-            assert "#" in line, f"{section} {line}"
+def test_a_preset_states_nothing_that_it_inherits(name: str) -> None:
+    """But for a value that has another source: then it is the same by chance."""
+    own = tomllib.loads(own_text(name))
+    if "extends" not in own:
+        assert name in ("riddle2023", "riddle2022-planar")
+        return
+    base = preset_text(own.pop("extends"))
+    inherited, base_notes, own_notes = leaves(tomllib.loads(base)), notes(base), notes(own_text(name))
+    stated = leaves(own)
+    renewed = tuple(
+        path.removesuffix("kind") for path in stated if path.endswith("kind") and stated[path] != inherited.get(path)
+    )
+    again = [path for path in stated if path in inherited and not path.startswith(renewed)]
+    again = [path for path in again if stated[path] == inherited[path]]
+    assert [p for p in again if marks(own_notes[p]) == marks(base_notes[p])] == []
+
+
+def marks(note: str) -> list[str]:
+    return re.findall(r"\[[^]]+\]", note)
+
+
+def test_the_whole_of_a_file_of_the_user_s_names_what_is_inherited(tmp_path: Path) -> None:
+    base, mine, whole = (tmp_path / f"{name}.toml" for name in ("base", "mine", "whole"))
+    base.write_text('extends = "riddle2023-rods"\n[arena]\nfriction = 0.3\n', encoding="utf-8")
+    mine.write_text(
+        f'extends = "{base.as_posix()}"\n[body.formulation]\nkind = "chain"\n[controller]\nkind = "program"\n'
+        "contractions = [{ segment = 1, start_s = 0.0, stop_s = 0.6 }]\n",
+        encoding="utf-8",
+    )
+    text = preset_text(mine)
+    whole.write_text(text, encoding="utf-8")
+    assert load_config(whole) == load_config(mine)
+    found = notes(text)
+    assert found["arena.friction"] == "'base.toml'"
+    assert found["sensor.tolerance_m"].startswith("riddle2023-rods: [M]")
+    assert (found["controller.kind"], found["controller.ramp_s"]) == ("", "default")
+    # Of the other kind of formulation, which its ancestors have.
+    assert found["body.formulation.integrator"] == "default"
+    assert "body.formulation.edge_time_constant_s" not in found
+    mine.write_text("friction = 1", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"did you mean 'arena\.friction'"):
+        preset_text(mine)
+
+
+def test_published_numbers_are_named_not_found_by_a_path() -> None:
+    for name in ("../data/riddle2023.json", "riddle2023.toml", "", "riddle2023-rods"):
+        with pytest.raises(ConfigError, match=r"published = .*: must be one of riddle2022, riddle2023, wang"):
+            load_config("crawler", {"published": name})
+    assert load_config("riddle2023", {"published": "none"}).published is None
 
 
 @pytest.mark.parametrize("name", preset_names())

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from annelid import Network
 from annelid.config import load_config, parse_assignments, preset_names
 from annelid.errors import UnreadableText
-from annelid.experiment.case import run_command
+from annelid.experiment.case import Case
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
 from annelid.textfiles import MOST_LEVELS, _has_long_key, nested, parse_json, parse_toml, toml_text, toml_value
@@ -112,7 +112,7 @@ def test_a_command_line_says_what_was_changed() -> None:
         "arena.friction": 1000.0,
         "body.rings": {"kind": "servo", "force_limit_N": [1.0, 2.5]},
     }
-    words = shlex.split(run_command("crawler", changes))
+    words = shlex.split(Case("crawler", changes).command)
     assert parse_assignments(words[4::2]) == changes
     assert words[3::2] == ["--set"] * 3
 

@@ -21,7 +21,7 @@ Every field of a configuration. Its path is the section's and its name, as `--se
 and `annelid.load_config(preset, {"body.mesh.radius_m": 0.14})` take it. The unit at the end of a name may be left out
 (`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
 
-The defaults are those of the models. A preset states every field, so its own values stand in their place:
+The defaults are those of the models. A preset, with those that it extends, states every field; its values are others:
 `annelid presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
 fields it has, and a section whose kind changes starts from that kind's defaults.
 """

@@ -29,7 +29,7 @@ INTRODUCTION = """# The run file
 
 `run.nc` is netCDF-4. `annelid.open_run(path)` opens it, cut to what was written and with its configuration; any
 program that reads netCDF opens it too. [How to read a run](../how_to/read_a_run.md) shows both;
-[Architecture](../architecture.md#the-run-file) says at which instant each value is taken.
+[Data out](../data_out.md#the-run-file) says at which instant each value is taken.
 
 Every variable carries `units` and `long_name`, from which these tables are made. Signals are recorded every
 `record.signals_interval_s` at the times `time` (s), whole postures every `record.frames_interval_s` at `frame_time`

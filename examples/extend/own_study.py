@@ -26,9 +26,10 @@ def slippery(
 ) -> None:
     """Find out how far the first segment elongates on slippery ground."""
     cases = {value: Case("riddle2023-fast", {"arena.friction": value, "duration_s": 1.0}) for value in (1.0, friction)}
-    outcomes = Store(output / "runs").compute(cases.values())
-    for value, outcome in zip(cases, outcomes.values(), strict=True):
-        typer.echo(f"friction {value:g}: {100 * outcome.summary.elongation_mean_max_m[0]:.2f} cm")
+    store = Store(output / "runs")
+    store.compute(cases.values())
+    for value, case in cases.items():
+        typer.echo(f"friction {value:g}: {100 * store[case].summary.elongation_mean_max_m[0]:.2f} cm")
 
 
 if __name__ == "__main__":

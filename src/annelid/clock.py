@@ -10,12 +10,7 @@ SLACK_S = 5e-7
 
 @dataclass(frozen=True, slots=True)
 class StepRatio:
-    """How many physics steps fall due at each control step.
-
-    Attributes:
-        control_timestep_s: Step of the controller, s.
-        physics_timestep_s: Step of the body, s; one of the two is an integer multiple of the other.
-    """
+    """How many physics steps fall due at each control step; one step is an integer multiple of the other."""
 
     control_timestep_s: float
     physics_timestep_s: float
@@ -28,8 +23,7 @@ class StepRatio:
     def physics_steps_due(self, control_step: int) -> int:
         """Number of physics steps that control step ``control_step`` (counted from 1) completes.
 
-        With a finer physics it is the same number each time. With a coarser one it is 1 whenever
-        the control clock reaches the end of a physics step, else 0.
+        With a finer physics it is the same each time, with a coarser one 1 at the end of a physics step, else 0.
         """
         if self.control_timestep_s >= self.physics_timestep_s:
             return round(self.control_timestep_s / self.physics_timestep_s)

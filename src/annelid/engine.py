@@ -10,13 +10,13 @@ REMEDY = "pip uninstall -y mujoco mujoco-core; pip install 'mujoco-core[renderin
 
 
 def mixed_engine() -> str | None:
-    """Tells whether the packages mujoco and mujoco-core are installed over each other, as pip allows; None if not."""
+    """Says how mujoco and mujoco-core are installed over each other, as pip allows; None if they are not."""
     try:
         core, other = distribution("mujoco-core"), distribution("mujoco")
     except PackageNotFoundError:
         return None
-    theirs = _files(other)
-    differ = sorted(path for path, mark in _files(core).items() if theirs.get(path, mark) != mark)
+    theirs = _hashes(other)
+    differ = sorted(path for path, mark in _hashes(core).items() if theirs.get(path, mark) != mark)
     if not differ:
         return None
     return (
@@ -26,17 +26,13 @@ def mixed_engine() -> str | None:
 
 
 def refuse_mixed_engine() -> None:
-    """Refuses an engine of two versions.
-
-    Raises:
-        MixedEngine: Two are installed over each other; the sentence has the line that repairs it.
-    """
+    """Raises `MixedEngine`, with the line that repairs it, where two engines are installed over each other."""
     if mixed := mixed_engine():
         raise MixedEngine(f"{mixed}; repair it with: {REMEDY}")
 
 
-def _files(installed: Distribution) -> dict[str, str]:
-    """Where a distribution puts the files of the engine, and the mark of each one's content."""
+def _hashes(installed: Distribution) -> dict[str, str]:
+    """Hash of each of the engine's files in a distribution, by the path where it is installed."""
     files = installed.files or ()
     return {
         str(installed.locate_file(file)): file.hash.value for file in files if file.parts[0] == "mujoco" and file.hash

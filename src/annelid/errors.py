@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from math import isfinite
 from numbers import Real
+from typing import Any
 
 from annelid.text import printable
 
@@ -82,34 +83,32 @@ def require_positive(**values: float) -> None:
     Raises:
         ConfigError: Of the first such value.
     """
-    for name, value in values.items():
-        if not value > 0:
-            raise ConfigError(f"{name} must be positive, not {value}")
+    _require("positive", lambda value: value > 0, values)
 
 
 def require_negative(**values: float) -> None:
     """Refuses values that are not negative, as `require_positive` does those that are not positive."""
-    for name, value in values.items():
-        if not value < 0:
-            raise ConfigError(f"{name} must be negative, not {value}")
+    _require("negative", lambda value: value < 0, values)
 
 
 def require_at_least(least: float, **values: float) -> None:
     """Refuses values below the least one, as `require_positive` does those that are not positive."""
-    for name, value in values.items():
-        if not value >= least:
-            raise ConfigError(f"{name} must be at least {least:g}, not {value}")
+    _require(f"at least {least:g}", lambda value: value >= least, values)
 
 
 def require_finite(**values: object) -> None:
     """Refuses numbers that are infinite or not a number, as `require_positive` does those that are not positive."""
+    _require("a finite number", lambda value: not isinstance(value, Real) or isfinite(value), values)
+
+
+def _require(what: str, is_met: Callable[[Any], bool], values: Mapping[str, object]) -> None:
     for name, value in values.items():
-        if isinstance(value, Real) and not isfinite(value):
-            raise ConfigError(f"{name} must be a finite number, not {shown(value)}")
+        if not is_met(value):
+            raise ConfigError(f"{name} must be {what}, not {shown(value)}")
 
 
 def shortened(text: str, most: int = MOST_SHOWN) -> str:
-    """Returns a text as an error sentence can hold it: its beginning and its end where it is long."""
+    """Returns a text as it fits into an error sentence: its beginning and its end where it is long."""
     return text if len(text) <= most else f"{text[: most // 2]} .. {text[-most // 4 :]}"
 
 
@@ -142,7 +141,7 @@ def suggest(name: str, valid: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Joins names by commas, as many as an error sentence can hold."""
+    """Joins names by commas, as many as fit into an error sentence."""
     every = list(names)
     words, length = [], 0
     for name in map(shortened, every):

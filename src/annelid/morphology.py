@@ -1,6 +1,6 @@
 """Geometry of the helical mesh: strands, crossings, rhombi, rings and springs, as numpy arrays.
 
-Numbers only: no engine, no configuration. The body axis is x, whichever way a worm leads at the start; lengths are in
+Numbers only: no engine, no configuration. The body axis is x, however a worm leads at the start; lengths are in
 metres, angles in radians.
 
 A strand turns at the rate ``w`` (rad/m) about the axis. Clockwise strand ``i`` lies at the angle
@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import asin, cos, floor, hypot, pi, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,7 @@ Indices = NDArray[np.int64]
 
 
 def heading_turn(heading_deg: float) -> Array:
-    """Returns the rotation of a worm that leads towards -x to one of another heading, ``(3, 3)``.
-
-    Args:
-        heading_deg: Angle about the vertical, positive to the worm's left; exact for quarter turns.
-    """
+    """Returns the rotation, ``(3, 3)``, by an angle to the left about the vertical, exact for quarter turns."""
     quarter, rest = divmod(heading_deg, 90.0)
     c, s = cos(radians(rest)), sin(radians(rest))
     c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
@@ -50,16 +47,16 @@ class MeshGeometry:
         radius_m: Radius of the tube.
         angular_rate_rad_per_m: Turn of a strand per metre of body.
         vertices_m: Points of every strand, shape ``(n_strands, n_vertices, 3)``, front to back.
-        crossing_vertex: Index along the strand of each plane's crossing, shape ``(n_planes,)``; the same
-            for every strand.
+        crossing_vertex: Index along the strand of each plane's crossing, shape ``(n_planes,)``; the same for every
+            strand.
         crossing_strands: The clockwise and the counter-clockwise strand of each crossing, ``(n_crossings, 2)``.
         plane_x_m: Position of each crossing plane, shape ``(n_planes,)``.
         ring_planes: Plane of each segment's ring, shape ``(n_segments,)``.
-        rings: Crossings round each ring in order of angle, shape ``(n_segments, n_per_plane)``; closed by
-            returning to the first.
+        rings: Crossings round each ring in order of angle, shape ``(n_segments, n_per_plane)``; closed by returning to
+            the first.
         springs: Front and rear crossing of every axial spring, shape ``(n_springs, 2)``, bay by bay.
-        sensor_springs: The springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the
-            first of each starts on clockwise strand 0, "the first helix".
+        sensor_springs: The springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the first of
+            each starts on clockwise strand 0, "the first helix".
         rhombi: Front, left, rear and right crossing of every complete rhombus, shape ``(n_rhombi, 4)``.
     """
 
@@ -80,11 +77,6 @@ class MeshGeometry:
     def n_strands(self) -> int:
         """Number of strands (helices)."""
         return self.vertices_m.shape[0]
-
-    @property
-    def n_planes(self) -> int:
-        """Number of crossing planes."""
-        return self.plane_x_m.shape[0]
 
     @property
     def n_per_plane(self) -> int:
@@ -129,23 +121,14 @@ class MeshGeometry:
         return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).sum(axis=1)
 
 
-@dataclass(frozen=True, slots=True)
-class Rhombus:
-    """One rhombus of the mesh at rest, in closed form: two crossings of a ring, and the two of an axial spring.
+class Rhombus(NamedTuple):
+    """One rhombus of the mesh at rest, in closed form: two crossings of a ring, and the two of an axial spring."""
 
-    Attributes:
-        n_per_plane: Rhombi round the body, as many as crossings of a ring.
-        across_m: Distance of neighbouring crossings of a ring.
-        along_m: Distance of the crossings that an axial spring joins, two planes apart.
-        side_m: Length of a strand from one crossing to the next, along its straight elements.
-        bend_rad: Angle by which a strand turns about the body axis in one element.
-    """
-
-    n_per_plane: int
-    across_m: float
-    along_m: float
-    side_m: float
-    bend_rad: float
+    n_per_plane: int  # rhombi round the body, as many as crossings of a ring
+    across_m: float  # distance of neighbouring crossings of a ring
+    along_m: float  # distance of the crossings that an axial spring joins, two planes apart
+    side_m: float  # length of a strand from one crossing to the next, along its straight elements
+    bend_rad: float  # angle by which a strand turns about the body axis in one element
 
     @property
     def ring_length_m(self) -> float:
@@ -168,13 +151,8 @@ def rhombus(n_helices: int, radius_m: float, angular_rate_rad_per_m: float, elem
     half = n_helices // 2
     spacing, turn = pi / half / angular_rate_rad_per_m, pi / half
     element = hypot(spacing / elements_per_side, 2.0 * radius_m * sin(turn / elements_per_side / 2.0))
-    return Rhombus(
-        n_per_plane=half,
-        across_m=2.0 * radius_m * sin(turn),
-        along_m=2.0 * spacing,
-        side_m=elements_per_side * element,
-        bend_rad=turn / elements_per_side,
-    )
+    across = 2.0 * radius_m * sin(turn)
+    return Rhombus(half, across, 2.0 * spacing, elements_per_side * element, turn / elements_per_side)
 
 
 def helical_mesh(
@@ -201,81 +179,50 @@ def helical_mesh(
         planes_between_rings: Crossing planes from one ring to the next, at least 2.
         free_planes_at_ends: Crossing planes before the first and after the last ring, at least 1.
         rear_overhang_m: Free strand behind the last plane; by default half a plane spacing, as in front.
-
-    Returns:
-        The geometry at rest.
-
-    Raises:
-        ValueError: An argument is outside its range; the sentence names it.
     """
     ends = elements_per_side if elements_per_end is None else elements_per_end
-    _check(n_segments, n_helices, radius_m, angular_rate_rad_per_m, elements_per_side, ends)
-    if planes_between_rings < 2 or free_planes_at_ends < 1:
-        raise ValueError(
-            f"planes_between_rings = {planes_between_rings} must be at least 2 and "
-            f"free_planes_at_ends = {free_planes_at_ends} at least 1"
-        )
     half = n_helices // 2
     step = 2 * pi / half
     spacing = step / (2 * angular_rate_rad_per_m)
     overhang = spacing / 2 if rear_overhang_m is None else rear_overhang_m
-    if not overhang > 0:
-        raise ValueError(f"rear_overhang_m = {overhang} must be positive")
-
     n_planes = 2 * free_planes_at_ends + (n_segments - 1) * planes_between_rings + 1
     plane_x: Array = spacing * (0.5 + np.arange(n_planes, dtype=np.float64))
     ring_planes = free_planes_at_ends + planes_between_rings * np.arange(n_segments)
     offset = step / 2 + step * floor(pi / 2 / step)
 
-    vertices = _strands(plane_x, overhang, half, radius_m, angular_rate_rad_per_m, offset, elements_per_side, ends)
-    strands = _crossing_strands(plane_x, half, angular_rate_rad_per_m, offset)
+    # Every strand at the planes, at its two ends, and evenly in between.
+    knots = np.concatenate([[0.0], plane_x, [plane_x[-1] + overhang]])
+    counts = [ends, *[elements_per_side] * (n_planes - 1), ends]
+    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], counts, strict=False)]
+    x = np.append(np.concatenate(spans), knots[-1])
+    turn, phase = angular_rate_rad_per_m * x[None], step * np.arange(half)[:, None]
+    angle = np.concatenate([turn + phase, offset - turn - phase])
+    y, z = radius_m * np.cos(angle), radius_m + radius_m * np.sin(angle)
+
+    # Strands pair at each plane: i + j is the same number on a whole plane, modulo half.
+    total = np.rint((offset - 2 * angular_rate_rad_per_m * plane_x) / step).astype(np.int64)
+    clockwise = np.arange(half)
+    counter = (total[:, None] - clockwise[None]) % half + half
     springs, sensor_springs = _springs(ring_planes, n_planes, half)
+
+    # Every rhombus by its four corners: front, its two neighbours on the next plane, rear.
+    plane, strand = np.meshgrid(np.arange(n_planes - 2), clockwise, indexing="ij")
+    lower = (strand - 1) % half
+    corners = plane * half + strand, (plane + 1) * half + strand, (plane + 2) * half + lower, (plane + 1) * half + lower
     return MeshGeometry(
         n_segments=n_segments,
         radius_m=radius_m,
         angular_rate_rad_per_m=angular_rate_rad_per_m,
-        vertices_m=vertices,
+        vertices_m=np.stack([np.broadcast_to(x, angle.shape), y, z], axis=-1),
         crossing_vertex=ends + elements_per_side * np.arange(n_planes),
-        crossing_strands=strands,
+        crossing_strands=np.stack([np.broadcast_to(clockwise, counter.shape), counter], axis=-1).reshape(-1, 2),
         plane_x_m=plane_x,
         ring_planes=ring_planes,
-        rings=ring_planes[:, None] * half + np.arange(half)[None],
+        rings=ring_planes[:, None] * half + clockwise[None],
         springs=springs,
         sensor_springs=sensor_springs,
-        rhombi=_rhombi(n_planes, half),
+        rhombi=np.stack(corners, axis=-1).reshape(-1, 4),
     )
-
-
-def _check(n_segments: int, n_helices: int, radius_m: float, rate: float, elements_per_side: int, ends: int) -> None:
-    if n_segments < 3:
-        raise ValueError(f"n_segments = {n_segments} must be at least 3")
-    if n_helices < 6 or n_helices % 2:
-        raise ValueError(f"n_helices = {n_helices} must be even and at least 6")
-    if not (radius_m > 0 and rate > 0):
-        raise ValueError(f"radius_m = {radius_m} and angular_rate_rad_per_m = {rate} must be positive")
-    if elements_per_side < 1 or ends < 1:
-        raise ValueError(f"elements_per_side = {elements_per_side} and elements_per_end = {ends} must be at least 1")
-
-
-def _strands(
-    plane_x: Array, overhang: float, half: int, radius: float, rate: float, offset: float, elements: int, ends: int
-) -> Array:
-    """Samples every strand at the planes, at its two ends, and evenly in between."""
-    knots = np.concatenate([[0.0], plane_x, [plane_x[-1] + overhang]])
-    counts = [ends, *[elements] * (len(plane_x) - 1), ends]
-    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], counts, strict=False)]
-    x = np.append(np.concatenate(spans), knots[-1])
-    phase = (2 * pi / half) * np.arange(half)
-    angle = np.concatenate([rate * x[None] + phase[:, None], offset - rate * x[None] - phase[:, None]])
-    return np.stack([np.broadcast_to(x, angle.shape), radius * np.cos(angle), radius + radius * np.sin(angle)], axis=-1)
-
-
-def _crossing_strands(plane_x: Array, half: int, rate: float, offset: float) -> Indices:
-    """Pairs strands at each plane: ``i + j`` is the same number on a whole plane, modulo ``half``."""
-    total = np.rint((offset - 2 * rate * plane_x) / (2 * pi / half)).astype(np.int64)
-    clockwise = np.arange(half)
-    counter = (total[:, None] - clockwise[None]) % half + half
-    return np.stack([np.broadcast_to(clockwise, counter.shape), counter], axis=-1).reshape(-1, 2)
 
 
 def _springs(ring_planes: Indices, n_planes: int, half: int) -> tuple[Indices, Indices]:
@@ -299,20 +246,13 @@ def _springs(ring_planes: Indices, n_planes: int, half: int) -> tuple[Indices, I
     return springs, sensor_bay[:, None] * half + strand[None]
 
 
-def _rhombi(n_planes: int, half: int) -> Indices:
-    """Lists every rhombus by its four corners: front, its two neighbours on the next plane, rear."""
-    front_plane, strand = np.meshgrid(np.arange(n_planes - 2), np.arange(half), indexing="ij")
-    corners = (
-        front_plane * half + strand,
-        (front_plane + 1) * half + strand,
-        (front_plane + 2) * half + (strand - 1) % half,
-        (front_plane + 1) * half + (strand - 1) % half,
-    )
-    return np.stack(corners, axis=-1).reshape(-1, 4)
-
-
 def norm(vectors: Array) -> Array:
     """Returns the lengths of vectors, ``(.., 3)``, along the last axis."""
     squares = vectors * vectors
     # In this order the last bit is that of numpy's einsum and of a dot product.
     return np.sqrt((squares[..., 0] + squares[..., 2]) + squares[..., 1])
+
+
+def cross(first: Array, second: Array) -> Array:
+    """Returns the vector products over the first axis, ``(3, ..)``; several times as fast as `numpy.cross`."""
+    return first[[1, 2, 0]] * second[[2, 0, 1]] - first[[2, 0, 1]] * second[[1, 2, 0]]

@@ -18,16 +18,9 @@ __all__ = ["whole_file", "with_suffix", "write_csv", "write_json", "write_text"]
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Gives a hidden draft beside a file, to be written and then moved into its place.
+    """Gives a hidden draft beside a file, with the same suffix, which is moved into its place once the block is done.
 
-    Args:
-        path: The file to write; what is there stays until the draft is complete.
-
-    Yields:
-        The draft, which has the same suffix; it is removed where the block ends in an error.
-
-    Raises:
-        RunFileError: The file cannot be written, for example because the disk is full.
+    Until then what is there stays; the draft goes where the block ends in an error. An OSError becomes a RunFileError.
     """
     path = Path(path)
     target = path.resolve()
@@ -47,37 +40,21 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Writes a text as a `whole_file` in UTF-8.
-
-    Args:
-        path: The file to write.
-        text: Its content.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
+    """Writes a text as a `whole_file` in UTF-8 and returns its path."""
     with whole_file(path) as draft:
         draft.write_text(text, encoding="utf-8")
     return path
 
 
+def write_json(path: Path, content: Any) -> Path:
+    """Writes plain values as JSON, as `write_text` does; NaN is refused."""
+    return write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> Path:
-    """Writes a table as CSV with a header.
+    """Writes a table as CSV with a header, as a `whole_file`, and returns its path.
 
-    Args:
-        path: The file to write.
-        columns: Names of the columns.
-        rows: Values of each row; None leaves a cell empty, and text that a spreadsheet would take for a formula gets
-            a leading apostrophe.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
+    None leaves a cell empty, and text that a spreadsheet would take for a formula gets a leading apostrophe.
     """
     with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -87,7 +64,6 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
 
 
 def _cell(text: str) -> str:
-    """Text as it is in a table; a leading apostrophe keeps spreadsheets from taking it for a formula."""
     text = printable(text)
     if text[:1] not in tuple("=+-@\t"):
         return text
@@ -98,38 +74,10 @@ def _cell(text: str) -> str:
     return text
 
 
-def write_json(path: Path, content: Any) -> Path:
-    """Writes plain values as JSON; NaN is refused.
-
-    Args:
-        path: The file to write.
-        content: Plain lists, mappings, numbers, strings and None.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
-    with whole_file(path) as draft:
-        draft.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    return path
-
-
 def with_suffix(path: str | Path, suffixes: tuple[str, ...], what: str, default: str | None = None) -> Path:
-    """Checks a file's suffix.
+    """Returns the path of a file to write, of which the suffix must be one of those given in lower case.
 
-    Args:
-        path: The file to write.
-        suffixes: The suffixes allowed, in lower case.
-        what: What is written, for the sentence.
-        default: Suffix to add where the name has none; None refuses such a name.
-
-    Returns:
-        The path, with a suffix.
-
-    Raises:
-        RunFileError: Another suffix, or the path is a folder.
+    A name without a suffix gets the default one, or is refused. What is written is named in the sentence.
     """
     path = Path(path)
     if path.is_dir():

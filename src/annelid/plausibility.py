@@ -1,4 +1,4 @@
-"""What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances held against one another.
+"""What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances checked against one another.
 
 Everything here follows from the configuration alone, in closed form, in under a millisecond and without the engine.
 """
@@ -25,7 +25,7 @@ IDLE_SHARE = 1e-3
 
 
 def check(config: RunConfig) -> list[Finding]:
-    """Holds the numbers of a configuration against one another, before anything is computed.
+    """Checks the numbers of a configuration against one another, before anything is computed.
 
     Args:
         config: Any configuration; of a planar worm there is nothing to check.
@@ -33,10 +33,11 @@ def check(config: RunConfig) -> list[Finding]:
     Returns:
         What is wrong, errors first; empty where nothing is.
     """
-    if not isinstance(config.body, WormBody):
-        return []
     body = config.body
-    found = [*_mesh(body), *body.rings.findings(body), *_materials(body), *_steps(config), *_senses(config)]
+    if not isinstance(body, WormBody):
+        return []
+    tolerance = _tolerance(config, body)
+    found = [*_mesh(body), *body.rings.findings(body), *_materials(body), *_steps(config, body), *tolerance]
     first: dict[tuple[str, str], Finding] = {}
     for finding in found:
         # Rings with ranges of their own may share a fault.
@@ -57,7 +58,7 @@ def refuse_nonsense(config: RunConfig) -> tuple[str, ...]:
     errors = [str(finding) for finding in found if finding.severity == "error"]
     if errors:
         raise ConfigError(". ".join(errors))
-    return tuple(str(finding) for finding in found)
+    return tuple(map(str, found))
 
 
 def _mesh(body: WormBody) -> Iterator[Finding]:
@@ -73,23 +74,20 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
             f"set body.strands.radius_m below {room / 4:.2g}, or fewer helices",
             "error",
         )
-    most = shape.longest_m / shape.along_m
+    most, usual = shape.longest_m / shape.along_m, 2.0 / mesh.radius_m
+    problem = instead = ""
     if most > 4.0:
-        yield Finding(
-            "body.mesh.angular_rate_rad_per_m",
-            mesh.angular_rate_rad_per_m,
-            f"the strands lie almost along the rings, so that a segment can stretch to {most:.1f} times its length",
-            f"set at most {2.0 / mesh.radius_m:.3g} with this radius (twice the length is usual)",
-            "warning",
+        problem = (
+            f"the strands lie almost along the rings, so that a segment can stretch to {most:.1f} times its length"
         )
+        instead = f"set at most {usual:.3g} with this radius (twice the length is usual)"
     elif most < 1.1:
-        yield Finding(
-            "body.mesh.angular_rate_rad_per_m",
-            mesh.angular_rate_rad_per_m,
-            f"the strands lie almost along the body, so that a segment can stretch to {most:.2f} times its length only",
-            f"set about {2.0 / mesh.radius_m:.3g} with this radius",
-            "warning",
+        problem = (
+            f"the strands lie almost along the body, so that a segment can stretch to {most:.2f} times its length only"
         )
+        instead = f"set about {usual:.3g} with this radius"
+    if problem:
+        yield Finding("body.mesh.angular_rate_rad_per_m", mesh.angular_rate_rad_per_m, problem, instead)
     if shape.bend_rad > radians(45.0):
         elements = round(shape.bend_rad * mesh.elements_per_side / radians(30.0) + 0.5)
         yield Finding(
@@ -97,7 +95,6 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
             mesh.elements_per_side,
             f"a strand turns by {shape.bend_rad * 180 / pi:.0f} degrees about the body in one straight element",
             f"set at least {elements}",
-            "warning",
         )
     rest = body.springs.rest_length_m
     if rest is not None and not 0.5 <= rest / shape.along_m <= 1.5:
@@ -106,64 +103,47 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
             rest,
             f"the mesh holds these springs at {shape.along_m:.3g} m, {shape.along_m / rest:.2g} times that",
             f"set between {0.5 * shape.along_m:.2g} and {1.5 * shape.along_m:.2g}, or leave it out",
-            "warning",
         )
 
 
 def _materials(body: WormBody) -> Iterator[Finding]:
-    strands = body.strands
-    density = strands.linear_density_kg_per_m / (pi * strands.radius_m**2)
-    ratio = strands.shear_modulus_Pa / strands.young_modulus_Pa
-    area = pi * strands.radius_m**2
+    young, shear, line = (
+        body.strands.young_modulus_Pa,
+        body.strands.shear_modulus_Pa,
+        body.strands.linear_density_kg_per_m,
+    )
+    area = pi * body.strands.radius_m**2
+    ratio = f"that is {shear / young:.2g} of the Young's modulus, where an isotropic material has 0.33 to 0.5"
+    density = f"with this radius that is {line / area:.3g} kg/m^3"
+    # Each with the bounds beyond which it is doubtful, and those to set it between.
     for field, value, problem, low, high, least, most in (
-        ("young_modulus_Pa", strands.young_modulus_Pa, "no strand is made of this", 1e6, 4e11, 1e6, 4e11),
-        (
-            "shear_modulus_Pa",
-            strands.shear_modulus_Pa,
-            f"that is {ratio:.2g} of the Young's modulus, where an isotropic material has 0.33 to 0.5",
-            0.1 * strands.young_modulus_Pa,
-            strands.young_modulus_Pa,
-            strands.young_modulus_Pa / 3,
-            strands.young_modulus_Pa / 2,
-        ),
-        (
-            "linear_density_kg_per_m",
-            strands.linear_density_kg_per_m,
-            f"with this radius that is {density:.3g} kg/m^3",
-            50.0 * area,
-            25_000.0 * area,
-            500.0 * area,
-            2000.0 * area,
-        ),
+        ("young_modulus_Pa", young, "no strand is made of this", 1e6, 4e11, 1e6, 4e11),
+        ("shear_modulus_Pa", shear, ratio, 0.1 * young, young, young / 3, young / 2),
+        ("linear_density_kg_per_m", line, density, 50.0 * area, 25_000.0 * area, 500.0 * area, 2000.0 * area),
     ):
         if not low <= value <= high:
-            instead = f"set between {least:.2g} and {most:.2g}"
-            yield Finding(f"body.strands.{field}", value, problem, instead, "warning")
+            yield Finding(f"body.strands.{field}", value, problem, f"set between {least:.2g} and {most:.2g}")
 
 
-def _steps(config: RunConfig) -> Iterator[Finding]:
+def _steps(config: RunConfig, body: WormBody) -> Iterator[Finding]:
     """The physics step against what it must resolve."""
-    body, arena, step = config.body, config.arena, config.clock.physics_timestep_s
-    assert isinstance(body, WormBody)
+    arena, step = config.arena, config.clock.physics_timestep_s
     assert arena is not None
     yield from body.formulation.findings(config)
     # At one step the engine's floor is twice as soft as asked, which has been measured; at less nothing has.
     if arena.contact_time_constant_s < 0.5 * step:
         yield softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step)
-    if arena.slope_rad:
-        # On ground that rises ahead the skin slides towards the rear.
-        rise = arena.slope_rad * cos(radians(body.heading_deg))
-        backward = rise > 1e-9 and arena.backward_friction is not None
-        field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-        steepness = tan(abs(arena.slope_rad))
-        if steepness >= (friction or 0.0):
-            yield Finding(
-                "arena.slope_deg",
-                round(degrees(arena.slope_rad), 9),
-                f"with arena.{field} = {friction:g} the worm slides down",
-                f"set arena.{field} above {steepness:.2g}",
-                "warning",
-            )
+    if not arena.slope_rad:
+        return
+    # On ground that rises ahead the skin slides towards the rear.
+    rise = arena.slope_rad * cos(radians(body.heading_deg))
+    backward = rise > 1e-9 and arena.backward_friction is not None
+    field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
+    steepness = tan(abs(arena.slope_rad))
+    if steepness >= (friction or 0.0):
+        problem = f"with arena.{field} = {friction:g} the worm slides down"
+        slope_deg = round(degrees(arena.slope_rad), 9)
+        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness:.2g}")
 
 
 def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
@@ -188,31 +168,28 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         return None
-    damping_s, rings = body.strands.material_damping_s, body.rings
-    if not damping_s or not body.formulation.has_rigid_crossings or rings.muscle is None or rings.layout != "whole":
-        return None
+    damping_s, rings, rate = body.strands.material_damping_s, body.rings, body.springs.stiffness_N_per_m
+    whole = body.formulation.has_rigid_crossings and rings.muscle is not None and rings.layout == "whole"
     # Beyond what was measured the lines that were fitted say nothing.
-    if not body.springs.stiffness_N_per_m or not 0.05 <= damping_s <= 0.4:
+    if not whole or not rate or damping_s is None or not 0.05 <= damping_s <= 0.4:
         return None
-    shape, strands = rhombus_of(body), body.strands
-    rigidity = strands.bending_rigidity_Nm2
-    spread = sqrt(rigidity / (body.springs.stiffness_N_per_m * shape.side_m**3))
+    shape = rhombus_of(body)
+    spread = sqrt(body.strands.bending_rigidity_Nm2 / (rate * shape.side_m**3))
     slippery = log(1.0 / min(max(arena.friction, 0.05), 1.0))
     most = shape.longest_m - shape.along_m
     lift = max(0.02, spread * (0.24 + 0.84 * damping_s) + 0.015 * slippery - 0.15)
     return most * lift, most * (0.16 + 0.087 * spread + 0.48 * damping_s)
 
 
-def _senses(config: RunConfig) -> Iterator[Finding]:
+def _tolerance(config: RunConfig, body: WormBody) -> Iterator[Finding]:
     """The sensors' tolerance against what a segment can lengthen by, and its neighbours lift it by."""
     if "tolerance_m" not in config.controller.sensor_fields:
         return
-    assert isinstance(config.body, WormBody)
-    shape, tolerance = rhombus_of(config.body), config.sensor.tolerance_m
+    shape, tolerance = rhombus_of(body), config.sensor.tolerance_m
     most = shape.longest_m - shape.along_m
     window = tolerance_window_m(config)
     low, high = window or (0.02 * most, 0.25 * most)
-    problem, instead = "", f"set about {(low + high) / 2 if window else 0.12 * most:.2g}"
+    instead = f"set about {(low + high) / 2 if window else 0.12 * most:.2g}"
     if tolerance >= most:
         problem = (
             f"a segment lengthens by at most {most:.2g} m before its strands are straight: its sensor never goes off"
@@ -234,5 +211,6 @@ def _senses(config: RunConfig) -> Iterator[Finding]:
     elif tolerance < low:
         lift = low if window else 0.1 * most
         problem = f"a contracting neighbour lifts a segment by up to {lift:.2g} m: sensors may never go on"
-    if problem:
-        yield Finding("sensor.tolerance_m", tolerance, problem, instead, "warning")
+    else:
+        return
+    yield Finding("sensor.tolerance_m", tolerance, problem, instead)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ SIDES = ("belly", "left", "back", "right")
 
 @dataclass(frozen=True, slots=True)
 class Sensation:
-    """What the body feels at one instant; its receiver may keep the arrays but must not write to them.
+    """What the body senses at one instant; its receiver may keep the arrays but must not write to them.
 
     Attributes:
         time_s: Simulated time, s.
@@ -56,9 +56,8 @@ class Sensation:
         center_of_mass_m: Centre of mass, m, shape ``(3,)``; planar worms use the first component.
         touch_N: Normal force of the ground on each side of every segment, N, ``(n_segments, 4)`` in the order of
             `SIDES`; ``(0, 4)`` for a body that has no skin.
-        front_m: Centre of the foremost ring, m, ``(3,)``; NaN for a body that cannot tell.
-        heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``; NaN for a body that
-            cannot tell.
+        front_m: Centre of the foremost ring, m, ``(3,)``; NaN for a body that has none.
+        heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``; NaN likewise.
     """
 
     time_s: float
@@ -83,7 +82,7 @@ class Plant(Protocol):
 
     @property
     def n_muscles(self) -> int:
-        """Number of ring muscles: one a segment, or two with half-rings (left, right, segment by segment)."""
+        """Number of ring muscles: one per segment, or two with half-rings (left, right, segment by segment)."""
         ...
 
     def reset(self, seed: int) -> Sensation:
@@ -109,17 +108,17 @@ class Controller(Protocol):
 
 @runtime_checkable
 class MultiRatePlant(Protocol):
-    """The capability of a plant that may be slower than the control clock of telling when it moves next."""
+    """The capability of a plant that may be slower than the control clock of saying when it moves next."""
 
     def steps_to_move(self) -> int:
-        """Returns the number of control steps to the end of the next one in which the body moves, at least 1.
+        """Returns the control steps to the end of the next one in which the body moves, at least 1.
 
         Until then the sensation stays what it is, but for its time.
         """
         ...
 
     def stride(self, activation: Array, n_steps: int) -> Sensation:
-        """Advances by ``n_steps`` control steps, at most `steps_to_move`; the same as so many calls of ``step``.
+        """Advances by at most `steps_to_move` control steps, as so many calls of ``step``.
 
         ``activation`` is that of the last of them, the only one in which the body may move.
         """
@@ -131,48 +130,33 @@ class StridingController(Protocol):
     """The capability of a controller of taking several control steps under one sensation."""
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by ``n_steps`` control steps; the same as so many calls of ``step`` bit for bit.
+        """Advances by ``n_steps`` control steps, as so many calls of ``step`` bit for bit; returns the last activation.
 
         ``sensation`` is that of the first step. Those of the others differ from it in their times only, which are
-        multiples of the control timestep. Returns the activation after the last.
+        multiples of the control timestep.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One variable of the run file.
-
-    Attributes:
-        name: Variable name in the file.
-        dims: Names of the dimensions after time (or frame), for example ``("segment", "sensor")``.
-        shape: Sizes of those dimensions.
-        units: Unit in the form CF uses (``"m"``, ``"N"``, ``"mV"``, ``"1"``).
-        long_name: What it is, in words.
-        every_frame: Recorded at frame rate (large, for pictures) instead of at the rate of the signals.
-    """
+    """One variable of the run file."""
 
     name: str
-    dims: tuple[str, ...]
-    shape: tuple[int, ...]
-    units: str
-    long_name: str
-    every_frame: bool = False
+    dims: tuple[str, ...]  # names of the dimensions after time (or frame), for example ("segment", "sensor")
+    shape: tuple[int, ...]  # sizes of those dimensions
+    units: str  # in the form CF uses ("m", "N", "mV", "1")
+    long_name: str  # what it is, in words
+    every_frame: bool = False  # recorded at frame rate (large, for pictures) instead of at the rate of the signals
 
 
 @dataclass(frozen=True, slots=True)
 class Recordable:
-    """What a plant or a controller offers to the recorder.
+    """What a plant or a controller offers to the recorder."""
 
-    Attributes:
-        signals: The variables.
-        coords: Labels of dimensions, for example ``{"neuron": ["segment1.contract", ...]}``.
-        attrs: Constants worth a global attribute, for example the total mass.
-    """
-
-    signals: tuple[Signal, ...] = ()
-    coords: Mapping[str, Sequence[str] | Sequence[int]] = field(default_factory=dict)
-    attrs: Mapping[str, float | int | str] = field(default_factory=dict)
+    signals: tuple[Signal, ...] = ()  # the variables
+    coords: Mapping[str, Sequence[str] | Sequence[int]] = field(default_factory=dict)  # labels of dimensions by name
+    attrs: Mapping[str, float | int | str] = field(default_factory=dict)  # constants, as the total mass, for the file
 
 
 @runtime_checkable
@@ -203,7 +187,7 @@ class Stateful(Protocol):
 
 @runtime_checkable
 class Doubtful(Protocol):
-    """The capability of telling what is doubtful about a run without being fatal."""
+    """The capability of saying what is doubtful about a run without being fatal."""
 
     def doubts(self) -> tuple[str, ...]:
         """Returns a sentence for everything doubtful since time zero."""
@@ -212,8 +196,51 @@ class Doubtful(Protocol):
 
 @runtime_checkable
 class Watched(Protocol):
-    """The capability of telling that the numbers have run away."""
+    """The capability of noticing that the numbers have run away."""
 
     def alarm(self) -> str | None:
         """Returns one sentence naming the quantity, its value and its limit, or None while all is well."""
         ...
+
+
+class SavedAndRecorded:
+    """Base of plants and controllers whose state is a dictionary of arrays and whose signals are listed in a table.
+
+    Attributes:
+        recorded: Name, dimensions, unit and meaning of what it may record; signals without a value are left out.
+    """
+
+    recorded: ClassVar[tuple[tuple[str, tuple[str, ...], str, str], ...]] = ()
+    _now: dict[str, NDArray[Any]]
+
+    def recordable(self) -> Recordable:
+        """Names the signals that `read` returns."""
+        values = self._values()
+        listed = (row for row in self.recorded if row[0] in values)
+        signals = (Signal(name, dims, np.shape(values[name]), units, meaning) for name, dims, units, meaning in listed)
+        return Recordable(tuple(signals), self._coords(), self._attrs())
+
+    def read(self, frame: bool) -> Values:
+        """Reads the signals that `recordable` names; there are none at frame rate."""
+        return {} if frame else self._values()
+
+    def get_state(self) -> State:
+        """Returns copies of all that the next step depends on."""
+        return {name: array.copy() for name, array in self._now.items()}
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        for name, array in self._now.items():
+            array[...] = state[name]
+
+    def _values(self) -> Values:
+        """Present values of all that is recorded."""
+        return {}
+
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        """Labels of the signals' dimensions."""
+        return {}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        """Constants worth an attribute of the run file."""
+        return {}

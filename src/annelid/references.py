@@ -15,13 +15,9 @@ ALWAYS = {"annelid": "the simulator", "riddle2023": "the paper that it reproduce
 
 
 def references_of(config: RunConfig | None = None) -> dict[str, str]:
-    """Tells what to cite for a configuration, or for annelid as such.
+    """Returns what to cite for a configuration, or for annelid as such.
 
-    Args:
-        config: The configuration; None for none.
-
-    Returns:
-        Keys of `entries`, each with what it is cited for; annelid and the paper come first.
+    Keys of `entries`, each with what it is cited for; annelid and the paper come first.
     """
     reasons = {key: [reason] for key, reason in ALWAYS.items()}
     if config is not None:
@@ -42,10 +38,9 @@ def entries() -> Mapping[str, str]:
 
 
 def bibtex(references: Mapping[str, str] | Iterable[str]) -> str:
-    """Returns entries as BibTeX, what each is cited for in a comment above it.
+    """Returns entries as BibTeX, by what `references_of` returned, or by keys alone.
 
-    Args:
-        references: What `references_of` returned, or keys alone.
+    What each is cited for stands in a comment above it.
     """
     reasons = references if isinstance(references, Mapping) else dict.fromkeys(references, "")
     blocks = [(f"% {reason}\n" if reason else "") + entries()[key] for key, reason in reasons.items()]

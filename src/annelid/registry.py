@@ -28,7 +28,7 @@ def load_home(home: str) -> None:
 
 @cache
 def load_extensions() -> None:
-    """Imports what other installed packages name; one that fails is told of and left out."""
+    """Imports what other installed packages name; one that fails is left out with a warning."""
     for entry in entry_points(group=GROUP):
         try:
             entry.load()
@@ -41,22 +41,12 @@ class Registry(Generic[Item]):
     """Things of one sort by their names."""
 
     def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError) -> None:
-        """Makes an empty one.
-
-        Args:
-            what: What the things are, for messages.
-            homes: Modules and packages of annelid that register some; they are imported on first use.
-            error: What is raised for an unknown name.
-        """
+        """Makes an empty registry of what is called so in messages; its homes register some, imported on first use."""
         self._what, self._homes, self._error = what, homes, error
         self._known: dict[str, Item] = {}
 
     def add(self, name: str, item: Item) -> Item:
-        """Registers a thing, and returns it.
-
-        Raises:
-            ConfigError: Another one has that name; the same one of a module that is loaded anew takes its own place.
-        """
+        """Registers a thing, and returns it; the same one of a module that is loaded anew takes its own place."""
         other = self._known.setdefault(name, item)
         if _origin(other) != _origin(item):
             raise ConfigError(f"{_origin(item)}: {self._what} {shown(name)} is taken by {_origin(other)}")
@@ -71,21 +61,16 @@ class Registry(Generic[Item]):
         return dict(sorted(self._known.items()))
 
     def find(self, name: str) -> Item:
-        """Returns the thing of a name.
-
-        Raises:
-            AnnelidError: There is none; the sentence suggests the nearest.
-        """
+        """Returns the thing of a name; the error where there is none suggests the nearest."""
         known = self.all()
         if name not in known:
             raise self._error(f"unknown {self._what} {shown(name)}: {suggest(name, known)}")
         return known[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Goes through the names."""
         return iter(self.all())
 
 
 def _origin(item: Any) -> Any:
-    """Tells where a class or a function was written, anything else as it is."""
+    """Where a class or a function was written; anything else as it is."""
     return f"{item.__module__}.{item.__qualname__}" if hasattr(item, "__qualname__") else item

@@ -22,7 +22,6 @@ class Console(rich.console.Console):
     """Rich's console, which takes no markup from text and passes on no control characters but its own."""
 
     def __init__(self, **options: Any) -> None:
-        """Takes the options of rich's."""
         super().__init__(markup=False, emoji=False, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:

@@ -15,11 +15,17 @@ def printable(text: str) -> str:
     r"""Returns a text whose control characters are written out, as ``\u001b`` for escape.
 
     These are what a terminal obeys instead of showing it, what turns the direction of writing, what no file of XML can
-    hold, and halves of characters; line feeds and tabs stay. The form is that of JSON and Python.
+    have, and halves of characters; line feeds and tabs stay. The form is that of JSON and Python.
     """
-    if text.isprintable():
-        return text
-    return "".join(c if _is_shown(c) else _written_out(c) for c in text)
+    return text if text.isprintable() else "".join(map(_shown, text))
+
+
+def _shown(character: str) -> str:
+    # Blanks other than the plain one are not printable to Python, but are to a terminal.
+    if character.isprintable() or character in _KEPT or category(character) == "Zs":
+        return character
+    number = ord(character)
+    return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
 
 
 def is_line(text: str) -> bool:
@@ -36,7 +42,7 @@ def write_printable_only() -> None:
 
 
 class _PrintableStream:
-    """A stream of text that writes control characters out; it has no way around, such as ``buffer``."""
+    """A stream of text that writes control characters out; nothing gets past it, such as through ``buffer``."""
 
     def __init__(self, stream: TextIO) -> None:
         # Under this name rich looks for the stream that its own control characters are for.
@@ -53,13 +59,3 @@ class _PrintableStream:
         if name == "buffer":
             raise AttributeError(name)
         return getattr(self.rich_proxied_file, name)
-
-
-def _is_shown(character: str) -> bool:
-    # Blanks other than the plain one are not printable to Python, but are to a terminal.
-    return character.isprintable() or character in _KEPT or category(character) == "Zs"
-
-
-def _written_out(character: str) -> str:
-    number = ord(character)
-    return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"

@@ -38,11 +38,7 @@ _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}
 
 
 def read_text(path: Path, what: str = "") -> str:
-    """Reads a text file, with or without a byte order mark.
-
-    Args:
-        path: The file.
-        what: What it is, for the sentence, if more than a file.
+    """Reads a text file, with or without a byte order mark; ``what`` it is, if more than a file, is for the sentence.
 
     Raises:
         UnreadableText: It cannot be read, is no regular file, is longer than `MOST_BYTES`, or is not UTF-8.
@@ -66,39 +62,18 @@ def read_text(path: Path, what: str = "") -> str:
 
 
 def read_toml(path: Path, what: str = "the configuration file") -> dict[str, Any]:
-    """Reads a TOML file.
-
-    Raises:
-        UnreadableText: It cannot be read (`read_text`), or is not valid TOML (`parse_toml`).
-    """
+    """Reads a TOML file, as `read_text` and `parse_toml` do."""
     return parse_toml(read_text(path, what), str(path))
 
 
 def read_json(path: Path, what: str = "") -> Any:
-    """Reads a JSON file.
-
-    Args:
-        path: The file.
-        what: What it is, for the sentence of an error; default: its path alone.
-
-    Raises:
-        UnreadableText: It cannot be read (`read_text`), or is not valid JSON (`parse_json`).
-    """
+    """Reads a JSON file, as `read_text` and `parse_json` do."""
     return parse_json(read_text(path, what), str(path))
 
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
-    """Reads TOML.
-
-    Args:
-        text: The text.
-        name: What it is called in an error.
-
-    Raises:
-        UnreadableText: It is not valid TOML, too long or too deep.
-    """
-    text = _bounded(text, name, len(text))
-    if _has_long_key(text):
+    """Reads TOML that an `UnreadableText` calls by a name where it is not valid, too long or too deep."""
+    if _has_long_key(_bounded(text, name, len(text))):
         raise _too_deep(name)
     return _parsed(tomllib.loads, "TOML", text, name)
 
@@ -120,11 +95,7 @@ def _parsed(load: Callable[[str], Any], language: str, text: str, name: str) -> 
 
 
 def check_depth(tree: Any, name: str) -> None:
-    """Refuses lists and mappings nested deeper than `MOST_LEVELS`, such as one that holds itself.
-
-    Raises:
-        UnreadableText: It is too deep.
-    """
+    """Refuses lists and mappings nested deeper than `MOST_LEVELS`, such as one that contains itself."""
     open_nodes = [(tree, 0)]
     while open_nodes:
         node, level = open_nodes.pop()
@@ -135,28 +106,19 @@ def check_depth(tree: Any, name: str) -> None:
 
 
 def toml_text(tree: Mapping[str, Any], heading: str = "") -> str:
-    """Writes a TOML document, of which `parse_toml` makes the same tree; None is left out.
-
-    Args:
-        tree: Tables, lists, strings, numbers and truth values by name.
-        heading: Lines of comment above everything.
-    """
+    """Writes a TOML document, of which `parse_toml` makes the same tree; None is left out, a heading is a comment."""
     import tomlkit
 
     document = tomlkit.document()
     for line in heading.splitlines():
-        # A comment may hold no control characters, and a file no half of a pair of surrogates.
+        # A comment may have no control characters, and a file no half of a pair of surrogates.
         document.add(tomlkit.comment(printable(line)))
     document.update(_plain(tree))
     return tomlkit.dumps(document)
 
 
 def toml_value(value: Any) -> str:
-    """Writes one value as TOML on one line, as it may stand behind a ``field =``.
-
-    Args:
-        value: A number, a string, a truth value, or lists and tables of these.
-    """
+    """Writes one value as TOML on one line, as it may stand behind a ``field =``."""
     import tomlkit
 
     # Within a list a table is written inline.

@@ -13,7 +13,7 @@ from annelid.body import WormBody
 from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
-from annelid.experiment import Case, Judged, Store, judged_run
+from annelid.experiment import Case, Judged, Store, judge
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import grouped, terminal_table
@@ -119,7 +119,7 @@ def crawl(store: Store, gaits: Sequence[str], effort: Effort) -> list[Reading]:
     """
     cases = runs(gaits, effort)
     store.compute(cases.values(), "crawling")
-    return [Reading(*point, judged_run(store, case)) for point, case in cases.items()]
+    return [Reading(*point, judge(store[case])) for point, case in cases.items()]
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis import gait, summary
-from annelid.analysis.comparison import compare, differing_fields, relative_difference, run_labels
+from annelid.analysis.comparison import LACKING, compare, differing_fields, relative_difference, run_labels
 from annelid.config import load_config
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
@@ -67,12 +67,10 @@ def test_worms_of_different_kinds_stand_side_by_side(planar: Run, rods: Run) -> 
     assert both.differences("travel_m") == [None, None]
     assert both.differences("elongation_mean_max_m") == [None, None], "three and four segments"
     assert both.fields["body.kind"] == ("riddle2022", "worm")
-    assert both.fields["arena.friction"][0] is None
-    assert both.lacking["arena.friction"] == (True, False)
-    assert json.loads(json.dumps(both.to_dict(), allow_nan=False))["configuration"]["body.kind"] == [
-        "riddle2022",
-        "worm",
-    ]
+    assert both.fields["arena.friction"] == (LACKING, 1.0)
+    written = json.loads(json.dumps(both.to_dict(), allow_nan=False))["configuration"]
+    assert written["body.kind"] == ["riddle2022", "worm"]
+    assert written["arena.friction"] == [None, 1.0]
 
 
 def test_a_run_differs_from_itself_in_nothing(planar: Run) -> None:
@@ -87,10 +85,9 @@ def test_a_run_differs_from_itself_in_nothing(planar: Run) -> None:
 def test_exactly_the_fields_that_were_changed_differ() -> None:
     changes = {"arena.friction": 0.3, "controller.gate_time_constant_ms": 200.0, "name": "other"}
     base = load_config("riddle2023-rods")
-    fields, lacking = differing_fields([base, load_config("riddle2023-rods", changes), base])
+    fields = differing_fields([base, load_config("riddle2023-rods", changes), base])
     assert set(fields) == {"arena.friction", "controller.gate_time_constant_ms"}
     assert fields["arena.friction"] == (1.0, 0.3, 1.0)
-    assert not any(any(lacks) for lacks in lacking.values())
 
 
 def test_labels_are_as_much_of_the_paths_as_tells_them_apart(planar: Run) -> None:

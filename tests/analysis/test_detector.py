@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from annelid.analysis.detector import Detection, detect_slip, precision_recall, score_detections
-from annelid.analysis.slip import slip_cost
+from annelid.analysis.gait import slip_cost
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 

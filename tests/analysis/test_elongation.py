@@ -2,25 +2,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.analysis.elongation import elongation, end_difference, interior_deficit, middle_deficit
-from annelid.analysis.forces import contraction_forces
-from annelid.analysis.travel import net_travel, path_travel
-
-
-def test_both_readings_of_a_written_down_stretch() -> None:
-    rest = np.array([[0.07, 0.08], [0.07, 0.08], [0.07, 0.08]])
-    stretch = np.repeat(rest[None], 4, axis=0)
-    stretch[1, 0] += [0.04, 0.02]  # segment 1 lengthens
-    stretch[2, 0, 0] -= 0.01  # its first helix shortens below rest
-    stretch[3, 2] += [0.00, 0.03]  # segment 3 lengthens away from the first helix
-    read = elongation(stretch, rest)
-    np.testing.assert_allclose(read.first_helix_pp_m, [0.05, 0.0, 0.0], atol=1e-15)
-    np.testing.assert_allclose(read.mean_max_m, [0.03, 0.0, 0.015], atol=1e-15)
+from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
 
 
 def test_deficits_of_the_published_elongations() -> None:
@@ -44,19 +30,6 @@ def test_deficits_do_not_depend_on_the_unit(lengths: list[float], factor: float)
 def test_deficits_of_a_worm_that_does_not_elongate_cannot_be_told() -> None:
     assert math.isnan(middle_deficit([0.0, 0.01, 0.0]))
     assert math.isnan(end_difference([0.0, 0.01, 0.0]))
-
-
-def test_forces_while_contracted_keep_every_sample_of_the_contracted_muscle() -> None:
-    force = np.array([[9.0, 1.0], [2.0, 1.0], [2.0, 7.0]])
-    activation = np.array([[0.9, 0.0], [0.9, 0.5], [0.2, 0.6]])
-    assert sorted(contraction_forces(force, activation)) == [2.0, 7.0, 9.0]
-
-
-def test_net_travel_and_the_way_forth_and_back() -> None:
-    position = [0.1, 0.3, 0.2, 0.0]
-    assert net_travel(position) == pytest.approx(-0.1)
-    assert path_travel(position) == pytest.approx(0.5)
-    assert math.isnan(net_travel([]))
 
 
 @given(st.lists(st.floats(0.001, 0.1), min_size=3, max_size=8), st.floats(0.1, 10.0))

@@ -137,7 +137,7 @@ def test_a_circle_is_found_wherever_its_arc_lies(
     along = start + turn * np.linspace(0.0, angle, 50)
     circle = fitted_circle(np.stack([x + radius * np.cos(along), y + radius * np.sin(along)], axis=-1))
     assert circle is not None
-    assert circle.is_told
+    assert circle.is_clear
     assert circle.radius_m == pytest.approx(radius, rel=1e-5)
     assert circle.centre_m == pytest.approx((x, y), abs=1e-4 * radius)
     assert circle.angle_rad == pytest.approx(turn * angle, rel=1e-4)
@@ -177,7 +177,7 @@ def test_the_balance_splits_what_the_books_say() -> None:
     assert (balance.damping_J, balance.numerical_J) == pytest.approx((10.8, 13.2))
     assert balance.numerical_share == pytest.approx(13.2 / 36.0)
     labels = dict(gait_rows(gait(run_of(data))))
-    assert labels["of which"] == "held 0 %, slip 20 %, other constraints 13 %, damping 30 %, integrator 37 %"
+    assert labels["of which"] == "stored 0 %, slip 20 %, other constraints 13 %, damping 30 %, integrator 37 %"
 
 
 def test_a_planar_worm_s_balance_needs_no_weight() -> None:

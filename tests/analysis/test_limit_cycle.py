@@ -33,7 +33,6 @@ class Field:
     def __init__(self, n_states: int, timestep_s: float = 1e-3) -> None:
         self.timestep_s = timestep_s
         self.labels = tuple(f"x[{i}]" for i in range(n_states))
-        self.switch_labels: tuple[str, ...] = ()
 
     def step(self, state, switches):
         switches = self.switch(state, switches)
@@ -69,7 +68,6 @@ class Thermostat(Field):
 
     def __init__(self, timestep_s: float = 1e-3) -> None:
         super().__init__(2, timestep_s)
-        self.switch_labels += ("heating",)
 
     def switch(self, state, switches):
         return ((state[:, :1] <= 1.0) | switches) & (state[:, :1] < 2.0)

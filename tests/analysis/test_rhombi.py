@@ -118,7 +118,7 @@ def test_a_run_is_measured_over_time_and_at_a_time(recorded: tuple[Run, MeshGeom
 
 def test_times_and_runs_without_postures_are_refused(recorded: tuple[Run, MeshGeometry]) -> None:
     run, _ = recorded
-    with pytest.raises(RunFileError, match=r"no posture at 1\.5 s: it was recorded from 0 to 0\.2 s"):
+    with pytest.raises(RunFileError, match=r"no picture at 1\.5 s: it was recorded from 0 to 0\.2 s"):
         nearest_frame(run, 1.5)
     empty = Run(run.path, run.data.isel(frame=slice(0)), run.config, run.status, "")
     planar = Run(run.path, run.data.drop_vars("crossing_position"), run.config, run.status, "")

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from synthetic import wave_activation, wave_data
 
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
-from annelid.analysis.rhythm import contractions, rhythm
-from annelid.analysis.score import score
+from annelid.analysis.rhythm import contractions, rhythm, score
 from annelid.config import load_config
 from annelid.simulation import Run, simulate
 

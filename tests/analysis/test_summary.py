@@ -13,7 +13,8 @@ from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
 from annelid.analysis import Summary, summary
 from annelid.analysis.paper import published
-from annelid.config import check_config, load_config
+from annelid.config import check_config, field_paths, load_config, preset_names
+from annelid.config.run import published_worms
 from annelid.simulation.runfile import Run
 
 PROMISED = {
@@ -24,7 +25,7 @@ PROMISED = {
 
 
 def run_of(data: xr.Dataset, **tree: Any) -> Run:
-    config = check_config({"name": "riddle2023"} | tree)
+    config = check_config({"name": "riddle2023", "published": "riddle2023"} | tree)
     return Run(Path("run.nc"), data, config, "complete", "")
 
 
@@ -100,10 +101,29 @@ def test_half_rings_add_up_to_a_ring_and_share_a_segment() -> None:
 
 
 def test_published_numbers_stand_beside_the_papers_worm_only() -> None:
-    paper = published(check_config({"name": "riddle2023-rods"}))
+    paper = published(check_config({"published": "riddle2023"}))
     assert paper["elongation_first_helix_pp_m"].value == (0.0420, 0.0255, 0.0402)
-    assert not published(check_config({"name": "riddle2023", "body": {"mesh": {"n_segments": 4}}}))
-    assert not published(check_config({"name": "mine"}))
+    assert not published(check_config({"published": "riddle2023", "body": {"mesh": {"n_segments": 4}}}))
+    assert not published(check_config({"published": "riddle2022"}))
+    assert not published(check_config({"name": "riddle2023"}))
+
+
+def test_published_numbers_go_with_a_preset_whatever_a_worm_is_called(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "riddle2023-rods"\n', encoding="utf-8")
+    assert published(load_config(mine)) == published(load_config("riddle2023"))
+    assert {name for name in preset_names() if published(load_config(name))} == {
+        "riddle2022-planar", "riddle2023", "riddle2023-fast", "riddle2023-rods", "wang",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(published_worms()))
+def test_what_is_published_is_of_fields_that_exist(name: str) -> None:
+    for worm in published_worms()[name]:
+        assert set(worm) == {"given", "numbers"}
+        assert set(worm["numbers"]) <= set(Summary.__slots__)
+        assert set(worm["given"]) <= {*field_paths(), "body.n_segments"}
+        assert all(len(entry) == 3 for entry in worm["numbers"].values())
 
 
 @pytest.mark.parametrize(
@@ -119,7 +139,7 @@ def test_published_numbers_stand_beside_the_papers_worm_only() -> None:
 def test_planar_periods(n_segments: int, tau_ms: float, gain: float, period_s: float | None) -> None:
     config = check_config(
         {
-            "name": "riddle2022-planar",
+            "published": "riddle2022",
             "body": {"kind": "riddle2022", "n_segments": n_segments, "gain": gain},
             "controller": {"gate_time_constant_ms": tau_ms},
         }
@@ -144,6 +164,38 @@ def test_loads_are_told_segment_by_segment() -> None:
     assert numbers.segment_force_peak_N == pytest.approx([6.0, 7.0, 8.0], rel=1e-6)
     assert numbers.segment_force_median_N == pytest.approx([5.0, 5.0, 5.0], abs=1e-6)
     assert numbers.contraction_force_peak_N == pytest.approx(8.0)
+
+
+def test_forces_are_those_of_every_sample_in_which_the_muscle_itself_is_contracted() -> None:
+    data = wave_data().isel(time=slice(3))
+    shape = ("time", "muscle")
+    data["muscle_force"] = (shape, [[9.0, 1.0, 0.0], [2.0, 1.0, 0.0], [2.0, 7.0, 0.0]])
+    data["activation"] = (shape, [[0.9, 0.0, 0.0], [0.9, 0.5, 0.0], [0.2, 0.6, 0.0]])
+    numbers = summary(run_of(data))
+    assert numbers.segment_force_median_N == [5.5, 7.0, None]
+    assert (numbers.contraction_force_median_N, numbers.contraction_force_peak_N) == (7.0, 9.0)
+
+
+def test_both_readings_of_a_written_down_stretch() -> None:
+    rest = np.array([[0.07, 0.08], [0.07, 0.08], [0.07, 0.08]])
+    stretch = np.repeat(rest[None], 4, axis=0)
+    stretch[1, 0] += [0.04, 0.02]  # segment 1 lengthens
+    stretch[2, 0, 0] -= 0.01  # its first helix shortens below rest
+    stretch[3, 2] += [0.00, 0.03]  # segment 3 lengthens away from the first helix
+    data = wave_data().isel(time=slice(4)).drop_dims("sensor")
+    data["stretch_length"] = (("time", "segment", "sensor"), stretch)
+    data["stretch_rest_length"] = (("segment", "sensor"), rest)
+    numbers = summary(run_of(data))
+    assert numbers.elongation_first_helix_pp_m == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
+    assert numbers.elongation_mean_max_m == pytest.approx([0.03, 0.0, 0.015], abs=1e-15)
+
+
+def test_travel_is_net_and_its_path_goes_forwards_and_backwards() -> None:
+    data = wave_data().isel(time=slice(4))
+    data["center_of_mass"][:, 0] = [-0.1, -0.3, -0.2, 0.0]
+    numbers = summary(run_of(data))
+    assert numbers.travel_m == pytest.approx(-0.1)
+    assert numbers.travel_path_m == pytest.approx(0.5)
 
 
 def test_the_robot_stands_beside_its_preset_only() -> None:

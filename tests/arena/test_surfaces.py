@@ -199,7 +199,7 @@ def test_rough_ground_has_its_roughness_and_correlation() -> None:
     rng = np.random.default_rng(0)
     lag, squares, products = 0.15, [], []
     for seed in range(60):
-        ground = surface_of(arena.model_copy(update={"relief_seed": seed})).ground  # type: ignore[attr-defined]
+        ground = arena.model_copy(update={"relief_seed": seed}).ground()
         here = rng.uniform([-40.0, -20.0], [-1.0, 20.0], (500, 2))
         angle = rng.uniform(0, 2 * pi, 500)
         there = here + lag * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -222,7 +222,7 @@ def test_to_first_order_a_distance_is_as_near_as_stated() -> None:
 
 
 def test_a_slope_leans_gravity_and_leaves_the_ground_level() -> None:
-    from annelid.arena.gravity import gravity_of
+    from annelid.arena.surface import gravity_of
 
     slope = Floor(slope_deg=10.0)
     pull = gravity_of(slope)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from annelid.body import mesh_of
 from annelid.body.actuation import stretch_sensors
-from annelid.body.actuators.servo import ServoRings, winding_speed
+from annelid.body.actuators.servo import ServoRings
 from annelid.body.worm import Mesh, Springs
 from annelid.config import load_config
 from annelid.errors import ConfigError
@@ -45,8 +46,10 @@ def speed(
 ) -> float:
     rings = rings or ServoRings(stiffness_N_per_m=STIFFNESS_N_PER_M, speed_limit_m_per_s=SPEED_M_PER_S)
     command, slack, length = (np.array([value]) for value in (activation, slack_m, length_m))
-    span, limit = np.array([[0.31, 0.48]]), np.array([LIMIT_N])
-    return float(winding_speed(command, slack, length, span, limit, rings, time_s)[0])
+    model: Any = SimpleNamespace(
+        actuator_actrange=np.array([[0.31, 0.48]]), actuator_forcerange=np.array([[-LIMIT_N, 0.0]])
+    )
+    return float(rings.drive(model, command, slack, length, time_s)[0])
 
 
 activations, lengths = st.floats(0.0, 1.0), st.floats(0.31, 0.48)
@@ -86,7 +89,7 @@ def test_without_load_a_cable_moves_at_the_speed_limit(layout: str) -> None:
     for _ in range(100):
         felt = plant.step(np.ones(plant.n_muscles))
         assert np.array_equal(felt.muscle_force_N, np.zeros(plant.n_muscles))
-    assert plant.actuator_state() == pytest.approx(longest - 0.5 * SPEED_M_PER_S, rel=1e-9)
+    assert plant.act == pytest.approx(longest - 0.5 * SPEED_M_PER_S, rel=1e-9)
 
 
 def test_a_slack_cable_changes_nothing() -> None:

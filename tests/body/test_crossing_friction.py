@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, mesh_of
-from annelid.body.friction import add_diagonal_friction
+from annelid.body.actuation import add_diagonal_friction
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 
@@ -104,7 +104,7 @@ def test_a_torque_at_the_crossings_becomes_the_force_of_the_same_work() -> None:
     geometry = mesh_of(config.body.mesh)
     model = build_spec(config).compile()
     lines = [i for i in range(model.ntendon) if model.tendon(i).name.startswith("diagonal_")]
-    assert len(lines) == len(geometry.rhombi) == (geometry.n_planes - 2) * 6
+    assert len(lines) == len(geometry.rhombi) == (len(geometry.plane_x_m) - 2) * 6
     # A flat scissor of the same sides: the change of its axial diagonal with the angle at rest, by differences.
     front, left, _, right = geometry.crossings_m[geometry.rhombi[0]]
     hoop = np.linalg.norm(left - right)

@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 from annelid import simulate
 from annelid.analysis import summary
 from annelid.analysis.gait import cycle_marks
-from annelid.analysis.travel import forward_position
+from annelid.analysis.track import forward_position
 from annelid.config import load_config
 from annelid.protocols import Array
-from annelid.simulation.placing import Placed, turned
+from annelid.simulation.anatomy import Placed, turned
 from annelid.simulation.worm import WormPlant
 
 FREE: dict[str, Any] = {
@@ -53,15 +53,15 @@ def deformed(plant: WormPlant) -> Placed:
     plant.reset(0)
     for _ in range(60):
         plant.step(np.array([1.0, 0.4, 0.0]))
-    return Placed(plant.qpos().copy(), plant.plastic().copy())
+    return Placed(plant.qpos.copy(), plant.plastic.copy())
 
 
 def at_rest(plant: WormPlant) -> Placed:
     plant.reset(0)
     plant.step(np.zeros(3))
-    plastic = plant.plastic().copy()
+    plastic = plant.plastic.copy()
     plant.reset(0)
-    return Placed(plant.qpos().copy(), plastic)
+    return Placed(plant.qpos.copy(), plastic)
 
 
 def lost(plant: WormPlant, placed: Placed, velocity: Array) -> Lost:

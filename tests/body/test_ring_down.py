@@ -22,6 +22,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
+from annelid.body.damping import HELD, MaterialDamping, add_damper_rows
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
@@ -29,7 +30,6 @@ from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masse
 from annelid.body.worm import Strands
 from annelid.morphology import Array
 from annelid.simulation import worm as _engine_warnings_go_to_the_log  # noqa: F401
-from annelid.simulation.damping import HELD, MaterialDamping, add_damper_rows
 
 Motion = Literal["in plane", "across", "twist"]
 

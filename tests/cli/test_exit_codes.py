@@ -45,7 +45,7 @@ def _computed_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
         return future
 
     monkeypatch.setattr("annelid.experiment.workers.Processes.submit", submit)
-    for figure in ("sweep.results.sweep_figure", "tune.results._figure"):
+    for figure in ("sweep.sweep_figure", "tune._figure"):
         monkeypatch.setattr(f"annelid.experiment.{figure}", lambda *_: Path("figure.png"))
 
 

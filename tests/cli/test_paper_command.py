@@ -137,16 +137,24 @@ def test_without_a_terminal_progress_is_a_line(annelid: Command, asked: Asked) -
 
 
 class Clock:
-    def __init__(self) -> None:
-        self.now = 0.0
+    """Stands for the module `time`."""
 
-    def __call__(self) -> float:
+    now = 0.0
+
+    def monotonic(self) -> float:
         return self.now
 
 
-def test_lines_come_at_most_every_half_minute() -> None:
-    clock, stream = Clock(), io.StringIO()
-    tell = Lines(stream, clock)
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr("annelid.experiment.progress.time", clock)
+    return clock
+
+
+def test_lines_come_at_most_every_half_minute(clock: Clock) -> None:
+    stream = io.StringIO()
+    tell = Lines(stream)
     for second in range(101):
         clock.now = float(second)
         tell("running worms", second, 200, second / 200)
@@ -155,9 +163,8 @@ def test_lines_come_at_most_every_half_minute() -> None:
     assert lines[1] == "running worms: 30 of 200 runs, about 2:50 left"
 
 
-def test_time_left_is_that_of_the_stage() -> None:
-    clock = Clock()
-    left = TimeLeft(clock)
+def test_time_left_is_that_of_the_stage(clock: Clock) -> None:
+    left = TimeLeft()
     assert left("running worms", 0.0) is None
     clock.now = 60.0
     assert left("running worms", 0.25) == pytest.approx(180.0)

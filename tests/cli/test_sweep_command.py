@@ -56,14 +56,14 @@ def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
 
 def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command) -> None:
     from annelid.config import load_study
-    from annelid.experiment.sweep.design import plan_of
+    from annelid.experiment.sweep import plan_of
 
     text = annelid("sweep", "--example").out
     assert text.splitlines()[0].startswith("# A sweep:  annelid sweep study.toml")
     Path("study.toml").write_text(text)
     plan = plan_of(load_study("study.toml"))
     assert len(plan.points) == 12
-    assert all(point.case.config for point in plan.points)
+    assert all(case.config for _, case in plan.points)
     fields = {line.split("=")[0].strip("# ") for line in text.splitlines() if "=" in line}
     assert {"samples", "seed", "repeats", "outputs", "rank", "keep", "address", "walltime"} <= fields
 

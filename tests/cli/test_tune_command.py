@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("runs_in_this_process")
         (("--objective", "pace"), "unknown objective 'pace'"),
         (("--objective", "slip", "--objective", "slip"), "one or two of"),
         (("--vary", "controller.gate_ms=1:2"), "did you mean"),
-        (("--vary", "arena.friction=1:0.5"), "lower end"),
+        (("--vary", "arena.friction=1:0.5"), "be below to = 0.5"),
         (("--set", "controller.kind=pogram"), "controller.kind = 'pogram'"),
         (("crawlr",), "unknown preset 'crawlr'"),
     ],

@@ -38,7 +38,7 @@ def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command
     assert again.exit_code == 0, again.err
     assert {path: path.stat().st_mtime_ns for path in Path("walk/uncertainty").glob("*/run.nc")} == before
     assert json.loads(Path("walk/uncertainty.json").read_text()) == content
-    assert "holds another run" in annelid(*command, "--seed", "3").sentence()
+    assert "has another run in it" in annelid(*command, "--seed", "3").sentence()
 
 
 def test_an_interrupted_study_names_the_command_that_goes_on(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid.config.sensor import StretchSensor as SensorSection
+from annelid.config.run import StretchSensor as SensorSection
 from annelid.control import AdaptiveController, SnsController
-from annelid.control.adaptive import AdaptiveSns
-from annelid.control.neural import design_of
+from annelid.control.base import design_of
 from annelid.control.robust import RobustController, RobustSns
-from annelid.control.sns import Sns
+from annelid.control.sns import AdaptiveSns, Sns
 from annelid.nervous import PeristalsisParameters
 from annelid.nervous.robust import RobustParameters
 from annelid.protocols import Sensation

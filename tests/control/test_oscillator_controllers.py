@@ -20,9 +20,9 @@ from annelid.control import (
     SineController,
     TimedController,
 )
-from annelid.control.adaptive import AdaptiveSns as AdaptiveSection
+from annelid.control.open_loop import SineWave, TimedWave
 from annelid.control.oscillators import HeteroclinicChannel, PhaseChain
-from annelid.control.waves import SineWave, TimedWave, sine_activation, timed_activation, timed_cycle_s
+from annelid.control.sns import AdaptiveSns as AdaptiveSection
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
 from annelid.simulation import Run, simulate
@@ -109,15 +109,15 @@ def test_three_by_one_and_two_by_two_are_the_authors_patterns() -> None:
     times = np.arange(6, 18, 0.5)
     turn = np.interp(np.arange(0, 6, 0.5), [0, 1, 2, 3, 6], [0, 1, 1, 0, 0])
     for wave, delay in ((TimedWave(), 1.0), (TimedWave(interval_s=2.0, waves=2), 2.0)):
-        assert timed_cycle_s(wave, 6) == 6.0
-        pattern = timed_activation(wave, 6, times)
+        assert TimedController(wave, 6, 6).cycle_s == 6.0
+        pattern = TimedController(wave, 6, 6).activation(times)
         for segment in range(6):
             expected = np.tile(np.roll(turn, round(2 * delay * segment)), 2)
             np.testing.assert_allclose(pattern[:, segment], expected, atol=1e-6)
 
 
 def test_a_segment_rests_until_its_first_turn() -> None:
-    before = timed_activation(TimedWave(), 6, np.arange(0, 6, 0.25))
+    before = TimedController(TimedWave(), 6, 6).activation(np.arange(0, 6, 0.25))
     for segment in range(6):
         assert not before[: 4 * segment + 1, segment].any()
         assert before[4 * segment + 1, segment] == pytest.approx(0.25, abs=1e-6)
@@ -130,7 +130,7 @@ def test_a_timed_segment_holds_for_its_number_of_control_steps(rise: int, hold: 
     wave = TimedWave(rise_s=rise * dt, hold_s=hold * dt, fall_s=0.0, interval_s=interval)
     start = round((cycles * 6 + segment) * interval / dt)
     steps = np.arange(start, start + 2100)
-    on = timed_activation(wave, 6, steps * dt)[:, segment]
+    on = TimedController(wave, 6, 6).activation(steps * dt)[:, segment]
     np.testing.assert_allclose(on[:rise], np.arange(rise) / max(rise, 1), atol=1e-6)
     np.testing.assert_allclose(on[rise : rise + hold], 1.0, atol=1e-6)
     assert not on[rise + hold :].any()
@@ -145,11 +145,11 @@ def test_a_timed_pattern_that_overtakes_itself_is_refused() -> None:
 def test_a_sine_travels_by_its_number_of_waves(waves: int, n: int, period: float, level: float) -> None:
     wave = SineWave(period_s=period, waves=waves, level=level)
     times = np.linspace(0, period, 50)
-    activation = sine_activation(wave, n, times)
+    activation = SineController(wave, n, n).activation(times)
     assert activation.min() >= 0
     assert activation.max() == pytest.approx(level)
     np.testing.assert_allclose(activation[0], activation[-1], atol=1e-9)
-    later = sine_activation(wave, n, times + period * waves / n)
+    later = SineController(wave, n, n).activation(times + period * waves / n)
     np.testing.assert_allclose(later[:, 1:], activation[:, :-1], atol=1e-9)
 
 

@@ -10,10 +10,10 @@ import pytest
 
 from annelid.config import StretchSensor, load_config
 from annelid.control import SnsController
-from annelid.control.pressure import PressureController, PressureSns
+from annelid.control.sns import PressureController, PressureSns
 from annelid.errors import ConfigError
 from annelid.nervous import peristalsis_network
-from annelid.nervous.pressure import PressureParameters, pressure_network
+from annelid.nervous.peristalsis import pressure_network
 from annelid.protocols import SIDES, Array, Sensation
 
 N = 4
@@ -190,6 +190,6 @@ def test_a_body_without_skin_is_refused() -> None:
 
 def test_parameters_of_the_wrong_sign_are_refused() -> None:
     with pytest.raises(ConfigError, match="hold must be at least 0, not -1"):
-        PressureParameters(hold=-1.0)
+        pressure_network(3, hold=-1.0)
     with pytest.raises(ConfigError, match="pressure_time_constant_s"):
         PressureController(PressureSns(pressure_time_constant_s=0.001), SENSOR, N, N, 0.002)

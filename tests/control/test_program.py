@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from annelid.analysis.paper import published
 from annelid.config import RunConfig, load_config, parse_assignments
 from annelid.control import ProgramController
-from annelid.control.program import Contraction, Program, program_activation
+from annelid.control.open_loop import Contraction, Program
 from annelid.control.sns import Sns
 from annelid.draw.table import field_lines
 from annelid.errors import ConfigError
@@ -44,7 +44,9 @@ def test_is_a_controller_that_records_and_restores() -> None:
 
 
 def test_without_a_ramp_activation_steps_at_start_and_stop() -> None:
-    activation = program_activation(program((2, 0.3, 0.6, 0.8)), 3, [0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0])
+    activation = ProgramController(program((2, 0.3, 0.6, 0.8)), 3, 3).activation(
+        [0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0]
+    )
     np.testing.assert_array_equal(activation[:, 1], [0, 0, 0.8, 0.8, 0.8, 0, 0])
     assert not activation[:, [0, 2]].any()
 
@@ -55,7 +57,7 @@ def test_a_contraction_lasts_exactly_its_number_of_control_steps(start: int, ste
     dt = 0.001
     one = program((1, start * dt, (start + steps) * dt, 1.0))
     for times in (np.arange(9000) * dt, np.cumsum(np.full(9000, dt)) - dt):
-        on = np.flatnonzero(program_activation(one, 1, times)[:, 0])
+        on = np.flatnonzero(ProgramController(one, 1, 1).activation(times)[:, 0])
         assert (on[0], len(on)) == (start, steps)
 
 
@@ -63,12 +65,12 @@ def test_a_ramp_rises_from_the_start_and_falls_from_the_stop() -> None:
     one = program((1, 1.0, 2.0, 0.6), ramp_s=0.2)
     times = [0.9, 1.0, 1.05, 1.1, 1.2, 1.7, 2.0, 2.05, 2.1, 2.2, 3.0]
     expected = [0.0, 0.0, 0.15, 0.3, 0.6, 0.6, 0.6, 0.45, 0.3, 0.0, 0.0]
-    np.testing.assert_allclose(program_activation(one, 1, times)[:, 0], expected, atol=1e-12)
+    np.testing.assert_allclose(ProgramController(one, 1, 1).activation(times)[:, 0], expected, atol=1e-12)
 
 
 def test_a_contraction_shorter_than_its_ramp_falls_from_what_it_has_reached() -> None:
     one = program((1, 1.0, 1.1, 1.0), ramp_s=0.4)
-    activation = program_activation(one, 1, [1.0, 1.05, 1.1, 1.15, 1.2, 1.3])[:, 0]
+    activation = ProgramController(one, 1, 1).activation([1.0, 1.05, 1.1, 1.15, 1.2, 1.3])[:, 0]
     np.testing.assert_allclose(activation, [0.0, 0.125, 0.25, 0.125, 0.0, 0.0], atol=1e-12)
 
 
@@ -82,8 +84,8 @@ def test_of_overlapping_contractions_the_larger_wins(
     several: list[tuple[int, float, float, float]], ramp_s: float
 ) -> None:
     times = np.linspace(0.0, 9.0, 400)
-    alone = [program_activation(program(one, ramp_s=ramp_s), 4, times) for one in several]
-    together = program_activation(program(*several, ramp_s=ramp_s), 4, times)
+    alone = [ProgramController(program(one, ramp_s=ramp_s), 4, 4).activation(times) for one in several]
+    together = ProgramController(program(*several, ramp_s=ramp_s), 4, 4).activation(times)
     np.testing.assert_array_equal(together, np.max([np.zeros((400, 4)), *alone], axis=0))
     assert together.min() >= 0
     assert together.max() <= 1
@@ -94,7 +96,7 @@ def test_a_ramp_moves_activation_no_faster_than_its_level_over_the_ramp(
     one: tuple[int, float, float, float], ramp_s: float
 ) -> None:
     times = np.linspace(0.0, 10.0, 2001)
-    activation = program_activation(program(one, ramp_s=ramp_s), 4, times)
+    activation = ProgramController(program(one, ramp_s=ramp_s), 4, 4).activation(times)
     assert np.abs(np.diff(activation, axis=0)).max() <= one[3] * 0.005 / ramp_s + 1e-9
 
 
@@ -201,7 +203,7 @@ def test_a_planar_worm_does_what_the_program_says(tmp_path: Path) -> None:
     assert isinstance(config.controller, Program)
     # The sample at t holds the activation of the step that ended there.
     begun = time[1:] - config.clock.control_timestep_s
-    np.testing.assert_allclose(activation[1:], program_activation(config.controller, 3, begun), atol=1e-9)
+    np.testing.assert_allclose(activation[1:], ProgramController(config.controller, 3, 3).activation(begun), atol=1e-9)
     heights = run.data["ring_length"].values
     assert heights[:, 1] == pytest.approx(0.11)
     assert 0.07 < heights[:, 2].min() < 0.105

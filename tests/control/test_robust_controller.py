@@ -16,9 +16,9 @@ from annelid.analysis import rhythm_score
 from annelid.config import RunConfig
 from annelid.control.robust import DescendingDrive, RobustController, RobustSns
 from annelid.errors import ConfigError
-from annelid.nervous.robust import ROLES, neuron_names
+from annelid.nervous.robust import ROLES, robust_network
 from annelid.protocols import SIDES, Records, Sensation, Stateful, StridingController
-from annelid.simulation.assemble import build_controller, build_plant
+from annelid.simulation.stepping import build_controller, build_plant
 
 N, TIMESTEP_S, REST_M = 4, 0.001, 0.1
 
@@ -103,7 +103,7 @@ def test_what_it_names_it_reads() -> None:
     made = controller()
     named, values = made.recordable(), made.read(frame=False)
     assert {signal.name: signal.shape for signal in named.signals} == {name: np.shape(v) for name, v in values.items()}
-    assert list(named.coords["neuron"]) == neuron_names(N)
+    assert list(named.coords["neuron"]) == list(robust_network(N).neurons)
     gate = np.asarray(values["sodium_gate"])[:-1].reshape(N, len(ROLES))
     assert np.isfinite(gate[:, :2]).all()
     assert np.isnan(gate[:, 2:]).all()

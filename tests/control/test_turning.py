@@ -11,21 +11,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import check_config, load_config
-from annelid.config.sensor import StretchSensor as SensorSection
+from annelid.config.run import StretchSensor as SensorSection
 from annelid.control import SnsController, TimedController
+from annelid.control.open_loop import TimedWave
 from annelid.control.sns import Sns
-from annelid.control.steering import (
+from annelid.control.turning import (
     ConstantTurning,
     CourseTurning,
     HeadingTurning,
     TouchTurning,
+    TurningController,
     TurningKind,
     half_scales,
     heading_angle,
     wrapped,
 )
-from annelid.control.turning import TurningController
-from annelid.control.waves import TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Controller, Records, Sensation, Stateful, StridingController, Watched
 
@@ -198,7 +198,7 @@ def test_every_segment_takes_its_share_and_a_negative_one_bends_the_other_way() 
     section = ConstantTurning(modulation=0.8, shares=shares, descending_time_constant_s=1e-3)
     scales = section.build(N, STEP_S).advance(felt(), 100)
     assert scales.tolist() == [pytest.approx([0.2, 1.0]), [1.0, 1.0], pytest.approx([1.0, 0.6])]
-    with pytest.raises(ConfigError, match=r"turning.shares has 3 entries: must have 6, one a segment"):
+    with pytest.raises(ConfigError, match=r"turning.shares has 3 entries: must have 6, one per segment"):
         load_config("riddle2025", {"turning.shares": list(shares)})
 
 

@@ -84,7 +84,7 @@ ELSEWHERE = {
     ("pytest",): "these are the tests",
     ("python", "examples/"): "tests/test_examples.py runs the examples",
     ("python", "benchmarks/"): "minutes each: `test_a_benchmark_runs` executes them",
-    ("python", "docs/site/"): "tests/docs/test_site.py builds the site",
+    ("python", "docs/site/"): "tests/docs calls these",
     ("python", "-c"): "arithmetic",
     ("annelid", "sweep"): "minutes, and workers; the command has tests of its own",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",

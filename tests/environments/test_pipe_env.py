@@ -14,9 +14,8 @@ from annelid.arena.course import AHEAD, LEFT, UP
 from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.environments import WormEnv
-from annelid.environments.episode import Episode
+from annelid.environments.episode import Episode, Route
 from annelid.environments.task import task_of
-from annelid.environments.way import way_of
 
 BEND = Pipe(bore_m=0.18, course="bend", radius_m=0.8, turn_deg=90.0, straight_m=0.2)
 
@@ -27,26 +26,26 @@ def rings(middle: np.ndarray) -> np.ndarray:
 
 
 @given(*[st.floats(-3.0, 3.0)] * 3)
-def test_on_open_ground_the_way_is_straight_ahead(x: float, y: float, z: float) -> None:
-    place = way_of(Floor()).place(rings(np.array([x, y, z])))
+def test_on_open_ground_the_route_is_straight_ahead(x: float, y: float, z: float) -> None:
+    place = Route(Floor()).place(rings(np.array([x, y, z])))
     assert place.along_m == pytest.approx(-x)
     assert np.array_equal(place.axes, [AHEAD, LEFT, UP])
 
 
 @given(st.floats(0.02, 1.55))
-def test_round_a_bend_the_way_is_the_arc_and_its_axes_turn(angle: float) -> None:
+def test_round_a_bend_the_route_is_the_arc_and_its_axes_turn(angle: float) -> None:
     centre = np.array([-0.2, -0.8, 0.18])
     middle = centre + 0.8 * np.array([-np.sin(angle), np.cos(angle), 0.0])
-    place = way_of(BEND).place(np.stack([middle] * 3))
+    place = Route(BEND).place(np.stack([middle] * 3))
     assert place.along_m == pytest.approx(0.2 + 0.8 * angle)
     assert np.allclose(place.axes @ place.axes.T, np.eye(3))
     assert np.allclose(place.axes[0], [-np.cos(angle), -np.sin(angle), 0.0])
     assert np.allclose(place.axes[2], UP)
 
 
-def test_where_the_pipe_begins_both_ways_agree() -> None:
+def test_where_the_pipe_begins_both_routes_agree() -> None:
     middle = rings(np.array([0.3, 0.0, 0.18]))
-    pipe, floor = way_of(BEND).place(middle), way_of(Floor()).place(middle)
+    pipe, floor = Route(BEND).place(middle), Route(Floor()).place(middle)
     assert pipe.along_m == pytest.approx(floor.along_m)
     assert np.allclose(pipe.axes, floor.axes)
 
@@ -68,7 +67,7 @@ def test_passing_is_success_and_ends_the_episode() -> None:
     options = {"fidelity": "coarse", "interval_s": 0.12, "episode_s": 6.0, "weights": None, "start_activation": 0.0}
     task = task_of(CHEAP["preset"], CHEAP["changes"], arena="pipe.taper", **options)
     worm = WormEnv(CHEAP["preset"], CHEAP["changes"], arena="pipe.taper").worm
-    start = way_of(task.config.arena).place(worm.posture.crossing.take(worm.geometry.rings, axis=0).mean(axis=1))  # type: ignore[arg-type]
+    start = Route(task.config.arena).place(worm.posture.crossing.take(worm.geometry.rings, axis=0).mean(axis=1))  # type: ignore[arg-type]
     episode, random = Episode(replace(task, goal_m=start.along_m + 0.01), worm), np.random.default_rng(0)
     episode.reset(random)
     told, k = [], 0

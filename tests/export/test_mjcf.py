@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body.mjcf import mjcf_text
+from annelid.body.assemble import mjcf_text
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.export.mjcf import write_mjcf
+from annelid.export.formats import write_mjcf
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run, read_checkpoint
 from annelid.simulation.worm import WormPlant

@@ -18,8 +18,7 @@ from scipy.io import loadmat
 from annelid.config import RunConfig
 from annelid.errors import MissingDependency, RunFileError
 from annelid.export import Selection, find_format, formats, selected
-from annelid.export.matlab import LONGEST_NAME, matlab_names
-from annelid.export.selection import signal_names
+from annelid.export.tables import LONGEST_NAME, matlab_names, signal_names
 from annelid.simulation.runfile import Run
 
 Columns = Mapping[str, list[Any]]

@@ -73,7 +73,7 @@ def test_peristalsis_is_made_of_these_half_centres():
     add_half_centre(twin, "contraction_1", "expansion_1", p)
     ends = {("contraction_1", "expansion_1"), ("expansion_1", "contraction_1")}
     assert isinstance(p, HalfCentre)
-    assert [c for c in network.connections if (c.source, c.target) in ends] == list(twin.connections)
+    assert [c for c in network.connections if (c.source, c.target) in ends] == twin.connections
     assert network.neurons["contraction_2"] == twin.neurons["contraction_1"]
     assert network.initial_mV["contraction_2"] == -0.2
 

@@ -29,7 +29,7 @@ def network() -> Network:
 def test_unknown_neuron_suggests_the_nearest(network, add):
     with pytest.raises(ConfigError, match=r"unknown neuron 'contractoin': did you mean 'contraction'\?"):
         add(network)
-    assert network.connections == ()
+    assert network.connections == []
     assert list(network.inputs) == ["drive"]
     assert list(network.outputs) == ["read"]
 

@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 from annelid.errors import ConfigError
 from annelid.nervous import HalfCentre, Network, Neuron, Stepper, add_half_centre, add_hold
 from annelid.nervous.neurons import Array
-from annelid.nervous.robust import ROLES, RobustParameters, neuron_names, robust_network, yield_mV, yielding_hold
+from annelid.nervous.robust import ROLES, TONIC_NEURON, RobustParameters, robust_network, yield_mV, yielding_hold
 
 BLOCK_MS = 10
 TURN_MS = RobustParameters().turn_ms
@@ -207,7 +207,8 @@ def test_without_entrainment_the_sensor_does_nothing() -> None:
 
 
 def test_names_are_those_of_the_neurons() -> None:
-    assert list(robust_network(4).neurons) == neuron_names(4)
+    names = [f"{role}_{segment}" for segment in range(1, 5) for role in ROLES]
+    assert list(robust_network(4).neurons) == [*names, TONIC_NEURON]
 
 
 @pytest.mark.parametrize(
@@ -215,7 +216,7 @@ def test_names_are_those_of_the_neurons() -> None:
     [
         ({"bifurcation_mV": 0.01}, "bifurcation_mV must be negative"),
         ({"turn_ms": 0.0}, "turn_ms must be positive"),
-        ({"entrainment": -0.1}, "entrainment must not be negative"),
+        ({"entrainment": -0.1}, "entrainment must be at least 0"),
         ({"push_nA": 0.5}, "push_nA = 0.5 must be between"),
         ({"push_nA": 40.0}, "push_nA = 40 must be between"),
     ],

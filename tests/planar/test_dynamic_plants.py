@@ -13,7 +13,7 @@ from annelid.planar.boxerbaum2012 import Boxerbaum2012Body
 from annelid.planar.daltorio2013 import Daltorio2013Body
 from annelid.planar.dynamic import DynamicPlanarPlant
 from annelid.protocols import Plant, Records, Sensation, Stateful, Watched
-from annelid.simulation.assemble import build_plant
+from annelid.simulation.stepping import build_plant
 
 CLOCK = Clock(control_timestep_s=0.005, physics_timestep_s=0.001)
 UNTOUCHED: dict[str, Any] = {"pipe_diameter_m": 0.3}

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.planar import friction
+from annelid.planar import midpoint as friction
 
 
 def problem(seed: int, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,7 +10,6 @@ import socket
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from annelid.cli import app
 from annelid.config import find_cluster
 from annelid.config.cluster import Slurm
 from annelid.errors import ClusterError, ConfigError
-from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, attempt
+from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, attempt, own_code
 from annelid.experiment.case import Case
 from annelid.experiment.cluster import slurm_cluster
 from annelid.experiment.store import Store, case_key
@@ -65,7 +64,7 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheduler: socket.soc
     cluster = f'[cluster]\nkind = "scheduler"\naddress = "{address}"\nreconnect_s = 0.5\n'
     Path("study.toml").write_text(STUDY + cluster)
     monkeypatch.setattr("annelid.experiment.workers.Processes.submit", lambda _, task: computed(task))
-    monkeypatch.setattr("annelid.experiment.sweep.results.write_results", lambda *_: [])
+    monkeypatch.setattr("annelid.experiment.sweep.write_results", lambda *_: [])
     return "study.toml"
 
 
@@ -227,13 +226,18 @@ class Away(Workers):
         """Nothing to let go."""
 
 
+def task_elsewhere(store: Store, case: Case) -> Task:
+    """A run for a worker that does not see the store's folder."""
+    return Task(store.path(case).name, case.config.model_dump_json(), own_code(), "elsewhere", "mark", store._keep)
+
+
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory) -> list[bytes]:
     """What an honest worker sends of `CASE` and of `OTHER`."""
     store = Store(tmp_path_factory.mktemp("runs"))
     found = []
     for case in (CASE, OTHER):
-        content = attempt(replace(store._task(case, "mark"), home="elsewhere"))
+        content = attempt(task_elsewhere(store, case))
         assert content is not None
         found.append(content)
     return found
@@ -315,7 +319,7 @@ def refused_numbers(folder: Path, content: bytes) -> None:
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """What an honest worker sends of `CASE` where only numbers are kept."""
     store = Store(tmp_path_factory.mktemp("numbers"), keep="outcomes")
-    content = attempt(replace(store._task(CASE, "mark"), home="elsewhere"))
+    content = attempt(task_elsewhere(store, CASE))
     assert content is not None
     return content
 

@@ -118,7 +118,7 @@ def test_a_kind_that_is_none_is_refused(kind: object) -> None:
 )
 def test_the_engine_refuses_nothing_that_the_configuration_takes(base: str, size: float) -> None:
     """What the engine says of a body is told by fields, and nothing else escapes from building it."""
-    from annelid.body.mjcf import mjcf_text
+    from annelid.body.assemble import mjcf_text
 
     config = load_config(base, {"body.mesh.elements_per_side": 1})
     numbers = [

@@ -22,9 +22,8 @@ from typer.testing import CliRunner
 
 from annelid.cli import app
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, save
+from annelid.draw.canvas import canvas, panel_title, save
 from annelid.draw.figures.sweep import sweep_figure
-from annelid.draw.style import panel_title
 from annelid.errors import AnnelidError
 from annelid.nervous import Network, Neuron
 from annelid.output import write_csv

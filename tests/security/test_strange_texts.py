@@ -14,8 +14,8 @@ import pytest
 from annelid import Network, simulate
 from annelid.config import find_cluster, load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
-from annelid.experiment.calibration.loop import read_loop
-from annelid.experiment.uncertainty.parameters import read_spread
+from annelid.experiment.load_frame import read_loop
+from annelid.experiment.spread import read_spread
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
 from annelid.textfiles import MOST_BYTES, parse_toml

@@ -20,9 +20,8 @@ from websockets.exceptions import ConnectionClosed, ConnectionClosedError, Inval
 from websockets.sync.client import connect
 
 from annelid.errors import MissingDependency
-from annelid.live import guard
-from annelid.live.guard import MOST_BYTES, Guard
-from annelid.live.server import Server, warning_of
+from annelid.live import server as guard
+from annelid.live.server import MOST_BYTES, Guard, Server, warning_of
 
 if TYPE_CHECKING:
     from websockets.sync.connection import Connection

@@ -13,8 +13,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Stateful
 from annelid.simulation.adjust import adjusted
-from annelid.simulation.assemble import build_controller, build_plant
-from annelid.simulation.stepping import Simulation, start
+from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 from annelid.simulation.worm import WormPlant
 
 BEFORE_S, AFTER_STEPS = 0.5, 5
@@ -46,7 +45,7 @@ def posture_after(simulation: Simulation) -> np.ndarray:
     for _ in range(AFTER_STEPS):
         simulation.advance()
     assert isinstance(simulation.plant, WormPlant)
-    return simulation.plant.qpos().copy()
+    return simulation.plant.qpos.copy()
 
 
 @settings(max_examples=3, deadline=None)

@@ -14,10 +14,10 @@ from annelid.arena.surface import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation
-from annelid.simulation.assemble import build_controller
-from annelid.simulation.batch.body import BatchWorm, BodyBatch, compile_worms
+from annelid.simulation.batch_body import BatchWorm, BodyBatch, compile_worms
 from annelid.simulation.ground import facing
 from annelid.simulation.loop import simulate
+from annelid.simulation.stepping import build_controller
 from annelid.simulation.worm import WormPlant, compile_worm
 
 RODS = "riddle2023-rods"
@@ -208,8 +208,8 @@ def test_a_worm_that_climbs_is_not_too_high() -> None:
     climbing = config("steps", arena__step_height_m=0.5, arena__step_length_m=1.0, guard__height_m=0.45)
     plant = reset(climbing)
     plant.data.qpos[0::1][: 3 * plant.geometry.n_crossings].reshape(-1, 3)[:, [0, 2]] += [-1.5, 1.0]
-    plant._posture = plant.locate()
-    assert plant._posture.crossing[:, 2].max() > 1.3
+    plant.posture = plant._locate()
+    assert plant.posture.crossing[:, 2].max() > 1.3
     plant._control_step = 0
     assert plant.alarm() is None
 
@@ -218,7 +218,7 @@ def test_a_worm_that_leaves_its_pipe_is_stopped() -> None:
     plant = reset(config("pipe", guard__height_m=0.3))
     assert plant.alarm() is None
     plant.data.qpos[: 3 * plant.geometry.n_crossings].reshape(-1, 3)[:, 1] += 0.5
-    plant._posture = plant.locate()
+    plant.posture = plant._locate()
     alarm = plant.alarm()
     assert alarm is not None
     assert "guard.height_m" in alarm

@@ -16,7 +16,7 @@ from mujoco.batch import Batch, SimulationError
 from annelid import RunConfig, load_config, open_run, simulate, simulate_batch, summary
 from annelid.errors import AnnelidError, ConfigError, RunFileError
 from annelid.protocols import Sensation
-from annelid.simulation.batch.structure import ALIKE
+from annelid.simulation.batch import ALIKE
 from annelid.simulation.checkpoint import Checkpoint
 from annelid.simulation.recorder import Recorder
 from annelid.simulation.runfile import read_checkpoint
@@ -201,7 +201,7 @@ def interrupt_at(time_s: float) -> Any:
 def test_ctrl_c_ends_all_worms_and_each_can_be_continued_bit_for_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("annelid.simulation.batch.loop.PROGRESS_INTERVAL_S", 0.0)
+    monkeypatch.setattr("annelid.simulation.batch.PROGRESS_INTERVAL_S", 0.0)
     configs = [config(**own) for own in DIFFERENT[1:]]
     result = simulate_batch(configs, tmp_path / "batch", progress=interrupt_at(0.1))
     assert result.statuses == ("interrupted",) * 2
@@ -217,7 +217,7 @@ def test_ctrl_c_ends_all_worms_and_each_can_be_continued_bit_for_bit(
 
 
 def test_a_second_ctrl_c_leaves_at_once_with_all_files_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.simulation.batch.loop.PROGRESS_INTERVAL_S", 0.0)
+    monkeypatch.setattr("annelid.simulation.batch.PROGRESS_INTERVAL_S", 0.0)
 
     def twice(simulated_s: float, wall_s: float) -> None:
         raise KeyboardInterrupt

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, compile_spec
-from annelid.body.damping import damper_name, damper_rows
+from annelid.body.damping import MaterialDamping, damper_name, damper_rows
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.worm import Strands, WormBody
@@ -17,7 +17,6 @@ from annelid.config import load_config, parse_assignments
 from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.plausibility import check
-from annelid.simulation.damping import MaterialDamping
 from annelid.simulation.worm import WormPlant
 
 TIME_S = 0.145
@@ -121,7 +120,7 @@ def test_rows_move_the_worm_as_dampers_of_tendons_do() -> None:
         place = rows._place + data.qpos[rows._slide]
         model.wrap_prm[where] = damper_rows(place)
         mujoco.mj_step(model, data)
-    assert np.abs(data.qpos - plant.qpos()).max() < 1e-3 * np.abs(plant.qpos()).max()
+    assert np.abs(data.qpos - plant.qpos).max() < 1e-3 * np.abs(plant.qpos).max()
 
 
 def test_what_the_material_takes_is_damping_not_constraints() -> None:
@@ -133,7 +132,7 @@ def test_what_the_material_takes_is_damping_not_constraints() -> None:
 
 def test_the_dof_that_is_held_stays_where_it_is() -> None:
     plant = pulled({}, 1.0)
-    assert abs(plant.qpos()[plant.model.joint("damper_reference").qposadr[0]]) < 1e-12
+    assert abs(plant.qpos[plant.model.joint("damper_reference").qposadr[0]]) < 1e-12
 
 
 def test_two_laws_at_once_are_refused() -> None:
@@ -154,12 +153,12 @@ def test_rows_follow_the_posture_alone() -> None:
     plant = pulled({}, 0.2)
     assert isinstance(plant.damping, MaterialDamping)
     coefficients = plant.model.wrap_prm.copy()
-    plant.damping.renew(plant.qpos())
+    plant.damping.renew(plant.qpos)
     assert np.abs(plant.model.wrap_prm - coefficients).max() > 0
     elsewhere = pulled({}, 0.1)
     elsewhere.set_state(plant.get_state())
     assert elsewhere.damping is not None
-    elsewhere.damping.renew(elsewhere.qpos())
+    elsewhere.damping.renew(elsewhere.qpos)
     assert np.array_equal(plant.model.wrap_prm, elsewhere.model.wrap_prm)
 
 

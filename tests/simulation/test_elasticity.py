@@ -33,9 +33,9 @@ def test_the_engine_s_springs_are_the_slope_of_the_energy(body: str) -> None:
     plant = worm(**BODIES[body])
     for _ in range(60):
         plant.step(np.array([1.0, 0.0, 0.3]))
-    model, plastic = plant.model, plant.plastic().copy()
+    model, plastic = plant.model, plant.plastic.copy()
     data = mujoco.MjData(model)
-    data.qpos[:], data.plastic[:] = plant.qpos(), plastic
+    data.qpos[:], data.plastic[:] = plant.qpos, plastic
     mujoco.mj_forward(model, data)
     force, start = data.qfrc_spring.copy(), data.qpos.copy()
     springs = [model.tendon(f"spring_{i}").id for i in range(len(plant.geometry.springs))]
@@ -62,16 +62,16 @@ def test_a_worm_at_rest_holds_nothing_and_its_springs_what_they_are_stretched_by
     plant = worm(**{"body.springs.stiffness_N_per_m": 20.0})
     lengths = plant.geometry.spring_length_m
     energy = plant.anatomy.elasticity.energy_J
-    assert energy(plant.qpos(), plant.plastic(), lengths) == pytest.approx(0.0, abs=1e-15)
-    stretched = energy(plant.qpos(), plant.plastic(), lengths + 0.01)
+    assert energy(plant.qpos, plant.plastic, lengths) == pytest.approx(0.0, abs=1e-15)
+    stretched = energy(plant.qpos, plant.plastic, lengths + 0.01)
     assert stretched == pytest.approx(0.5 * 20.0 * 0.01**2 * len(lengths), rel=1e-9)
-    assert energy(plant.qpos(), plant.plastic(), lengths - 0.01) == pytest.approx(stretched, rel=1e-9)
+    assert energy(plant.qpos, plant.plastic, lengths - 0.01) == pytest.approx(stretched, rel=1e-9)
 
 
 def test_springs_that_only_pull_hold_nothing_when_short() -> None:
     plant = worm(**{"body.springs.tension_only": True})
     lengths = plant.geometry.spring_length_m
-    assert plant.anatomy.elasticity.energy_J(plant.qpos(), plant.plastic(), lengths - 0.01) < 1e-15
+    assert plant.anatomy.elasticity.energy_J(plant.qpos, plant.plastic, lengths - 0.01) < 1e-15
 
 
 def test_one_edge_turned_about_itself_twists_its_neighbours_and_bends_against_its_curvature() -> None:
@@ -88,8 +88,8 @@ def test_one_edge_turned_about_itself_twists_its_neighbours_and_bends_against_it
     rigidity = np.pi * strands.radius_m**4 / (2.0 * length)
     bending, torsion = strands.young_modulus_Pa * rigidity / 4, strands.shear_modulus_Pa * rigidity / 2
     angle = 0.7
-    qpos = plant.qpos().copy()
+    qpos = plant.qpos.copy()
     qpos[body.joint("strand_0_twist_5").qposadr[0]] = angle
     expected = 2.0 * (torsion * angle**2 + bending * curvature**2 * (1.0 - np.cos(angle)))
-    energy = plant.anatomy.elasticity.energy_J(qpos, plant.plastic(), plant.geometry.spring_length_m)
+    energy = plant.anatomy.elasticity.energy_J(qpos, plant.plastic, plant.geometry.spring_length_m)
     assert energy == pytest.approx(expected, rel=1e-6)

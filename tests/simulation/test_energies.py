@@ -1,4 +1,4 @@
-"""The energy books: closed forms, the engine's own matrices, and a remainder that goes to zero with the step."""
+"""The energy totals: closed forms, the engine's own matrices, and a remainder that goes to zero with the step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
 from annelid.config import load_config
-from annelid.simulation.energies import EnergyMeter
+from annelid.simulation.energies import EnergyMeter, EnergyTotals
 from annelid.simulation.worm import WormPlant
 
 FREE = {"arena.floor_gap_m": 30.0, "body.rings.passive_peak": 1e-12}
@@ -35,7 +35,7 @@ def held(plant: WormPlant) -> float:
 
 
 def remainder(plant: WormPlant, start_J: float) -> float:
-    """What the books do not explain, J."""
+    """What the energy totals do not explain, J."""
     read = plant.read(False)
     losses = float(read["damping_loss"]) + float(read["constraint_loss"])
     return float(np.sum(read["muscle_work"])) - losses - (held(plant) - start_J)
@@ -110,7 +110,7 @@ def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(ri
 
 
 @pytest.mark.parametrize("rings", [{}, SERVOS], ids=["muscles", "servos"])
-def test_the_books_close_with_the_matrices_of_the_engine_s_integrator(rings: dict[str, Any]) -> None:
+def test_the_totals_close_with_the_matrices_of_the_engine_s_integrator(rings: dict[str, Any]) -> None:
     """What is left of the muscles' work is what the integrator takes: weight, contacts and work are all there."""
     place = Path(__file__).parents[2] / "benchmarks" / "energy_balance.py"
     spec = importlib.util.spec_from_file_location("energy_balance", place)
@@ -158,29 +158,29 @@ LAW = "0.75 1.05 117.57 200 0.58 1.6 1.5 1.3 1.2"
 MUSCLE = f'gaintype="muscle" biastype="muscle" lengthrange="0.5 1.1" gainprm="{LAW}" biasprm="{LAW}"'
 
 
-def test_a_mass_on_a_spring_and_a_servo_has_its_books_in_closed_form() -> None:
+def test_the_totals_of_a_mass_on_a_spring_and_a_servo_in_closed_form() -> None:
     """All is linear: of the muscle's work, the integrator takes (m dv^2 + k dx^2) / 2 and the damping of the change."""
     model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=0.01, actuator=SERVO))
     data = mujoco.MjData(model)
     data.act[:] = 1.0
     energy_meter = EnergyMeter(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
     mass, rate, damping = 2.0, 80.0, 1.5
-    books, expected = energy_meter.opened(), 0.0
+    totals, expected = EnergyTotals.zero(1), 0.0
     data.ctrl[:] = -0.3
     for _ in range(80):
         x, v = float(data.qpos[0]), float(data.qvel[0])
         mujoco.mj_step(model, data)
         tension, entries = energy_meter.step({name: getattr(data, name) for name in energy_meter.outputs}, data.ctrl)
-        books += entries
+        totals = totals.plus(entries)
         assert tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
         dx, dv = float(data.qpos[0]) - x, float(data.qvel[0]) - v
         expected += 0.5 * mass * dv**2 + 0.5 * rate * dx**2 + damping * dv * dx
         held = 0.5 * mass * data.qvel[0] ** 2 + 0.5 * rate * (data.qpos[0] + 0.1) ** 2 - 0.5 * rate * 0.1**2
-        left = float(books.muscle_work[0] - books.damping_loss - books.constraint_loss) - held
+        left = float(totals.muscle_work[0] - totals.damping_loss - totals.constraint_loss) - held
         assert left == pytest.approx(expected, abs=1e-9)
     assert data.qpos[0] < -0.1
-    assert books.muscle_work[0] > 0.05
-    assert books.damping_loss > 0.001
+    assert totals.muscle_work[0] > 0.05
+    assert totals.damping_loss > 0.001
 
 
 def pulled(data: mujoco.MjData, before_m_per_s: float) -> float:

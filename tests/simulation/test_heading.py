@@ -12,10 +12,9 @@ from small_robot import assert_equal, small_config
 
 from annelid import load_config, simulate, simulate_batch
 from annelid.analysis import summary
-from annelid.analysis.gait import gait
-from annelid.analysis.slip import slip_cost
+from annelid.analysis.gait import gait, slip_cost
 from annelid.analysis.track import track_of
-from annelid.body.mjcf import mjcf_text
+from annelid.body.assemble import mjcf_text
 from annelid.draw.camera import VIEWS_DEG, view_angles
 from annelid.environments import WormEnv
 from annelid.errors import ConfigError

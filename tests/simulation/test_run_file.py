@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import reduce
 from operator import getitem
 from pathlib import Path
@@ -20,12 +20,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy import N, SavedToyPlant, ToyController, ToyPlant, toy_config, without_digest
 
-from annelid.config import load_config
+from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid.protocols import Recordable, Signal
 from annelid.simulation import Run, container, loop, open_run, simulate
 from annelid.simulation.container import RawWriter, Variable
-from annelid.simulation.runfile import SCHEMA_VERSION, read_config, verify_run
+from annelid.simulation.runfile import SCHEMA_VERSION, migrated, read_config, verify_run
 
 
 def toy_run(out: Path, **overrides: object) -> Run:
@@ -91,7 +91,7 @@ def test_folder_and_file_open_alike(run: Run) -> None:
 
 
 NEWER_THAN_0_1 = {
-    "": ["turning"],
+    "": ["turning", "published"],
     "body": ["heading_deg", "joints"],
     "body.strands": ["damping_time_s", "loss_factor", "loss_frequency_Hz"],
     "body.springs": ["sensors"],
@@ -125,6 +125,33 @@ def test_a_file_of_annelid_0_1_is_read(run: Run, tmp_path: Path) -> None:
     assert (old.status, old.warnings, old.cpu_time_s) == (run.status, (), 0.0)
     xarray.testing.assert_equal(old.data, run.data)
     assert "older version" in verify_run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "published"),
+    [
+        ("riddle2023", "riddle2023"),
+        ("riddle2023-rods", "riddle2023"),
+        ("wang", "wang"),
+        ("wang-2", None),
+        ("riddle2022-planar", "riddle2022"),
+        ("riddle2025", None),
+        ("mine", None),
+    ],
+)
+def test_the_name_decided_what_is_published_up_to_schema_1(name: str, published: str | None) -> None:
+    tree = load_config({"name": name}).model_dump(mode="json")
+    assert tree.pop("published") is None
+    for schema in (0, 1):
+        old = xarray.Dataset(attrs={"schema_version": schema, "config": json.dumps(tree)})
+        assert RunConfig.model_validate_json(migrated(old).attrs["config"]).published == published
+    new = xarray.Dataset(attrs={"schema_version": 2, "config": json.dumps(tree)})
+    assert migrated(new).attrs["config"] == json.dumps(tree)
+
+
+@pytest.mark.parametrize("config", ["{", "[]", '"riddle2023"', '{"name": 3}', "[" * 100_000])
+def test_what_is_wrong_with_an_old_configuration_is_left_to_its_reader(config: str) -> None:
+    assert migrated(xarray.Dataset(attrs={"config": config})).attrs["config"] == config
 
 
 def test_a_file_of_a_newer_schema_is_refused(run: Run, tmp_path: Path) -> None:
@@ -409,13 +436,12 @@ def test_what_is_written_raw_is_what_xarray_reads(
         for variable in variables[:-1]:
             unwritten = before[variable.name].values
             assert np.isnan(unwritten).all() if variable.dtype == "<f8" else (unwritten == 0).all()
-    with RawWriter(path, extents) as writer:
+    with closing(RawWriter(path, extents)) as writer:
         for name, content in contents.items():
             writer.write(name, content[:1])
             if shape[0] > 1:
                 writer.write(name, content[1:], content[0].nbytes)
         writer.write("counter", np.array(-5, dtype="<i8"))
-        writer.close()
     assert path.stat().st_size == size
     with xarray.open_dataset(path, engine="h5netcdf") as after:
         for name, content in contents.items():

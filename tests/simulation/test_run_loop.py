@@ -40,9 +40,9 @@ def test_times_of_a_run_and_of_its_continuation_join_to_those_of_the_whole(
     total: int, every: int, share: float, step: float
 ) -> None:
     cut = round(share * total)
-    whole = Schedule(0, total, every, every, step).sample_times_s()
-    first = Schedule(0, cut, every, every, step).sample_times_s()
-    second = Schedule(cut, total, every, every, step).sample_times_s() if cut else whole[first.size :]
+    whole = Schedule(0, total, every, every, step).times_s(every)
+    first = Schedule(0, cut, every, every, step).times_s(every)
+    second = Schedule(cut, total, every, every, step).times_s(every) if cut else whole[first.size :]
     np.testing.assert_array_equal(np.concatenate([first, second]), whole)
     assert whole.size == total // every + 1
 

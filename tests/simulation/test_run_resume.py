@@ -100,7 +100,12 @@ def test_the_file_of_the_new_part_names_the_run_before(tmp_path: Path) -> None:
 def test_recording_and_name_may_change(tmp_path: Path) -> None:
     first = toy_run(toy_config(**NOISY), tmp_path / "1")
     config = toy_config(
-        duration_s=0.3, name="finer", record__signals_interval_s=0.001, record__frames_interval_s=0.5, **NOISY
+        duration_s=0.3,
+        name="finer",
+        published="riddle2022",
+        record__signals_interval_s=0.001,
+        record__frames_interval_s=0.5,
+        **NOISY,
     )
     second = toy_run(config, tmp_path / "2", resume=first)
     np.testing.assert_array_equal(second.data["control_steps"], np.arange(201, 301))

@@ -46,14 +46,13 @@ def test_many_worms_read_like_each_alone(body: str, n_worms: int, seed: int) -> 
     engine = {name: random.normal(size=(n_worms, *shapes[name])) for name in part.outputs}
     crossing, center = random.normal(size=(n_worms, part.geometry.n_crossings, 3)), random.normal(size=(n_worms, 3))
     skin = random.normal(size=(n_worms, len(part.skin.segment), 3))
-    postures, forces = part.posture(crossing, center, skin).each(), part.forces(engine).each()
+    posture, (forces, ground) = part.posture(crossing, center, skin), part.forces(engine)
     for i in range(n_worms):
-        one = {name: values[i] for name, values in engine.items()}
-        alone = part.posture(crossing[i], center[i], skin[i]), part.forces(one)
-        assert np.array_equal(part.ground(engine)[i], part.ground(one))
-        for of_many, of_one in zip((postures[i], forces[i]), alone, strict=True):
-            for field in of_one.__slots__:
-                assert np.array_equal(getattr(of_many, field), getattr(of_one, field)), field
+        alone, ground_alone = part.forces({name: values[i] for name, values in engine.items()})
+        assert np.array_equal(ground[i], ground_alone)
+        for of_many, of_one in ((posture, part.posture(crossing[i], center[i], skin[i])), (forces, alone)):
+            for field in of_one._fields:
+                assert np.array_equal(getattr(of_many, field)[i], getattr(of_one, field)), field
 
 
 def test_lengths_are_the_distances_along_springs_and_rings() -> None:
@@ -99,5 +98,5 @@ def test_a_stride_equals_its_control_steps() -> None:
         one, many = steps.step(pull), strides.stride(pull, n)
         assert one.time_s == many.time_s
         assert np.array_equal(one.stretch_m, many.stretch_m)
-        assert np.array_equal(steps.qpos(), strides.qpos())
+        assert np.array_equal(steps.qpos, strides.qpos)
     assert strides.data.time == pytest.approx(0.03)

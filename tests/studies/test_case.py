@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, parse_assignments
-from annelid.control.program import Program
+from annelid.control.open_loop import Program
 from annelid.experiment.case import Case
 from annelid_studies.worms import CHAIN, PLANAR, RODS, chain, fast, one_after_the_other, rods
 

@@ -31,7 +31,7 @@ from annelid.experiment.attempt import (
     publish,
 )
 from annelid.experiment.case import Case
-from annelid.experiment.cluster import SchedulerWorkers, slurm_cluster, workers_of
+from annelid.experiment.cluster import slurm_cluster, workers_of
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.simulation.runfile import FILE_NAME
@@ -281,11 +281,11 @@ def wait_until(condition: Callable[[], object], limit_s: float) -> None:
 
 
 def test_without_a_scheduler_one_sentence_says_so() -> None:
-    workers = SchedulerWorkers(Scheduler(address="tcp://127.0.0.1:9", reconnect_s=0.5))
+    workers = workers_of(Scheduler(address="tcp://127.0.0.1:9", reconnect_s=0.5))
     with pytest.raises(ClusterError, match=r"no scheduler answers at tcp://127\.0\.0\.1:9"):
         workers.slots()
     with pytest.raises(ConfigError, match=r"cannot read the scheduler file nowhere\.json"):
-        SchedulerWorkers(Scheduler(address="nowhere.json")).slots()
+        workers_of(Scheduler(address="nowhere.json")).slots()
 
 
 @pytest.fixture

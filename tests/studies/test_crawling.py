@@ -11,7 +11,7 @@ from annelid.analysis.gait import Gait
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.experiment.tune.judge import Judged
+from annelid.experiment.tune import Judged
 from annelid_studies.crawling import (
     VALUES,
     Reading,

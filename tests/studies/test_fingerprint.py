@@ -34,15 +34,15 @@ def test_the_key_of_a_run_covers_all_that_computes_it_and_nothing_else() -> None
 
 def test_the_key_of_an_outcome_covers_all_that_reads_it() -> None:
     modules = modules_behind(*READERS)
-    readers = ("experiment.outcome", "analysis.summary", "analysis.gait", "analysis.score", "simulation.runfile")
+    readers = ("experiment.outcome", "analysis.summary", "analysis.gait", "analysis.rhythm", "simulation.runfile")
     assert {f"annelid.{name}" for name in readers} <= modules
     assert not {name for name in modules if name.split(".")[1] in ("draw", "live", "cli", "export")}
 
 
 def test_a_module_is_found_where_a_package_loads_its_names_on_first_use() -> None:
     modules = modules_behind("annelid_studies.robustness")
-    assert {"annelid.analysis.score", "annelid.experiment.store", "annelid_studies.tables"} <= modules
-    assert "annelid.experiment.tune.search" not in modules
+    assert {"annelid.analysis.rhythm", "annelid.experiment.store", "annelid_studies.tables"} <= modules
+    assert "annelid.experiment.tune" not in modules
 
 
 def test_a_module_is_found_by_its_import_wherever_it_stands(copied: Path) -> None:

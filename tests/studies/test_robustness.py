@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from annelid.analysis.score import RhythmScore
-from annelid.control.waves import TimedWave
+from annelid.analysis.rhythm import RhythmScore
+from annelid.control.open_loop import TimedWave
 from annelid.errors import ConfigError, RunFileError
 from annelid.plausibility import tolerance_window_m
 from annelid_studies import robustness as study

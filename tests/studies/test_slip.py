@@ -9,8 +9,7 @@ import pytest
 
 from annelid.analysis import DetectionScore, SlipCost
 from annelid.config import load_config
-from annelid.control.pressure import PressureSns
-from annelid.control.sns import Sns
+from annelid.control.sns import PressureSns, Sns
 from annelid.errors import ConfigError
 from annelid.experiment.store import Store
 from annelid_studies.slip import (

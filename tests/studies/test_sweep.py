@@ -21,12 +21,19 @@ from annelid.analysis.gait import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
 from annelid.experiment.attempt import attempt
+from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.space import unit_samples
-from annelid.experiment.sweep import Sweep, sweeping, swept
-from annelid.experiment.sweep.dataset import dataset_of
-from annelid.experiment.sweep.design import Plan, flattened, plan_of
-from annelid.experiment.sweep.numbers import NUMBERS
-from annelid.experiment.sweep.results import failures, results_table, told_numbers, write_results
+from annelid.experiment.sweep import (
+    Plan,
+    Sweep,
+    failures,
+    flattened,
+    plan_of,
+    results_table,
+    shown_numbers,
+    swept,
+    write_results,
+)
 from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
 
@@ -61,7 +68,7 @@ class Here(Workers):
 
 @pytest.fixture(autouse=True)
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweeping, "workers_of", lambda cluster, jobs: Here())
+    monkeypatch.setattr("annelid.experiment.sweep.workers_of", lambda cluster, jobs: Here())
 
 
 @st.composite
@@ -84,16 +91,14 @@ def grids(draw: st.DrawFn) -> list[dict[str, Any]]:
 @given(vary=grids(), repeats=st.integers(1, 3))
 def test_a_grid_has_every_combination_once_at_its_own_place(vary: list[dict[str, Any]], repeats: int) -> None:
     plan = plan_of(study(vary, repeats=repeats))
-    assert len(plan.points) == np.prod(plan.shape)
-    assert [point.place for point in plan.points] == list(np.ndindex(plan.shape))
     keys = list(plan.levels)
-    for point in plan.points:
-        for field, value in point.values.items():
-            assert plan.levels[field][point.place[keys.index(field)]] == value
-            assert point.case.changes[field] == value
+    for place, (values, case) in zip(np.ndindex(plan.shape), plan.points, strict=True):
+        for field, value in values.items():
+            assert plan.levels[field][place[keys.index(field)]] == value
+            assert case.changes[field] == value
         if repeats > 1:
-            assert point.case.changes["seed"] == plan.levels["repeat"][point.place[-1]]
-    assert len({json.dumps(dict(point.case.changes)) for point in plan.points}) == len(plan.points)
+            assert case.changes["seed"] == plan.levels["repeat"][place[-1]]
+    assert len({json.dumps(dict(case.changes)) for _, case in plan.points}) == len(plan.points)
 
 
 @settings(deadline=None, max_examples=25)
@@ -147,11 +152,11 @@ def test_fields_may_be_nested_and_lack_their_units() -> None:
             "vary": [{"field": "sensor.tolerance", "values": [0.001]}],
         }
     )
-    (point,) = plan_of(nested).points
-    config = point.case.config
+    ((values, case),) = plan_of(nested).points
+    config = case.config
     assert config.arena is not None
     assert (config.arena.friction, config.controller.kind, config.duration_s) == (0.4, "sns-robust", 0.5)
-    assert list(point.values) == [TOLERANCE]
+    assert list(values) == [TOLERANCE]
     assert config.sensor.tolerance_m == 0.001
     assert flattened({"a": {"b": {"c": 1}, "d": [2]}}) == {"a.b.c": 1, "a.d": [2]}
 
@@ -177,7 +182,7 @@ ONE = [{"field": GATE, "values": [100.0]}]
         ({"vary": [{"field": "controller.gate_ms", "values": [1.0]}]}, "vary: unknown field .* did you mean"),
         ({"vary": [*ONE, *ONE]}, "stands twice"),
         ({"vary": [{"field": "controller.scheme", "from": 1.0, "to": 2.0, "number": 2}]}, "no number with a range"),
-        ({"vary": [{"field": SEGMENTS, "from": 3, "to": 5, "number": 4}]}, "only 3 values to tell apart"),
+        ({"vary": [{"field": SEGMENTS, "from": 3, "to": 5, "number": 4}]}, "only 3 distinct values"),
         ({"vary": [{"field": SEGMENTS, "from": 3.5, "to": 5, "number": 2}]}, "must be whole numbers"),
         ({"vary": [{"field": "seed", "values": [1, 2]}], "repeats": 2}, "both set the seed"),
         ({"set": {"body": {"gian": 1.0}}}, "unknown field 'body.gian'"),
@@ -237,13 +242,13 @@ REFUSED = [{"field": "body.gain", "values": [1.31, 1e4, -1.0]}, LISTED[0]]
 def done(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     """Six runs twice, of which some are refused by the plant, others by the configuration."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeping, "workers_of", lambda cluster, jobs: Here())
+        patch.setattr("annelid.experiment.sweep.workers_of", lambda cluster, jobs: Here())
         wanted = study(REFUSED, repeats=2, rank="ring_length_min_m")
         return swept(wanted, tmp_path_factory.mktemp("sweep"))
 
 
 def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
-    data = dataset_of(done)
+    data = done.data
     assert dict(data.sizes) == {"body.gain": 3, SEGMENTS: 2, "repeat": 2, "segment": 4}
     assert data["body.gain"].values.tolist() == [1.31, 1e4, -1.0]
     for name, variable in data.variables.items():
@@ -252,9 +257,9 @@ def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
     good = data.sel({"body.gain": 1.31})
     assert set(good.status.values.ravel()) == {"complete"}
     assert len(set(good.run.values.ravel())) == good.run.size
-    for point, run in zip(done.plan.points, done.runs, strict=True):
+    for place, run in zip(np.ndindex(done.plan.shape), done.runs, strict=True):
         if run.outcome is not None:
-            here = data.isel(dict(zip(done.plan.levels, point.place, strict=True)))
+            here = data.isel(dict(zip(done.plan.levels, place, strict=True)))
             assert here.ring_length_min_m == run.outcome.summary.ring_length_min_m
             told = here.elongation_mean_max_m.values
             assert told[~np.isnan(told)].tolist() == run.outcome.summary.elongation_mean_max_m
@@ -264,7 +269,7 @@ def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
 
 
 def test_failed_runs_are_listed_with_their_reason(done: Sweep) -> None:
-    data = dataset_of(done)
+    data = done.data
     bad = data.isel({"body.gain": [1, 2]})
     assert set(bad.status.values.ravel()) == {"failed"}
     assert all("overshoot" in reason for reason in bad.reason.values[0].ravel())
@@ -274,16 +279,16 @@ def test_failed_runs_are_listed_with_their_reason(done: Sweep) -> None:
 
 
 def test_results_are_written_and_read_back_alike(done: Sweep) -> None:
-    data = dataset_of(done)
-    paths = write_results(done, data)
+    data = done.data
+    paths = write_results(done)
     assert [path.name for path in paths] == ["sweep.nc", "sweep.csv", "sweep.png"]
     read = xr.load_dataset(paths[0], engine="h5netcdf")
     assert read.sel({"body.gain": 1.31}).ring_length_min_m.equals(data.sel({"body.gain": 1.31}).ring_length_min_m)
     assert read.status.values.tolist() == data.status.values.tolist()
     assert load_study(json.loads(read.attrs["study"])) == done.plan.study
     assert len(paths[1].read_text().splitlines()) == 13
-    assert told_numbers(done, data)[0] == "ring_length_min_m"
-    assert results_table(done, data).row_count == 4
+    assert shown_numbers(done)[0] == "ring_length_min_m"
+    assert results_table(done).row_count == 4
 
 
 def test_a_second_sweep_computes_what_is_missing_only(tmp_path: Path) -> None:

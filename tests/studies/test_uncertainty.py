@@ -14,34 +14,34 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import annelid
 from annelid.analysis import summary
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
-from annelid.experiment import store as store_module
-from annelid.experiment.calibration.fit import calibrate
-from annelid.experiment.calibration.loop import read_loop
-from annelid.experiment.calibration.report import EQUAL_STIFFNESS
+from annelid.experiment import uncertainty as study
+from annelid.experiment.calibration import EQUAL_STIFFNESS, calibrate
+from annelid.experiment.case import Case
+from annelid.experiment.load_frame import read_loop
+from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
 from annelid.experiment.store import case_key
-from annelid.experiment.uncertainty import Spread, Uncertainty, VariantRun, read_spread, study, uncertainty
-from annelid.experiment.uncertainty.parameters import (
-    ABSENT,
-    CALIBRATION,
-    EXACT,
-    FIELDS,
-    UNMEASURED,
-    applicable,
-    changes,
-    draw,
-)
-from annelid.experiment.uncertainty.quantities import (
+from annelid.experiment.uncertainty import (
     Quantity,
+    Spread,
+    Uncertainty,
+    VariantRun,
+    combine,
+    finer_steps,
     largest_difference,
+    more_elements,
     order_of_convergence,
+    plan,
+    read_spread,
     readings,
     scatter,
+    uncertainty,
+    uncertainty_table,
+    write_uncertainty,
 )
-from annelid.experiment.uncertainty.report import as_json, headline, remarks, with_error, write_uncertainty
-from annelid.experiment.uncertainty.study import combine, finer_steps, more_elements, plan, variant
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import open_run
 from annelid_studies.worms import RODS
@@ -55,6 +55,10 @@ NOTHING: dict[str, float] = {"young_modulus": 0.0, "dry_friction": 0.0, "cable_f
 def spread(errors: Mapping[str, float], correlation: Any = None, exponent: float | None = None) -> Spread:
     matrix = np.eye(len(errors)) if correlation is None else np.asarray(correlation, dtype=float)
     return Spread(tuple(errors), np.array(list(errors.values())), matrix, "a test", exponent)
+
+
+def variant(config: RunConfig, changed: Mapping[str, Any]) -> Case:
+    return Case(config.name, changed, config)
 
 
 # The draw
@@ -194,7 +198,7 @@ def test_errors_out_of_range_are_refused(errors: dict[str, float], says: str) ->
 
 
 def calibration() -> dict[str, Any]:
-    path = Path(store_module.__file__).parent / "uncertainty" / CALIBRATION
+    path = Path(annelid.__file__).parent / "data" / CALIBRATION
     return json.loads(path.read_text(encoding="utf-8"))
 
 
@@ -231,7 +235,7 @@ def test_another_fit_is_read_as_it_was_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (lambda c: c["parameters"]["dry_friction"].update(relative_error=None), "does not tell dry_friction"),
+        (lambda c: c["parameters"]["dry_friction"].update(relative_error=None), "does not determine dry_friction"),
         (lambda c: c["parameters"].update(mass=c["parameters"].pop("dry_friction")), "unknown parameter 'mass'"),
         (lambda c: c["correlation"][0].__setitem__(1, 0.9), "correlation must be symmetric"),
         (lambda c: c["correlation"].pop(), "no calibration.json"),
@@ -264,7 +268,7 @@ errors = st.one_of(st.none(), st.floats(0.0, 1e6))
 def quantity(
     value: float | None, parameters: float | None, time_step: float | None, elements: float | None
 ) -> Quantity:
-    return Quantity("q", "q", "m", value, "cm", 100.0, 2, parameters, time_step, elements, None, 8)
+    return Quantity("elongation_mean_max_m.1", value, parameters, time_step, elements, None, 8)
 
 
 @given(errors, errors, errors)
@@ -285,7 +289,7 @@ def test_the_total_is_the_root_of_the_sum_of_squares(a: float | None, b: float |
         ((1.0, 0.0, 2.0, 2.0), False, "not converged: time step and elements"),
         ((1.0, None, 0.0, 0.6), False, "not converged: elements; without parameters"),
         ((1.0, 0.1, None, 0.1), None, "without time step"),
-        ((None, 0.1, None, None), None, "not told by this run"),
+        ((None, 0.1, None, None), None, "not known from this run"),
     ],
 )
 def test_what_is_wrong_with_a_quantity_is_said_in_words(
@@ -322,10 +326,10 @@ def test_no_order_where_halvings_disagree(values: tuple[float | None, float | No
 
 
 def test_values_are_written_to_two_digits_of_their_error() -> None:
-    assert with_error(quantity(0.0615, 0.0021, 0.0, 0.0)) == "6.15 +- 0.21 cm"
-    assert with_error(quantity(-0.1159, 0.117, 0.0, 0.0)) == "-12 +- 12 cm"
-    assert with_error(quantity(0.0615, None, None, None)) == "6.15 cm"
-    assert with_error(quantity(None, None, None, None)) == "-"
+    assert str(quantity(0.0615, 0.0021, 0.0, 0.0)) == "6.15 +- 0.21 cm"
+    assert str(quantity(-0.1159, 0.117, 0.0, 0.0)) == "-12 +- 12 cm"
+    assert str(quantity(0.0615, None, None, None)) == "6.15 cm"
+    assert str(quantity(None, None, None, None)) == "-"
 
 
 # The runs of a study
@@ -374,16 +378,16 @@ def test_elements_end_where_the_mesh_does() -> None:
 def test_an_unchanged_variant_is_the_run_itself() -> None:
     for preset in (RODS, "wang", "riddle2023"):
         config = load_config(preset)
-        assert variant(config, "drawn", {}).config == config
-        assert case_key(variant(config, "drawn", {})) == case_key(variant(config, "nominal", {}))
+        assert variant(config, {}).config == config
+        assert case_key(variant(config, {})) == case_key(variant(config, {"seed": config.seed}))
 
 
 def test_a_plan_changes_only_what_it_says() -> None:
     config = load_config(RODS)
     known, _ = applicable(config, read_spread())
-    variants = plan(config, 4, known)
-    assert [one.kind for one in variants] == ["nominal", *["drawn"] * 4, *["time step"] * 2, *["elements"] * 2]
-    for one in variants:
+    planned = plan(config, 4, known)
+    assert [kind for kind, _ in planned] == ["nominal", *["drawn"] * 4, *["time step"] * 2, *["elements"] * 2]
+    for one in (variant(config, changed) for _, changed in planned):
         sections = {path: getattr_path(one.config, path) for path in one.changes}
         assert sections == one.changes
         back = {path: getattr_path(config, path) for path in one.changes}
@@ -402,7 +406,7 @@ def done(kind: Any, value: float | None, message: str = "") -> VariantRun:
 
 
 def test_runs_that_were_stopped_have_no_part_in_the_errors(tiny: Uncertainty) -> None:
-    nominal = [reading for reading in readings(summary(open_run(tiny.folder))) if reading.name == "period_s"]
+    nominal = {"period_s": readings(summary(open_run(tiny.folder)))["period_s"]}
     runs = [
         done("drawn", 1.0),
         done("drawn", 3.0),
@@ -445,7 +449,7 @@ KINDS = ("nominal", "drawn", "time step", "elements")
 
 def reading_of(run: VariantRun, name: str) -> float:
     """Reads the run's file anew."""
-    value = {each.name: each.value for each in readings(summary(open_run(run.path)))}[name]
+    value = readings(summary(open_run(run.path)))[name]
     assert value is not None
     return value
 
@@ -453,15 +457,15 @@ def reading_of(run: VariantRun, name: str) -> float:
 def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> None:
     json_path, csv_path, png_path = write_uncertainty(tiny)
     content = json.loads(json_path.read_text(encoding="utf-8"))
-    assert content == json.loads(json.dumps(as_json(tiny)))
     assert len(content["runs"]) == 7
     assert all((tiny.folder / run["path"] / "run.nc").exists() for run in content["runs"])
     assert content["too_short_to_tell"] == 2
     lines = csv_path.read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + len(content["quantities"])
     assert png_path.read_bytes().startswith(b"\x89PNG")
-    assert "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)" in headline(tiny)
-    words = "\n".join(remarks(tiny))
+    table = uncertainty_table(tiny)
+    assert "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)" in str(table.title)
+    words = str(table.caption)
     assert "20 ms against 10 and 5 ms; elements a side: 3 against 4 and 5" in words
     assert f"dry_friction, spring_rest_length, viscous_friction ({ABSENT})" in words
 
@@ -536,7 +540,7 @@ def test_a_folder_in_use_is_refused_and_left_alone(tiny: Uncertainty, tmp_path: 
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
     other = load_config(tiny.config.model_dump(), {"arena.friction": 0.5})
     before = files(tiny.folder)
-    with pytest.raises(ConfigError, match="holds another run"):
+    with pytest.raises(ConfigError, match="has another run in it"):
         uncertainty(other, 2, tiny.folder)
     assert files(tiny.folder) == before
     assert open_run(tiny.folder).config == tiny.config
@@ -545,7 +549,7 @@ def test_a_folder_in_use_is_refused_and_left_alone(tiny: Uncertainty, tmp_path: 
 def test_a_run_that_a_guard_stops_has_no_error_bars_but_its_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "plan", lambda config, n, spread: [variant(config, "nominal", {})])
+    monkeypatch.setattr(study, "plan", lambda config, n, spread: [("nominal", {})])
     config = load_config(RODS, SHORT | {"guard.edge_strain": 1e-6})
     with pytest.raises(SimulationStopped, match="strain"):
         uncertainty(config, 2, tmp_path / "run", jobs=1)

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.draw import bug_report as module
-from annelid.draw.bug_report import bug_report, without_names
-from annelid.draw.doctor import Finding
+from annelid.draw import doctor as module
+from annelid.draw.doctor import Finding, bug_report, without_names
 
 NAMES = st.text("abcdefghijklmnopqrstuvwxyz0123456789.-_ÄÖ", min_size=1, max_size=12)
 FINDINGS = [

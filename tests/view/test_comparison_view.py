@@ -42,7 +42,7 @@ def test_the_fields_of_other_kinds_are_left_to_json(planar_run: Run, rods_run: R
 
 @pytest.mark.parametrize("draw", [lengths_figure, potentials_figure, travel_figure])
 def test_every_run_gets_its_colour(draw, planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
-    from annelid.draw.style import segment_colors
+    from annelid.draw.canvas import segment_colors
 
     both = draw([planar_run, rods_run], ("planar", "rods"), tmp_path / "both.png")
     with Image.open(both) as image:

@@ -96,7 +96,7 @@ def test_the_panel_says_what_is_seen(live: tuple[Show, Page]) -> None:
         assert page.get_by_text(words).count() > 0
     charts = "Object.values(window.__viserTestpoints.uplots).map(plot => plot.chart.data.length)"
     assert page.evaluate(charts) == [7]
-    ask(show, page, show.choose_plot, "neurons of segment 2")
+    ask(show, page, show.panel.choose_plot, "neurons of segment 2")
     wait_for(lambda: page.evaluate(charts) == [5], page)
 
 
@@ -129,15 +129,15 @@ def test_a_click_pokes_the_worm(live: tuple[Show, Page]) -> None:
     show, page = live
     ask(show, page, show.player.pause)
     page.wait_for_timeout(500)
-    points = show.picture.strands.reshape(-1, 3).astype(float)
-    x, y = screen_place(show, points[np.abs(points - show.picture.middle).sum(axis=1).argmin()] + show.stage.shift_m)
+    points, middle = show.stage.picture.strands.reshape(-1, 3).astype(float), show.stage.picture.middle
+    x, y = screen_place(show, points[np.abs(points - middle).sum(axis=1).argmin()] + show.stage.shift_m)
     canvas = page.locator("canvas").first.bounding_box()
     assert canvas is not None
     page.mouse.click(canvas["x"] + x * canvas["width"], canvas["y"] + y * canvas["height"])
     wait_for(lambda: plant_of(show).data.xfrc_applied.any(), page)
     force = plant_of(show).data.xfrc_applied[:, :3].sum(axis=0)
     [client] = show.clients()
-    away = show.picture.middle - client.camera.position
+    away = show.stage.picture.middle - client.camera.position
     assert force @ away > 0.8 * np.linalg.norm(force) * np.linalg.norm(away)
 
 

@@ -11,14 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
-from annelid.draw.scene import upright
-from annelid.draw.skeleton import Skeleton
+from annelid.draw.scene import Skeleton, upright
 from annelid.errors import ConfigError, RunFileError
-from annelid.live.living import LivingWorm, knobs_of
-from annelid.live.moments import Moment, Reel, reel_of
+from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
+from annelid.live.panel import plots_of
 from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
-from annelid.live.traces import plots_of
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 
@@ -50,7 +48,7 @@ def test_strands_at_rest_lie_where_the_mesh_is(preset: str) -> None:
 def test_strands_follow_the_worm() -> None:
     worm = LivingWorm(load_config("riddle2023-rods"))
     worm.advance(0.3, math.inf)
-    vertices, crossing = Skeleton(worm.plant.anatomy).locate(worm.plant.qpos())
+    vertices, crossing = Skeleton(worm.plant.anatomy).locate(worm.plant.qpos)
     np.testing.assert_array_equal(crossing, worm.plant.read(True)["crossing_position"])
     edges = np.linalg.norm(np.diff(vertices, axis=1), axis=-1)
     rest = np.linalg.norm(np.diff(worm.plant.geometry.vertices_m, axis=1), axis=-1)
@@ -60,7 +58,7 @@ def test_strands_follow_the_worm() -> None:
 def test_a_picture_has_every_part() -> None:
     config = load_config("riddle2023-rods")
     anatomy = compile_worm(config)
-    painter = Painter(Skeleton(anatomy), config)
+    painter = Painter(anatomy, config)
     lift = np.zeros((3, 3))
     lift[1, 2] = painter.arrow_N
     picture = painter.paint(moment(anatomy.model.qpos0, 3, lift))
@@ -106,7 +104,7 @@ def test_a_window_of_signals_is_thinned_evenly(first: float, length: float, most
 
 
 def test_the_oldest_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.live.moments.KEEP_S", 1.0)
+    monkeypatch.setattr("annelid.live.living.KEEP_S", 1.0)
     grown = reel(0)
     for i in range(500):
         grown.add(Moment(i * FRAME_S, np.zeros(3), np.zeros(1), np.zeros((1, 3))))
@@ -277,10 +275,9 @@ def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[s
 
     config = load_config("riddle2023-rods", overrides, arena=arena)
     player, anatomy = player_of(config)
-    painter = Painter(Skeleton(anatomy), config)
     server = Server()
     try:
-        stage = Stage(server, config, painter.strand_colors(), painter.paint(player.moment))
+        stage = Stage(server, config, Painter(anatomy, config), player.moment)
         names = {"floor", "rail_left", "rail_right", "post_0", "relief", "pipe"}
         assert {name for name in names if server.scene.get_handle_by_name(f"/worm/ground/{name}")} == nodes
         for layer in LAYERS:
@@ -296,12 +293,11 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
 
     config = load_config("riddle2023-rods", {"arena.slope_deg": 30.0})
     player, anatomy = player_of(config)
-    painter = Painter(Skeleton(anatomy), config)
     server = Server()
     try:
-        stage = Stage(server, config, painter.strand_colors(), painter.paint(player.moment))
+        stage = Stage(server, config, Painter(anatomy, config), player.moment)
         player.tick(0.5)
-        stage.show(painter.paint(player.moment), follow=True)
+        stage.show(player.moment, follow=True)
         place, along = np.array([0.3, -0.1, 0.2]), np.array([0.0, 0.6, 0.8])
         seen = stage.turn @ place + stage.shift_m
         origin, sight = stage.to_model(seen, stage.turn @ along)

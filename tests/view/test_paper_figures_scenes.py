@@ -13,8 +13,7 @@ from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import fitting_distance, picture_axes, picture_points
-from annelid.draw.scene import render_still
-from annelid.draw.skeleton import Skeleton
+from annelid.draw.scene import Skeleton, render_still
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
@@ -197,6 +196,6 @@ def test_planar_worms_and_times_outside_are_refused(planar_run: Run, rods_run: R
         figure_4_model(planar_run.config, tmp_path / "figure")
     with pytest.raises(RunFileError, match="planar"):
         figure_8_propagation(planar_run, tmp_path / "figure")
-    with pytest.raises(RunFileError, match=r"no posture at 1\.5 s"):
+    with pytest.raises(RunFileError, match=r"no picture at 1\.5 s"):
         figure_2_propagation(rods_run, tmp_path / "figure")
     assert not list(tmp_path.iterdir())

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from annelid.draw import plots
+from annelid.draw.canvas import activation_color, segment_colors
 from annelid.draw.plots import figure7
-from annelid.draw.style import activation_color, segment_colors
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
 
@@ -44,7 +44,7 @@ def test_published_elongations_end_at_lines_that_are_named(rods_run: Run, pictur
     expected = first_helix.min(axis=0) + np.array([4.20, 2.55, 4.02])
     assert [named[f"paper, {segment}"] for segment in (1, 2, 3)] == pytest.approx(expected)
     assert sorted(float(np.asarray(line.get_ydata())[0]) for line in axes.lines[-3:]) == pytest.approx(sorted(expected))
-    other = replace(rods_run, config=rods_run.config.model_copy(update={"name": "mine"}))
+    other = replace(rods_run, config=rods_run.config.model_copy(update={"published": None}))
     axes = Figure().subplots()
     plots._lengths(axes, other, segment_colors(3))
     assert not axes.texts

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from io import StringIO
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -82,6 +83,14 @@ def test_a_changed_worm_reproduces_nothing(changes: dict[str, float]) -> None:
     sentence = closing_sentence(formulation(), load_config("riddle2023-fast", changes))
     assert "reproduce" not in sentence
     assert next(iter(changes)) in sentence
+
+
+def test_a_worm_of_another_name_is_compared_with_the_nearest_preset(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "riddle2023-fast"\nseed = 3\n', encoding="utf-8")
+    assert closing_sentence(formulation(), load_config(mine)).startswith("mine reproduces order")
+    changed = closing_sentence(formulation(), load_config(mine, {"arena.friction": 0.3}))
+    assert changed.startswith("this run differs from riddle2023-fast in arena.friction:")
 
 
 def test_what_only_records_or_names_is_no_change() -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from annelid.draw.figures import uncertainty as figures
-from annelid.draw.figures.uncertainty import Panel, uncertainty_figure
+from annelid.draw.figures import experiments as figures
+from annelid.draw.figures.experiments import Panel, uncertainty_figure
 
 PANEL = Panel("length (cm)", ["1", "2"], [8.0, 7.0], {"a": [0.3, 0.1], "b": [0.4, None], "c": [1.2, 0.0]})
 

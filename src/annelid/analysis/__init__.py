@@ -8,19 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from annelid.analysis.gait import Gait, gait
-from annelid.analysis.score import RhythmScore, lengthening_score, rhythm_score
+from annelid.analysis.rhythm import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.summary import Summary, summary
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
-    from annelid.analysis.detector import (
-        Detection,
-        DetectionScore,
-        detect_slip,
-        precision_recall,
-        score_detections,
-    )
-    from annelid.analysis.elongation import end_difference, interior_deficit, middle_deficit
+    from annelid.analysis.detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
+    from annelid.analysis.gait import SlipCost, slip_cost
     from annelid.analysis.paper import (
         PAPER_ELONGATION_M,
         PAPER_END_DIFFERENCE,
@@ -38,11 +32,9 @@ if TYPE_CHECKING:
         rhombus_diagonals,
         rhombus_plane,
     )
-    from annelid.analysis.rhythm import CONTRACTED, contractions, segment_activation
-    from annelid.analysis.score import DESIGN_INTERVAL_S, SHORTEST_S
-    from annelid.analysis.slip import SlipCost, slip_cost
-    from annelid.analysis.track import Track, track_of, turn_of
-    from annelid.analysis.travel import forward_position
+    from annelid.analysis.rhythm import CONTRACTED, DESIGN_INTERVAL_S, SHORTEST_S, contractions, segment_activation
+    from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
+    from annelid.analysis.track import Track, forward_position, track_of, turn_of
 
 __all__ = [
     "CONTRACTED",

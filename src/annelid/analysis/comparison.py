@@ -4,44 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from annelid.analysis.gait import gait
 from annelid.analysis.summary import summary
 from annelid.config import RunConfig, field_value, fields_of
+from annelid.simulation.runfile import Run
 
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
-
-Number = float | Sequence[float | None] | None
-"""One number, one a segment, or None for what a run does not have."""
+Number = float | Sequence[float | None] | None  # one number, one per segment, or None for what a run does not have
 
 _NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
 # Fields of the configuration that change nothing in a run.
-_WORDS = ("name", "summary")
+_WORDS = ("name", "summary", "published")
+
+LACKING: Any = object()  # stands for the value of a field that a kind of worm does not have
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What several runs have come to.
+    """What several runs have come to."""
 
-    Attributes:
-        labels: A short distinct name for each run.
-        paths: Their files.
-        statuses: How they ended.
-        orders: Segments (from 1) in the order of their contractions.
-        numbers: Fields of `Summary` and of `Gait` (``gait.speed_m_per_s``), one value a run, in SI units.
-        fields: Fields of the configuration in which they differ, one value a run; None where its kind has none.
-        lacking: Of these fields, those that some run does not have.
-    """
-
-    labels: tuple[str, ...]
+    labels: tuple[str, ...]  # a short distinct name for each run
     paths: tuple[str, ...]
     statuses: tuple[str, ...]
-    orders: tuple[tuple[int, ...], ...]
-    numbers: Mapping[str, tuple[Number, ...]]
-    fields: Mapping[str, tuple[Any, ...]]
-    lacking: Mapping[str, tuple[bool, ...]]
+    orders: tuple[tuple[int, ...], ...]  # segments (from 1) in the order of their contractions
+    numbers: Mapping[str, tuple[Number, ...]]  # fields of Summary and of Gait (gait.speed_m_per_s), SI units
+    fields: Mapping[str, tuple[Any, ...]]  # of the configuration in which they differ
 
     def differences(self, field: str) -> list[Number]:
         """Returns the `relative_difference` of each run's number to the first run's; None for the first."""
@@ -72,33 +60,28 @@ def compare(runs: Sequence[Run]) -> Comparison:
         rows[-1] |= {f"gait.{field}": value for field, value in walking.items()}
         rows[-1] |= {f"gait.energy.{part}": share for part, share in energy.items()}
     names = list(dict.fromkeys(field for row in rows for field in row))
-    fields, lacking = differing_fields([run.config for run in runs])
     return Comparison(
         labels=run_labels(runs),
         paths=tuple(str(run.path) for run in runs),
         statuses=tuple(run.status for run in runs),
         orders=tuple(tuple(one.order) for one in summaries),
         numbers={field: tuple(row.get(field) for row in rows) for field in names},
-        fields=fields,
-        lacking=lacking,
+        fields=differing_fields([run.config for run in runs]),
     )
 
 
 def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
-    """Returns a short distinct name for each run: its folder's name, or as much of its path as tells them apart."""
+    """Returns a short distinct name for each run: its folder's name, or as much of its path as makes it distinct."""
     parts = [run.path.absolute().parent.parts for run in runs]
     for depth in range(1, max(map(len, parts)) + 1):
         labels = tuple("/".join(part[-depth:]) for part in parts)
         if len(set(labels)) == len(labels):
             return labels
-    return tuple(f"{'/'.join(part[-1:])} ({number})" for number, part in enumerate(parts, start=1))
+    return tuple(f"{part[-1]} ({number})" for number, part in enumerate(parts, start=1))
 
 
 def relative_difference(first: Number, other: Number) -> Number:
-    """Returns ``(other - first) / |first|``, segment by segment where there is one number a segment.
-
-    None where either is None, the first is 0, or their numbers of segments differ.
-    """
+    """Returns ``(other - first) / |first|``, by segment; None where either is None, the first 0, or lengths differ."""
     if first is None or other is None:
         return None
     if isinstance(first, Sequence) or isinstance(other, Sequence):
@@ -109,27 +92,21 @@ def relative_difference(first: Number, other: Number) -> Number:
     return (other - first) / abs(first) if first else None
 
 
-def differing_fields(
-    configs: Sequence[RunConfig],
-) -> tuple[dict[str, tuple[Any, ...]], dict[str, tuple[bool, ...]]]:
-    """Finds the fields in which configurations differ, by dotted path.
-
-    Returns:
-        The values of each such field, None for a configuration without it; and which lack it.
-    """
+def differing_fields(configs: Sequence[RunConfig]) -> dict[str, tuple[Any, ...]]:
+    """Finds the fields in which configurations differ: values by dotted path, `LACKING` where there is none."""
     own = [fields_of(config) for config in configs]
-    paths = [path for path in dict.fromkeys(path for each in own for path in each) if path not in _WORDS]
-    fields, lacking = {}, {}
-    for path in paths:
-        lacks = tuple(path not in each for each in own)
-        pairs = zip(configs, lacks, strict=True)
-        values = tuple(None if lack else field_value(config, path) for config, lack in pairs)
-        if any(value != values[0] for value in values) or len(set(lacks)) > 1:
-            fields[path], lacking[path] = values, lacks
-    return fields, lacking
+    fields = {}
+    for path in dict.fromkeys(path for each in own for path in each if path not in _WORDS):
+        pairs = zip(configs, own, strict=True)
+        values = tuple(field_value(config, path) if path in each else LACKING for config, each in pairs)
+        if any(value != values[0] for value in values):
+            fields[path] = values
+    return fields
 
 
 def _plain(value: Any) -> Any:
     if hasattr(value, "model_dump"):
         return value.model_dump(mode="json")
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if value is LACKING else value

@@ -2,16 +2,15 @@
 
 A step of a `Flow` is smooth as long as its switches, such as stretch sensors that are on or off, keep still. When one
 moves within a step, the step is shortened to the instant of the switch, which bisection finds, and a new one begins
-there. So a perturbed copy switches earlier or later by what its perturbation says, and the finite differences carry the
-jump of the vector field at the switch (the saltation matrix; Leine & Nijmeijer 2004, ch. 7). With ``refine=False``
-switches move at whole steps only, as in a plain run, and the derivative misses the saltations.
+there, so that finite differences carry the jump of the vector field at the switch (the saltation matrix; Leine &
+Nijmeijer 2004, ch. 7). With ``refine=False`` switches move at whole steps only, as in a plain run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, cast, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +20,7 @@ from annelid.protocols import Array, Controller, Plant, Records, Sensation, Stat
 
 Switches = NDArray[np.bool_]
 
-MOST_STATES = 400
-"""Continuous states beyond which a monodromy by finite differences is refused."""
+MOST_STATES = 400  # continuous states beyond which a monodromy by finite differences is refused
 # Halvings of a step that locate an event: to 1e-9 of the step.
 _HALVINGS = 30
 
@@ -32,47 +30,33 @@ class Flow(Protocol):
 
     A step reads the switches from the state at its beginning (and from what they were, for hysteresis) and
     advances under them; between two switchings the step is smooth.
-
-    Attributes:
-        timestep_s: Duration of a step, s.
-        labels: Names of the continuous states.
-        switch_labels: Names of the switches.
     """
 
     timestep_s: float
-    labels: tuple[str, ...]
-    switch_labels: tuple[str, ...]
+    labels: tuple[str, ...]  # names of the continuous states
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
-        """Advances copies by one step.
+        """Advances copies, ``(n_copies, n_states)``, by one step.
 
-        Args:
-            state: Shape ``(n_copies, n_states)``.
-            switches: What they were during the step before, ``(n_copies, n_switches)``.
-
-        Returns:
-            The states one step on, and the switches in force during this step; new arrays.
+        Takes the switches of the step before, ``(n_copies, n_switches)``. Returns new arrays: the states one step on,
+        and the switches in force during this step.
         """
         ...
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
-        """Returns the states after shares of steps, up to the move of a switch or to the section.
+        """Returns the states after shares of steps in [0, 1], ``(n_copies,)``, up to the section or a switch's move.
 
-        Args:
-            state: Where the steps begin, ``(n_copies, n_states)``.
-            switches: The switches in force, ``(n_copies, n_switches)``.
-            ahead: What `step` returned for these.
-            share: In [0, 1], ``(n_copies,)``.
+        ``switches`` are those in force, and ``ahead`` is what `step` returned for them.
         """
         ...
 
 
 @runtime_checkable
 class Senses(Protocol):
-    """The capability of a plant of telling what it feels without moving."""
+    """The capability of a plant of sensing without moving."""
 
     def sense(self) -> Sensation:
-        """Returns what the body feels at this instant."""
+        """Returns the sensation at this instant."""
         ...
 
 
@@ -85,7 +69,7 @@ class BatchedPlant(Protocol):
     """
 
     def sense_copies(self, states: State) -> Sensation:
-        """Returns what they feel: every array with the copies' axis in front, and one time for all."""
+        """Returns their sensations: every array with the copies' axis in front, and one time for all."""
         ...
 
     def step_copies(self, states: State, activation: Array) -> State:
@@ -104,58 +88,39 @@ class BatchedController(Protocol):
 
 @runtime_checkable
 class Piecewise(Protocol):
-    """The capability of a controller of telling where its equations have kinks; states are as for `BatchedPlant`."""
+    """The capability of a controller of knowing where its equations have kinks; states are as for `BatchedPlant`."""
 
     def pieces_copies(self, states: State) -> Switches:
         """Returns in which smooth piece of the equations each copy is, ``(n_copies, n_pieces)``."""
         ...
 
 
-class _Slot(NamedTuple):
-    """Where an array of the plant's (part 0) or the controller's (1) state lies in the vector of all."""
-
-    part: int
-    name: str
-    shape: tuple[int, ...]
-    where: slice
-
-    @property
-    def size(self) -> int:
-        return self.where.stop - self.where.start
-
-
 class ClosedLoop:
-    """Plant and controller as a `Flow`.
+    """Plant and controller, in their present state, as a `Flow`.
 
     The state is every array of floats in `get_state` of both, plant first; the switches are every array of booleans.
-    Integers, such as the number of steps taken, are held at their values when this is made: what depends on them, a
-    kick at the first step or a hold at the start, must be over by then.
+    Integers, such as the number of steps taken, stay as they are now: what depends on them, a kick at the first step or
+    a hold at the start, must be over by then. Potentials are labelled by their neurons, other states such as
+    ``height[2]``.
 
     All copies advance in one call where plant and controller are batched (`BatchedPlant`, `BatchedController`).
     Otherwise each copy is restored, stepped and saved by itself: a period then costs one run per copy.
-
-    Attributes:
-        timestep_s: Duration of a step, s.
-        labels: Names of the states: a neuron's name for a potential, else such as ``height[2]``.
-        switch_labels: Names of the switches.
-        batched: Whether all copies advance in one call.
     """
 
     def __init__(
         self, plant: Plant, controller: Controller, control_timestep_s: float, stride: int = 1, *, kinks: bool = False
     ) -> None:
-        """Takes plant and controller in their present state.
+        """Takes a plant and a controller, which are stepped by this from now on.
 
         Args:
-            plant: The body; it is stepped by this from now on.
-            controller: The controller, likewise.
+            plant: The body.
+            controller: The controller.
             control_timestep_s: Duration of a control step, s.
             stride: Control steps a step, more than 1 where the body moves in coarser steps than the controller.
-            kinks: Count kinks of the controller's equations among the switches, where it tells them (`Piecewise`).
+            kinks: Count kinks of the controller's equations among the switches, where it is `Piecewise`.
 
         Raises:
-            ConfigError: Plant or controller cannot be saved and restored, the plant cannot tell what it feels, or
-                there are more than `MOST_STATES` states.
+            ConfigError: One of them cannot be saved and restored, the plant cannot sense, or there are too many states.
         """
         for part, what in ((plant, "plant"), (controller, "controller")):
             if not isinstance(part, Stateful):
@@ -167,15 +132,14 @@ class ClosedLoop:
         self._stride = stride
         self._parts = (plant, controller)
         self._piecewise = controller if kinks and isinstance(controller, Piecewise) else None
-        states = self._states()
-        self._floats, self._bools = _slots(states, "f"), _slots(states, "b")
+        self._made_of = self._states()
         self._rest: list[State] = [
-            {name: array for name, array in state.items() if array.dtype.kind not in "fb"} for state in states
+            {name: array for name, array in state.items() if array.dtype.kind not in "fb"} for state in self._made_of
         ]
-        self.labels = tuple(label for slot in self._floats for label in _labels(self._parts[slot.part], slot))
-        sensors = tuple(f"{slot.name}[{i}]" for slot in self._bools for i in range(slot.size))
-        n_pieces = self.present()[1].shape[1] - len(sensors)
-        self.switch_labels = sensors + tuple(f"piece[{i}]" for i in range(n_pieces))
+        self.labels: tuple[str, ...] = ()
+        for part, state in zip(self._parts, self._made_of, strict=True):
+            floats = ((name, array.size) for name, array in state.items() if array.dtype.kind == "f")
+            self.labels += tuple(label for name, size in floats for label in _labels(part, name, size))
         if len(self.labels) > MOST_STATES:
             raise ConfigError(
                 f"{type(plant).__name__} and {type(controller).__name__} have {len(self.labels)} continuous states; "
@@ -183,41 +147,50 @@ class ClosedLoop:
             )
         if not (self.batched or isinstance(plant, Senses)):
             raise ConfigError(
-                f"{type(plant).__name__} has no limit cycle to find: a plant needs sense(), which tells what it feels"
+                f"{type(plant).__name__} has no limit cycle to find: a plant needs sense(), which returns its sensation"
             )
 
     def present(self) -> tuple[Array, Switches]:
         """Returns states ``(1, n_states)`` and switches ``(1, n_switches)`` of plant and controller."""
         states = self._states()
-        state, switches = _packed(states, self._floats, 1), _packed(states, self._bools, 1).astype(bool)
+        state, switches = self._packed(states, "f", 1), self._packed(states, "b", 1).astype(bool)
         return state, self._with_pieces(self._unpacked(state, switches), switches)
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Advances copies by one step, as `Flow.step` says."""
         parts, n_copies = self._unpacked(state, switches), len(state)
         after = self._step_batch(parts) if self.batched else self._step_each(parts, n_copies)
-        sensed = _packed(after, self._bools, n_copies).astype(bool)
-        return _packed(after, self._floats, n_copies), self._with_pieces(parts, sensed)
+        sensed = self._packed(after, "b", n_copies).astype(bool)
+        return self._packed(after, "f", n_copies), self._with_pieces(parts, sensed)
 
     def part(self, state: Array, switches: Switches, ahead: Array, share: Array) -> Array:
         """Takes shares of steps, each the same share of the change of the whole: exact for forward Euler."""
         part = state + share[:, np.newaxis] * (ahead - state)
         return np.where(share[:, np.newaxis] == 1.0, ahead, part)
 
+    def _states(self) -> list[State]:
+        return [cast(Stateful, part).get_state() for part in self._parts]
+
+    def _packed(self, states: list[State], kind: str, n_copies: int) -> NDArray:
+        """Arrays of a kind of dtype of both parts, as one vector a copy."""
+        names = ((i, name) for i, part in enumerate(self._made_of) for name, a in part.items() if a.dtype.kind == kind)
+        flat = [states[i][name].reshape(n_copies, -1) for i, name in names]
+        return np.concatenate([np.empty((n_copies, 0)), *flat], axis=1)
+
     def _unpacked(self, state: Array, switches: Switches) -> list[State]:
+        left: dict[str, NDArray] = {"f": state, "b": switches}
         parts: list[State] = [{}, {}]
-        for slots, values in ((self._floats, state), (self._bools, switches)):
-            for slot in slots:
-                parts[slot.part][slot.name] = values[:, slot.where].reshape(-1, *slot.shape)
+        for part, made_of in zip(parts, self._made_of, strict=True):
+            for name, array in made_of.items():
+                if (kind := array.dtype.kind) in left:
+                    part[name] = left[kind][:, : array.size].reshape(-1, *array.shape)
+                    left[kind] = left[kind][:, array.size :]
         return parts
 
     def _with_pieces(self, parts: list[State], sensed: Switches) -> Switches:
         if self._piecewise is None:
             return sensed
         return np.concatenate([sensed, self._piecewise.pieces_copies(parts[1])], axis=1)
-
-    def _states(self) -> list[State]:
-        return [cast(Stateful, part).get_state() for part in self._parts]
 
     def _step_batch(self, parts: list[State]) -> list[State]:
         plant, controller = cast(BatchedPlant, self._parts[0]), cast(BatchedController, self._parts[1])
@@ -240,31 +213,15 @@ class ClosedLoop:
         return [{name: np.stack([end[i][name] for end in ends]) for name in part} for i, part in enumerate(parts)]
 
 
-def _slots(states: list[State], kind: str) -> list[_Slot]:
-    """Lays arrays of a kind of dtype out in one vector."""
-    slots: list[_Slot] = []
-    for part, state in enumerate(states):
-        for name, array in state.items():
-            if array.dtype.kind == kind:
-                start = slots[-1].where.stop if slots else 0
-                slots.append(_Slot(part, name, array.shape, slice(start, start + array.size)))
-    return slots
-
-
-def _packed(states: list[State], slots: list[_Slot], n_copies: int) -> NDArray:
-    flat = [states[slot.part][slot.name].reshape(n_copies, -1) for slot in slots]
-    return np.concatenate([np.empty((n_copies, 0)), *flat], axis=1)
-
-
-def _labels(part: object, slot: _Slot) -> list[str]:
+def _labels(part: object, name: str, size: int) -> list[str]:
     """A neuron's own name for its potential, else the array's name with the index, counted from 0."""
     if isinstance(part, Records):
         recordable = part.recordable()
         for signal in recordable.signals:
             names = recordable.coords.get(signal.dims[0], ()) if len(signal.dims) == 1 else ()
-            if signal.name == slot.name and len(names) == slot.size:
-                return [str(name) for name in names]
-    return [f"{slot.name}[{i}]" for i in range(slot.size)]
+            if signal.name == name and len(names) == size:
+                return [str(own) for own in names]
+    return [f"{name}[{i}]" for i in range(size)]
 
 
 class Continuous:
@@ -274,19 +231,13 @@ class Continuous:
     and of first order in that step otherwise. The method is Ralston's of three stages, which lie within the first
     three quarters of a step: a step that ends where a switch moves has seen the switch at rest.
     Ralston 1962, Math. Comp. 16, 431-437.
-
-    Attributes:
-        timestep_s: Duration of a step, s.
-        labels: Names of the states.
-        switch_labels: Names of the switches.
     """
 
     def __init__(self, flow: Flow, timestep_s: float) -> None:
-        """Takes the flow that gives the vector field, and the step to integrate it with, s."""
         self._flow = flow
         self._ratio = timestep_s / flow.timestep_s
         self.timestep_s = timestep_s
-        self.labels, self.switch_labels = flow.labels, flow.switch_labels
+        self.labels = flow.labels
 
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Returns the states that the field at the beginning leads to in a whole step, and the switches in force."""
@@ -302,7 +253,7 @@ class Continuous:
         return state + weight * (2.0 * first + 3.0 * second + 4.0 * third) / 9.0
 
     def _held(self, state: Array, switches: Switches, change: Array) -> Array:
-        """The change at a stage; where the stage is past a move of a switch, the one before, as if it held still."""
+        """The change at a stage; where the stage is past a move of a switch, the one before, as if it did not move."""
         here, seen = self._change(state, switches)
         return np.where((seen != switches).any(axis=1, keepdims=True), change, here)
 
@@ -313,7 +264,7 @@ class Continuous:
 
 @dataclass(slots=True)
 class Copies:
-    """Copies on their way: state, switches in force, and where a whole step from here leads."""
+    """Copies at some instant: state, switches in force, and where a whole step from here leads."""
 
     state: Array
     switches: Switches
@@ -364,14 +315,10 @@ def first_share(flow: Flow, here: Copies, share: Array, past: Callable[[Array], 
 
 
 def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, refine: bool = True) -> Copies:
-    """Lets copies run, each for a duration of its own, and returns them at their ends.
+    """Lets copies, ``(n_copies, n_states)``, run for their own durations, s, ``(n_copies,)``; returns them at the ends.
 
-    Args:
-        flow: The system.
-        state: Shape ``(n_copies, n_states)``.
-        before: Switches as they were before, ``(n_copies, n_switches)``.
-        duration_s: Shape ``(n_copies,)``, s.
-        refine: Whether steps end where a switch moves.
+    ``before`` are the switches as they were before, ``(n_copies, n_switches)``; with ``refine`` steps end where one
+    moves.
     """
     left = np.asarray(duration_s, dtype=float) / flow.timestep_s
     done = Copies.at(flow, state, before)

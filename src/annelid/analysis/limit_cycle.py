@@ -2,14 +2,16 @@
 
 The return map of a section is iterated, or solved by Newton's method, until the orbit closes; state-transition
 matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
-ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks, at which the equations
-change piece within a step, take it further away. `Continuous` and `Piecewise` of `annelid.analysis.flow` take care of
-both.
+ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks within a step take it
+further away; `Continuous` and `Piecewise` of `annelid.analysis.flow` take care of both.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import reduce
+from itertools import accumulate
 from typing import Literal, cast, get_args
 
 import numpy as np
@@ -23,25 +25,9 @@ from annelid.errors import AnnelidError, ConfigError, suggest
 from annelid.protocols import Array, Controller, Plant, Stateful
 from annelid.simulation import build_controller, build_plant
 
-__all__ = [
-    "LimitCycle",
-    "NoLimitCycle",
-    "Section",
-    "Time",
-    "crossing_times",
-    "find_limit_cycle",
-    "flow_of",
-    "kicked_phase_response",
-    "limit_cycle",
-    "section_at",
-    "settled",
-    "travel",
-]
+Time = Literal["continuous", "located", "stepped"]  # how a worm's time is taken; see `limit_cycle`
 
-Time = Literal["continuous", "located", "stepped"]
-"""How a worm's time is taken; see `limit_cycle`."""
-
-# Step whose change tells the vector field, and the step that the field is integrated with, s.
+# Step whose change is the vector field, and the step that the field is integrated with, s.
 _FIELD_STEP_S = 1e-5
 _CONTINUOUS_STEP_S = 1e-3
 _MOST_RETURNS, _MOST_NEWTON = 40, 12
@@ -57,15 +43,10 @@ class NoLimitCycle(AnnelidError):
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """The event that ends a cycle: a state rising through a threshold.
+    """The event that ends a cycle: a state rising through a threshold."""
 
-    Attributes:
-        state: Index of the state.
-        threshold: In its unit.
-    """
-
-    state: int
-    threshold: float
+    state: int  # its index
+    threshold: float  # in its unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +72,7 @@ class LimitCycle:
             state is measured by its range, ``(n_states, n_states)``, complex.
         trivial: Index of the multiplier nearest to 1, whose eigenvector is along the orbit.
         phase_response: Infinitesimal phase response curves, ``(n_phases + 1, n_states)``: by how many seconds a
-            cycle is advanced by a unit of perturbation of each state at each instant; where a state rests on a kink,
-            the mean of what perturbations to either side do.
+            cycle is advanced by a unit of perturbation of each state there; on a kink, the mean of both sides.
     """
 
     labels: tuple[str, ...]
@@ -154,19 +134,13 @@ def limit_cycle(
 
 
 def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0) -> tuple[Flow, Array, Switches]:
-    """Builds the closed loop of a configuration and lets it run until what only its beginning sees is over.
+    """Builds the closed loop of a configuration and lets it run until its start is over.
 
-    Args:
-        config: A configuration without sensor noise; a continuous flow needs a planar body and a controller that
-            is the same at every time step.
-        time: How its time is taken, as for `limit_cycle`.
-        settle_s: Simulated time, s, longer than ``sensor.startup_hold_s``.
+    Arguments and errors are those of `limit_cycle`; a continuous flow needs a planar body and a controller that is the
+    same at every time step.
 
     Returns:
         The flow, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
-
-    Raises:
-        ConfigError: Another way of taking time, or as for `limit_cycle`.
     """
     if time not in get_args(Time):
         raise ConfigError(f"unknown time {time!r}: {suggest(time, get_args(Time))}")
@@ -183,7 +157,7 @@ def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0)
     flow, state, switches = settled(plant, controller, clock.control_timestep_s, settle_s, stride=stride)
     if time != "continuous":
         return flow, state, switches
-    # The same loop in forward Euler steps so short that they tell the vector field.
+    # The same loop in forward Euler steps so short that they are the vector field.
     tree = config.model_dump()
     tree["clock"] = {"control_timestep_s": _FIELD_STEP_S, "physics_timestep_s": _FIELD_STEP_S}
     if paper_controller(config.controller) is not None:
@@ -203,14 +177,9 @@ def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0)
 def settled(
     plant: Plant, controller: Controller, control_timestep_s: float, settle_s: float, *, stride: int = 1
 ) -> tuple[ClosedLoop, Array, Switches]:
-    """Lets any plant and controller run from their reset, and makes the closed loop of them.
+    """Lets any plant and controller run from their reset for ``settle_s``, and makes the closed loop of them.
 
-    Args:
-        plant: The body.
-        controller: The controller.
-        control_timestep_s: Duration of a control step, s.
-        settle_s: Simulated time, s.
-        stride: Control steps from one movement of the body to the next.
+    The body moves every ``stride`` control steps.
 
     Returns:
         The loop, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
@@ -316,10 +285,8 @@ def find_limit_cycle(
     multipliers, eigenvectors, adjoint = _decomposed(monodromy, orbit.range)
     state, switches = orbit.state[arcs], orbit.switches[arcs]
     velocity = (flow.step(state, switches)[0] - state) / flow.timestep_s
-    carried = [adjoint]
-    for transition in transitions[::-1]:
-        carried.append(transition.T @ carried[-1])
-    response = np.array(carried[::-1])
+    carried = accumulate(transitions[::-1], lambda later, transition: transition.T @ later, initial=adjoint)
+    response = np.array([*carried][::-1])
     return LimitCycle(
         labels=flow.labels,
         period_s=float(orbit.time[-1] * flow.timestep_s),
@@ -367,64 +334,62 @@ def crossing_times(
     count: int = 1,
     refine: bool = True,
 ) -> tuple[Array, Array, Switches]:
-    """Lets copies run until they have met the section.
-
-    Args:
-        flow: The system.
-        state: Shape ``(n_copies, n_states)``.
-        before: Switches as they were before, ``(n_copies, n_switches)``.
-        section: The event.
-        longest_s: Simulated time after which to give up, s.
-        count: Which of the events to stop at, from 1.
-        refine: Whether steps end where a switch moves.
+    """Lets copies run, from where `travel` would, until they have met the section ``count`` times.
 
     Returns:
         Times, s, ``(n_copies,)``; states and switches there.
 
     Raises:
-        NoLimitCycle: A copy has not met the section so often in that time.
+        NoLimitCycle: A copy has not met it so often in ``longest_s``.
     """
     here = Copies.at(flow, state, before)
-    rows, times, counts = np.arange(len(state)), np.zeros(len(state)), np.zeros(len(state), dtype=int)
-    end = here[rows]
-    while rows.size:
-        _refuse_waiting(flow, section, count, float(times[rows].max()), longest_s)
-        there, taken = advance(flow, here, np.ones(rows.size), refine)
-        met = _meets(section, here, there)
-        counts[rows] += met
-        final = met & (counts[rows] == count)
-        if final.any():
-            end[rows[final]], taken[final] = _stop(flow, section, here[final], taken[final])
+    end, times = here[np.arange(len(state))], np.zeros(len(state))
+    for rows, _, there, taken, final in _steps_to(flow, here, section, longest_s, count, refine):
         times[rows] += taken * flow.timestep_s
-        rows, here = rows[~final], there[~final]
+        end[rows[final]] = there[final]
     return times, end.state, end.switches
 
 
 def _first_return(
     flow: Flow, state: Array, before: Switches, section: Section, longest_s: float, refine: bool
 ) -> _Orbit:
-    """One copy's way from the section back to it, step by step."""
-    here = Copies.at(flow, state, before)
-    time, states, switches, moved = [0.0], [here.state[0]], [here.switches[0]], []
-    met = False
-    while not met:
-        _refuse_waiting(flow, section, 1, time[-1] * flow.timestep_s, longest_s)
-        there, taken = advance(flow, here, np.ones(1), refine)
-        met = bool(_meets(section, here, there)[0])
-        if met:
-            there, taken = _stop(flow, section, here, taken)
-        elif (there.switches != here.switches).any():
+    """One copy from the section back to it, step by step."""
+    start = Copies.at(flow, state, before)
+    time, states, switches, moved = [0.0], [start.state[0]], [start.switches[0]], []
+    for _, here, there, taken, final in _steps_to(flow, start, section, longest_s, 1, refine):
+        if not final[0] and (there.switches != here.switches).any():
             moved.append(len(time))
-        here = there
         time.append(time[-1] + float(taken[0]))
-        states.append(here.state[0])
-        switches.append(here.switches[0])
+        states.append(there.state[0])
+        switches.append(there.switches[0])
     return _Orbit(np.array(time), np.array(states), np.array(switches), np.array(moved, dtype=np.intp))
 
 
-def _meets(section: Section, here: Copies, there: Copies) -> NDArray[np.bool_]:
-    low, high = here.state[:, section.state], there.state[:, section.state]
-    return (low < section.threshold) & (high >= section.threshold)
+def _steps_to(
+    flow: Flow, here: Copies, section: Section, longest_s: float, count: int, refine: bool
+) -> Iterator[tuple[NDArray[np.intp], Copies, Copies, Array, NDArray[np.bool_]]]:
+    """Steps copies until they have met the section ``count`` times, on which their last steps end.
+
+    Yields at every step which copies take it, where it begins and ends, its share of a whole step, and which are done.
+    """
+    rows, times, counts = np.arange(len(here.state)), np.zeros(len(here.state)), np.zeros(len(here.state), dtype=int)
+    while rows.size:
+        if times[rows].max() > longest_s:
+            raise NoLimitCycle(
+                f"{flow.labels[section.state]} does not rise through {section.threshold:g} "
+                f"{'' if count == 1 else f'{count} times '}within {longest_s:g} s: "
+                "choose another threshold or neuron, or a worm that oscillates"
+            )
+        there, taken = advance(flow, here, np.ones(rows.size), refine)
+        low, high = here.state[:, section.state], there.state[:, section.state]
+        met = (low < section.threshold) & (high >= section.threshold)
+        counts[rows] += met
+        final = met & (counts[rows] == count)
+        if final.any():
+            there[final], taken[final] = _stop(flow, section, here[final], taken[final])
+        yield rows, here, there, taken, final
+        times[rows] += taken * flow.timestep_s
+        rows, here = rows[~final], there[~final]
 
 
 def _stop(flow: Flow, section: Section, here: Copies, share: Array) -> tuple[Copies, Array]:
@@ -434,15 +399,6 @@ def _stop(flow: Flow, section: Section, here: Copies, share: Array) -> tuple[Cop
     # On the section to the last bit, so that a copy that starts from here does not meet it at once.
     state[:, section.state] = section.threshold
     return Copies.at(flow, state, here.switches), share
-
-
-def _refuse_waiting(flow: Flow, section: Section, count: int, time_s: float, longest_s: float) -> None:
-    if time_s > longest_s:
-        raise NoLimitCycle(
-            f"{flow.labels[section.state]} does not rise through {section.threshold:g} "
-            f"{'' if count == 1 else f'{count} times '}within {longest_s:g} s: "
-            "choose another threshold or neuron, or a worm that oscillates"
-        )
 
 
 def _arcs(orbit: _Orbit, n_phases: int) -> NDArray[np.intp]:
@@ -478,10 +434,7 @@ def _transitions(flow: Flow, orbit: _Orbit, arcs: NDArray[np.intp], perturbation
 
 def _product(transitions: Array) -> Array:
     """State-transition matrix of a whole period: the product of those of its arcs."""
-    product = np.eye(transitions.shape[1])
-    for transition in transitions:
-        product = transition @ product
-    return product
+    return reduce(lambda product, transition: transition @ product, transitions, np.eye(transitions.shape[1]))
 
 
 def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128], Array]:
@@ -496,13 +449,7 @@ def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128],
 
 
 def kicked_phase_response(
-    flow: Flow,
-    cycle: LimitCycle,
-    kicks: Array,
-    phases: NDArray[np.intp],
-    *,
-    n_cycles: int = 3,
-    longest_s: float = 60.0,
+    flow: Flow, cycle: LimitCycle, kicks: Array, phases: NDArray[np.intp], *, n_cycles: int = 3, longest_s: float = 60.0
 ) -> Array:
     """Measures phase response directly: kicks the system at a phase, and sees when it next meets the section.
 
@@ -511,15 +458,11 @@ def kicked_phase_response(
         cycle: Its limit cycle.
         kicks: What is added to the states at once, ``(n_kicks, n_states)``; any size.
         phases: Indices into the cycle's instants, ``(n_kicked,)``.
-        n_cycles: Which meeting with the section to compare, from 1; by then the kick should have died away but for
-            its phase.
+        n_cycles: Which meeting with the section to compare, from 1; by then only the kick's phase should be left.
         longest_s: Longest cycle to wait for, s.
 
     Returns:
         Advance of each phase by each kick, s, ``(n_kicked, n_kicks)``, within half a period of 0.
-
-    Raises:
-        NoLimitCycle: A kick has thrown the system off the cycle.
     """
     plain = np.zeros((1, kicks.shape[1]))
     state = (cycle.state[phases, np.newaxis] + np.concatenate([plain, kicks])).reshape(-1, kicks.shape[1])

@@ -4,30 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from importlib import resources
+from typing import Any
 
 from annelid.analysis.comparison import differing_fields, relative_difference
 from annelid.analysis.summary import Summary
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, preset_names
+from annelid.config.run import published_worms
 from annelid.control.sns import paper_controller
 from annelid.textfiles import parse_json
 
-ROBOT_ELONGATION_M = (0.0615, 0.0382, 0.0478, 0.0598)
-"""Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m: each the mean of the left
-and the right stretch sensor. Riddle et al. 2023, section 4, from data of Wang. Its Fig. 9 shows the readings over
-time as a graph; numbers are given of these maxima only.
-"""
-PAPER_ELONGATION_M = (0.0420, 0.0255, 0.0402)
-"""Largest elongation of the segments of the paper's worm of three, m. Riddle et al. 2023, section 3."""
-PAPER_MIDDLE_DEFICIT, PAPER_END_DIFFERENCE = 0.394, 0.0445
+_ROBOT, _WORM = (published_worms()[name][0]["numbers"] for name in ("wang", "riddle2023"))
+ROBOT_ELONGATION_M: tuple[float, ...] = tuple(_ROBOT["elongation_mean_max_m"][0])
+"""Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m."""
+PAPER_ELONGATION_M: tuple[float, ...] = tuple(_WORM["elongation_first_helix_pp_m"][0])
+"""Largest elongation of the segments of the paper's worm of three, m."""
+PAPER_MIDDLE_DEFICIT: float = _WORM["middle_deficit"][0]
+PAPER_END_DIFFERENCE: float = _WORM["end_difference"][0]
 """How far segment 2 stays below segment 1 by these, and segment 3, as the paper states them."""
-
-PAPER_2023 = "Riddle et al. 2023"
-PAPER_2022 = "Riddle et al. 2022"
 FORMULATION = "riddle2023"
-"""The preset that rebuilds the paper's worm in the paper's own formulation."""
+"""The preset that rebuilds the paper's worm in the paper's own formulation, and the name of what it publishes."""
 
 PERIOD_WITHIN, ELONGATION_WITHIN = 0.01, 0.05
 """Relative differences up to which a run agrees with the paper's formulation."""
@@ -35,8 +33,8 @@ PERIOD_WITHIN, ELONGATION_WITHIN = 0.01, 0.05
 _IN_ITS_RUN = ("period_s", "elongation_mean_max_m", "middle_deficit_mean", "ring_length_min_m", "pin_gap_max_m")
 SPREAD = ("elongation_least_pp_m", "elongation_most_pp_m")
 """The range over a segment's sensors, in which one published sensor may lie."""
-# What says how a run is recorded and guarded, and what it is called.
-_BESIDE_THE_WORM = ("name", "summary", "record.", "guard.")
+# What says how a run is recorded and guarded.
+_BESIDE_THE_WORM = ("record.", "guard.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,23 +55,14 @@ class Published:
 def published(config: RunConfig) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
-    Only configurations named after a paper and with its kind of controller have such numbers: the three-segment worm of
-    ``riddle2023`` and its rods, the four-segment robot ``wang``, and the planar worms of ``riddle2022`` with the gate
-    time constants and gains that go together.
+    These are the numbers that its field ``published`` names, in ``data/published.toml``, where the controller is
+    the paper's and the fields that the numbers are given for have those values.
     """
-    network = paper_controller(config.controller)
-    if network is None:
+    if config.published is None or paper_controller(config.controller) is None:
         return {}
-    if _is_of_2023(config):
-        return dict(_RIDDLE_2023)
-    if config.name == "wang" and config.body.n_segments == len(ROBOT_ELONGATION_M):
-        return dict(_ROBOT)
-    period_s = config.body.published_period_s(config)
-    if config.name.startswith("riddle2022") and period_s is not None:
-        return {
-            "period_s": Published(period_s, PAPER_2022, "the authors' code"),
-            "order": Published("1-2-3..", PAPER_2022, "Fig. 4"),
-        }
+    for worm in published_worms()[config.published]:
+        if all(_value(config, path) == value for path, value in worm["given"].items()):
+            return {field: Published(_tuple(value), *source) for field, (value, *source) in worm["numbers"].items()}
     return {}
 
 
@@ -126,15 +115,14 @@ def references(config: RunConfig) -> dict[str, Published]:
         beside |= dict.fromkeys(SPREAD, single)
     if stands_for_the_papers(config):
         for field in _IN_ITS_RUN:
-            value = getattr(formulation(), field)
-            value = tuple(value) if isinstance(value, list) else value
-            beside[field] = Published(value, FORMULATION, f"annelid run {FORMULATION}")
+            beside[field] = Published(_tuple(getattr(formulation(), field)), FORMULATION, f"annelid run {FORMULATION}")
     return beside
 
 
 def stands_for_the_papers(config: RunConfig) -> bool:
     """Tells whether a worm is of rods and of the paper's kind, to be compared with the paper's own formulation."""
-    return _is_of_2023(config) and isinstance(config.body, WormBody) and not config.body.formulation.is_papers
+    theirs = config.published == FORMULATION and bool(published(config))
+    return theirs and isinstance(config.body, WormBody) and not config.body.formulation.is_papers
 
 
 def has_rigid_crossings(config: RunConfig) -> bool:
@@ -142,15 +130,21 @@ def has_rigid_crossings(config: RunConfig) -> bool:
     return isinstance(config.body, WormBody) and config.body.formulation.has_rigid_crossings
 
 
-def changed_fields(config: RunConfig) -> list[str]:
-    """Returns the fields in which a run differs from the preset that it is named after; none where there is none.
+def changed_fields(config: RunConfig) -> tuple[str, list[str]]:
+    """Returns the preset that a run is of, and the fields in which it differs from that.
 
-    What is recorded and when the guard stops the run do not count, nor does the seed where nothing is drawn. A section
-    of another kind counts as its kind.
+    It is the preset that the run is named after, or else the nearest of those with the same published numbers. What is
+    recorded and when the guard stops the run do not count, nor does the seed where nothing is drawn. A section of
+    another kind counts as its kind.
     """
-    if config.name not in preset_names():
-        return []
-    fields, _ = differing_fields([load_config(config.name), config])
+    presets = {name: load_config(name) for name in preset_names()}
+    same = [name for name, preset in presets.items() if preset.published == config.published]
+    changed = {name: _changes(presets[name], config) for name in ([config.name] if config.name in presets else same)}
+    return min(changed.items(), key=lambda each: len(each[1]))
+
+
+def _changes(preset: RunConfig, config: RunConfig) -> list[str]:
+    fields = differing_fields([preset, config])
     uncounted = (*_BESIDE_THE_WORM, *(() if config.sensor.noise_m else ("seed",)))
     changed = [field for field in fields if not field.startswith(uncounted)]
     others = tuple(field.removesuffix("kind") for field in changed if field.endswith(".kind"))
@@ -167,24 +161,10 @@ def agreement(numbers: Summary) -> Agreement:
     return Agreement(numbers.order == theirs.order, period, of_each)
 
 
-def _is_of_2023(config: RunConfig) -> bool:
-    named = config.name.startswith(FORMULATION) and config.body.n_segments == 3
-    return named and paper_controller(config.controller) is not None
+def _value(config: RunConfig, path: str) -> Any:
+    """Returns the value at a dotted path; None where this worm has no such field."""
+    return reduce(lambda section, name: getattr(section, name, None), path.split("."), config)
 
 
-_RIDDLE_2023 = {
-    "order": Published("1-2-3", PAPER_2023, "Fig. 7"),
-    "elongation_first_helix_pp_m": Published(PAPER_ELONGATION_M, PAPER_2023, "section 3"),
-    # Segment 2 below segment 1, and segment 1 versus 3.
-    "middle_deficit": Published(PAPER_MIDDLE_DEFICIT, PAPER_2023, "section 3"),
-    "end_difference": Published(PAPER_END_DIFFERENCE, PAPER_2023, "section 3"),
-    "contraction_force_median_N": Published("up to 2.5 N", PAPER_2023, "section 2.2"),
-    "travel_m": Published("negligible", PAPER_2023, "section 5"),
-    # 5000 steps of 1 ms in 3.5 min.
-    "real_time_factor": Published(5.0 / 210.0, PAPER_2023, "section 3"),
-}
-
-_ROBOT = {
-    "order": Published("1-2-3-4", PAPER_2023, "Fig. 9"),
-    "elongation_mean_max_m": Published(ROBOT_ELONGATION_M, PAPER_2023, "section 4"),
-}
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,14 +11,12 @@ from annelid.analysis.track import Track, track_of
 from annelid.config.arena import ArenaKind
 from annelid.errors import RunFileError
 from annelid.protocols import Array
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A worm's way through a pipe, at the times of the recorded postures.
+    """A worm's passage through a pipe, at the times of the recorded postures.
 
     Attributes:
         time_s: Shape ``(n,)``.
@@ -52,8 +49,8 @@ class Passage:
     def speed_m_per_s(self) -> float:
         """Mean speed of the foremost ring along the centre line through all that bends or narrows, m/s.
 
-        It counts from the first posture in which the ring has come there to the first in which it is past it, so that
-        worms are compared over the same way; or to the end for one that does not get so far. NaN if it never came.
+        From the first posture there to the first past it, or to the end for a worm that does not get so far, so that
+        worms are compared over the same distance; NaN if it never came.
         """
         inside = np.flatnonzero(self.front_m >= self.reach_m[0])
         past = np.flatnonzero(self.front_m >= self.reach_m[1])
@@ -64,10 +61,9 @@ class Passage:
         return float((self.front_m[last] - self.front_m[first]) / (self.time_s[last] - self.time_s[first]))
 
     def speed_over_m_per_s(self, window_s: float) -> Array:
-        """Speed of the middle at every posture, m/s, ``(n,)``: the slope of a line through the postures of a window.
+        """Speed of the middle at every posture, m/s, ``(n,)``: the slope of a line through the postures of a window, s.
 
-        Args:
-            window_s: Width of the window, s; a cycle or more, so that the swings within one do not count.
+        A window of a cycle or more leaves the swings within one out.
         """
         slope = np.empty(len(self.time_s))
         for k, now in enumerate(self.time_s):
@@ -78,7 +74,7 @@ class Passage:
 
 
 def passage_of(run: Run) -> Passage:
-    """Reads a worm's way through a pipe from its run.
+    """Reads a worm's passage through a pipe from its run.
 
     Raises:
         RunFileError: The worm was not in a pipe, or `annelid.analysis.track.track_of` refuses the run.
@@ -91,7 +87,7 @@ def passage_of(run: Run) -> Passage:
 
 
 def passage_through(pipe: ArenaKind, track: Track) -> Passage:
-    """Reads a worm's way through a pipe from its track."""
+    """Reads a worm's passage through a pipe from its track."""
     centre_line, bore, reach_m = pipe.centre_line(), pipe.bore(), pipe.reach_m()
     assert centre_line is not None
     assert bore is not None

@@ -9,28 +9,27 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from annelid.analysis.elongation import elongation, end_difference, middle_deficit
-from annelid.analysis.forces import contraction_forces, net_work, positive_work
-from annelid.analysis.rhythm import Rhythm, run_rhythm
-from annelid.analysis.travel import forward_position, net_travel, path_travel
+from annelid.analysis.gait import muscle_work
+from annelid.analysis.rhythm import CONTRACTED, Rhythm, run_rhythm
+from annelid.analysis.track import forward_position
 from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from annelid.simulation.runfile import Run
-
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a run amounts to. A number that cannot be told is None (null in JSON), never NaN.
+    """What a run amounts to. A number that is not known is None (null in JSON), never NaN.
 
     Attributes:
         name: Name of the configuration.
         status: How the run ended, as the run file says.
         n_segments: Number of actuated segments.
-        duration_s: Simulated time that the file holds, s.
+        duration_s: Simulated time in the file, s.
         real_time_factor: Simulated time over wall-clock time.
         order: Segments (from 1) in the order of their contractions.
         onsets_s: Times of those contractions, s, aligned with ``order``.
@@ -52,8 +51,8 @@ class Summary:
         segment_force_peak_N: Per segment: largest force of its muscles while contracted, N.
         positive_work_J: Per segment: work of its muscles while it was positive, J; none of it is regained.
         muscle_work_J: Per segment: net work of its muscles, J; where no work is summed, force over shortening.
-        travel_m: Displacement of the centre of mass towards where the worm leads at first, negative backwards, m.
-        travel_path_m: Its way forth and back along that direction, m.
+        travel_m: Displacement of the centre of mass along the initial heading, negative backwards, m.
+        travel_path_m: Length of its path forwards and backwards along that direction, m.
         ring_length_min_m: Shortest ring during the run, m (planar worm: height of a rhombus).
         edge_strain_max: Largest strain of any edge of a rod.
         pin_gap_max_m: Largest distance between two pinned strands, m.
@@ -111,20 +110,27 @@ def summary(run: Run) -> Summary:
     """
     data = run.data
     n_segments = run.config.body.n_segments
+    sampled = bool(data.sizes.get("time"))
     beat = run_rhythm(run) or Rhythm((), (), None, None, None, 0)
-    read = None
-    if "stretch_length" in data and data.sizes.get("time"):
-        read = elongation(data["stretch_length"].values, data["stretch_rest_length"].values)
-    first_helix, mean = (read.first_helix_pp_m, read.mean_max_m) if read else (None, None)
-    spread = read if read and data.sizes["sensor"] > 1 else None
+    first_helix = mean = spread = None
+    if "stretch_length" in data and sampled:
+        # The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak on the first helix.
+        stretch, rest = data["stretch_length"].values, data["stretch_rest_length"].values
+        peak_to_peak = np.ptp(stretch, axis=0)
+        first_helix, mean = peak_to_peak[:, 0], stretch.mean(axis=2).max(axis=0) - rest.mean(axis=1)
+        spread = peak_to_peak if data.sizes["sensor"] > 1 else None
     forces = _contraction_forces(data, n_segments)
     pulling = np.concatenate([np.empty(0), *forces])
-    ahead = forward_position(run) if "center_of_mass" in data else np.empty(0)
+    ahead = forward_position(run) if "center_of_mass" in data and sampled else None
+    shortest = None
+    if "ring_length" in data and sampled:
+        # A ring of two halves is as long as both.
+        shortest = data["ring_length"].values.reshape(data.sizes["time"], n_segments, -1).sum(axis=2).min()
     return Summary(
         name=run.config.name,
         status=run.status,
         n_segments=n_segments,
-        duration_s=_number(np.ptp(data["time"].values)) if data.sizes.get("time") else None,
+        duration_s=_number(np.ptp(data["time"].values)) if sampled else None,
         real_time_factor=_number(run.real_time_factor),
         order=list(beat.order),
         onsets_s=list(beat.onsets_s),
@@ -141,38 +147,33 @@ def summary(run: Run) -> Summary:
         contraction_force_peak_N=_number(pulling.max()) if pulling.size else None,
         segment_force_median_N=_numbers([np.median(one) if one.size else None for one in forces] or None),
         segment_force_peak_N=_numbers([one.max() if one.size else None for one in forces] or None),
-        positive_work_J=_by_segment(positive_work(data), n_segments),
-        muscle_work_J=_by_segment(net_work(data), n_segments),
-        travel_m=_number(net_travel(ahead)),
-        travel_path_m=_number(path_travel(ahead)),
-        ring_length_min_m=_shortest_ring(data, n_segments),
+        positive_work_J=_by_segment(muscle_work(data, positive=True), n_segments),
+        muscle_work_J=_by_segment(muscle_work(data), n_segments),
+        travel_m=None if ahead is None else _number(ahead[-1] - ahead[0]),
+        travel_path_m=None if ahead is None else _number(np.abs(np.diff(ahead)).sum()),
+        ring_length_min_m=_number(shortest),
         edge_strain_max=_largest(data, "edge_strain"),
         pin_gap_max_m=_largest(data, "pin_gap"),
-        elongation_least_pp_m=_numbers(spread.least_pp_m) if spread else None,
-        elongation_most_pp_m=_numbers(spread.most_pp_m) if spread else None,
+        elongation_least_pp_m=None if spread is None else _numbers(spread.min(axis=1)),
+        elongation_most_pp_m=None if spread is None else _numbers(spread.max(axis=1)),
         warnings=run.warnings,
     )
 
 
 def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[Array]:
-    """Forces while contracted, an array a segment; empty without muscles that have forces."""
+    """Forces of all samples in which the muscle itself is contracted, an array per segment; empty without forces.
+
+    The short transient at each onset is in there: it sets the peak and hardly moves the median.
+    """
     if "muscle_force" not in data or "activation" not in data:
         return []
     muscles = np.split(np.arange(data.sizes["muscle"]), n_segments)
-    force, activation = data["muscle_force"].values, data["activation"].values
-    return [contraction_forces(force[:, own], activation[:, own]) for own in muscles]
+    force, contracted = data["muscle_force"].values, data["activation"].values > CONTRACTED
+    return [force[:, own][contracted[:, own]] for own in muscles]
 
 
 def _by_segment(of_muscles: Array | None, n_segments: int) -> list[float | None] | None:
     return None if of_muscles is None else _numbers(of_muscles.reshape(n_segments, -1).sum(axis=1))
-
-
-def _shortest_ring(data: xr.Dataset, n_segments: int) -> float | None:
-    """A ring of two halves is as long as both."""
-    if "ring_length" not in data or not data.sizes.get("time"):
-        return None
-    lengths = data["ring_length"].values
-    return _number(lengths.reshape(len(lengths), n_segments, -1).sum(axis=2).min())
 
 
 def _largest(data: xr.Dataset, name: str) -> float | None:
@@ -185,3 +186,28 @@ def _number(value: float | None) -> float | None:
 
 def _numbers(values: Iterable[float | None] | None) -> list[float | None] | None:
     return None if values is None else [_number(value) for value in values]
+
+
+def middle_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below the first: ``1 - mean(interior) / first``, NaN if that is unmoved.
+
+    With three segments this is the paper's "segment 2 below segment 1" (39.4 %).
+    """
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[1:-1].mean(), values[0])
+
+
+def interior_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below both ends: ``1 - mean(interior) / mean(ends)``."""
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[1:-1].mean(), (values[0] + values[-1]) / 2.0)
+
+
+def end_difference(elongation_m: ArrayLike) -> float:
+    """How far the last segment stays below the first: ``1 - last / first``."""
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[-1], values[0])
+
+
+def _deficit(less: float, full: float) -> float:
+    return float(1.0 - less / full) if full > 0 else float("nan")

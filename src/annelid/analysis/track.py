@@ -1,28 +1,43 @@
-"""Where a worm crawled, seen from above: its track, its outline, how it turned, and the circle through it."""
+"""Where a worm crawled, seen from above: its travel, track and outline, how it turned, and the circle through it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.body.worm import WormBody
 from annelid.errors import RunFileError
+from annelid.morphology import heading_turn
 from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
-
+# Where a worm leads in its own axes, seen from above.
+_FORWARDS = np.array([-1.0, 0.0])
+# An arc is one where it bulges by more than this many times what the points are off it.
 _CLEARLY = 3.0
-"""An arc is one where it bulges by more than this many times what the points are off it."""
+
+
+def first_heading(run: Run) -> Array:
+    """Returns the direction in which a run's worm leads at the start, seen from above, ``(2,)``."""
+    body = run.config.body
+    heading_deg = body.heading_deg if isinstance(body, WormBody) else 0.0
+    return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
+
+
+def forward_position(run: Run) -> Array:
+    """Returns the position of the centre of mass along the initial heading, m from the origin, ``(n_times,)``."""
+    ahead, centre = first_heading(run), run.data["center_of_mass"]
+    along: Array = ahead[0] * centre.sel(axis="x").values
+    # A planar worm moves along x alone.
+    return along + ahead[1] * centre.sel(axis="y").values if ahead[1] else along
 
 
 @dataclass(frozen=True)
 class Track:
-    """A worm's way over the floor, at the times of the recorded postures.
+    """A worm's track on the floor, at the times of the recorded postures.
 
     Attributes:
         time_s: Shape ``(n,)``.
@@ -61,10 +76,7 @@ class Track:
         return self.crossing_m[..., :2].reshape(len(self.time_s), -1, self.n_per_plane, 2)
 
     def outline_m(self, sample: int) -> Array:
-        """Returns the body's outline seen from above at a sample: a closed polygon, m, ``(n_corners, 2)``.
-
-        On either side it runs along the outermost crossing of every plane.
-        """
+        """Returns the outline seen from above, m, ``(n_corners, 2)``: closed, along the outermost crossings."""
         planes = self._planes[sample]
         centre = planes.mean(axis=1)
         along = np.gradient(centre, axis=0)
@@ -98,7 +110,7 @@ class Turn:
     Attributes:
         cycles: Complete cycles between the two ends.
         angle_rad: Change of the heading, positive to the left.
-        path_m: Length of the way of the middle of the body, from cycle to cycle.
+        path_m: Length of the path of the middle of the body, from cycle to cycle.
         curvature_per_m: Angle over path; positive to the left.
     """
 
@@ -109,7 +121,7 @@ class Turn:
 
     @property
     def radius_m(self) -> float:
-        """Radius of the circle, m; infinite for a straight way, NaN for one of no length."""
+        """Radius of the circle, m; infinite for a straight path, NaN for one of no length."""
         return np.inf if self.curvature_per_m == 0 else abs(1.0 / self.curvature_per_m)
 
 
@@ -121,8 +133,8 @@ def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
 
     Args:
         track: The track.
-        period_s: Time of a cycle.
-        after_s: Time from which on it is measured, so that the start is left out.
+        period_s: Time of a cycle, s.
+        after_s: Time from which on it is measured, so that the start is left out, s.
 
     Raises:
         RunFileError: Less than two complete cycles behind ``after_s``.
@@ -144,19 +156,12 @@ def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """A circle fitted to a track.
-
-    Attributes:
-        centre_m: Its centre, x and y, m.
-        radius_m: Its radius, m.
-        angle_rad: Angle that the track covers seen from the centre, positive to the left (from x to y), rad.
-        off_m: Root mean square of the points' distances from the circle, m.
-    """
+    """A circle fitted to a track."""
 
     centre_m: tuple[float, float]
     radius_m: float
-    angle_rad: float
-    off_m: float
+    angle_rad: float  # that the track covers seen from the centre, positive to the left (from x to y)
+    off_m: float  # root mean square of the points' distances from the circle
 
     @property
     def signed_radius_m(self) -> float:
@@ -164,20 +169,17 @@ class Circle:
         return self.radius_m if self.angle_rad > 0 else -self.radius_m
 
     @property
-    def is_told(self) -> bool:
+    def is_clear(self) -> bool:
         """Whether the track bends clearly more than it swings: by how far its arc stands off the chord."""
         bulge_m = self.radius_m * (1.0 - float(np.cos(min(abs(self.angle_rad) / 2, np.pi))))
         return bulge_m > _CLEARLY * self.off_m and bulge_m > 1e-9 * self.radius_m
 
 
 def fitted_circle(points_m: ArrayLike) -> Circle | None:
-    """Fits a circle to points of a track in the order of time; None for fewer than three or for points on a line.
+    """Fits a circle to points of a track in order, m, ``(n, 2)``; None for fewer than three, or for a line.
 
     The sum of ``(|p|^2 + b . p + c)^2`` over its mean squared slope is smallest (Taubin 1991), which unlike plain
     least squares does not draw the radius of a short noisy arc in.
-
-    Args:
-        points_m: Positions seen from above, m, ``(n, 2)``.
     """
     points = np.asarray(points_m, dtype=float)
     if len(points) < 3:

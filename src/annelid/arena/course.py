@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, pi
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,87 +19,50 @@ HELIX_STEPS = 8
 
 
 class Foot(NamedTuple):
-    """Points of a centre line that are nearest to given points.
+    """Points of a centre line, for example those nearest to given points."""
 
-    Attributes:
-        arc_m: Arc length from the worm's front, m, ``(...)``.
-        point_m: Position, m, ``(..., 3)``.
-        tangent: Unit tangent, ``(..., 3)``.
-        curvature_per_m: Curvature vector, which points to the centre of the curve, 1/m, ``(..., 3)``.
-    """
-
-    arc_m: Array
-    point_m: Array
-    tangent: Array
-    curvature_per_m: Array
-
-
-class Piece(Protocol):
-    """One straight or curve of a centre line."""
-
-    def nearest(self, points_m: Array) -> Foot:
-        """Finds its nearest points to points, m, ``(..., 3)``."""
-        ...
-
-    def at(self, arc_m: Array) -> Foot:
-        """Finds its points at arc lengths, m, ``(...)``, which go on beyond its ends."""
-        ...
+    arc_m: Array  # arc length from the worm's front, (...)
+    point_m: Array  # (..., 3)
+    tangent: Array  # unit vector, (..., 3)
+    curvature_per_m: Array  # vector to the centre of the curve, (..., 3)
 
 
 @dataclass(frozen=True)
 class Straight:
-    """A straight between two arc lengths, either of which may be infinite.
+    """A straight between two arc lengths, either of which may be infinite."""
 
-    Attributes:
-        start_m: Its point at arc length ``first_m``, or at 0 where that is infinite, ``(3,)``.
-        direction: Unit vector, ``(3,)``.
-        first_m: Arc length at its start, m.
-        last_m: Arc length at its end, m.
-    """
-
-    start_m: Array
-    direction: Array
+    start_m: Array  # its point at arc length first_m, or at 0 where that is infinite, (3,)
+    direction: Array  # unit vector, (3,)
     first_m: float
     last_m: float
 
     def nearest(self, points_m: Array) -> Foot:
         """Finds its nearest points to points, m, ``(..., 3)``."""
-        along = (points_m - self.start_m) @ self.direction + self._origin
+        along = (points_m - self.start_m) @ self.direction + self._origin_m
         return self.at(np.clip(along, self.first_m, self.last_m))
 
     def at(self, arc_m: Array) -> Foot:
         """Finds its points at arc lengths, m, ``(...)``."""
-        point = self.start_m + (arc_m - self._origin)[..., np.newaxis] * self.direction
+        point = self.start_m + (arc_m - self._origin_m)[..., np.newaxis] * self.direction
         return Foot(arc_m, point, np.broadcast_to(self.direction, point.shape), np.zeros(point.shape))
 
     @property
-    def _origin(self) -> float:
+    def _origin_m(self) -> float:
         return self.first_m if self.first_m > -inf else 0.0
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A circular arc or a helix about an axis.
+    """A circular arc or a helix about an axis."""
 
-    Attributes:
-        centre_m: The axis' point at the height of the curve's start, ``(3,)``.
-        outwards: Unit vector from there to the start, ``(3,)``.
-        onwards: Unit vector across it, in which the curve goes about the axis, ``(3,)``.
-        axis: Unit vector of the axis, ``(3,)``.
-        radius_m: Distance from the axis, m.
-        rise_m_per_rad: Rise along the axis per angle, m/rad; 0 for an arc.
-        angle_rad: The whole angle.
-        first_m: Arc length at its start, m.
-    """
-
-    centre_m: Array
-    outwards: Array
-    onwards: Array
-    axis: Array
+    centre_m: Array  # the axis' point at the height of the curve's start, (3,)
+    outwards: Array  # unit vector from there to the start, (3,)
+    onwards: Array  # unit vector across it, in which the curve goes about the axis, (3,)
+    axis: Array  # unit vector, (3,)
     radius_m: float
-    rise_m_per_rad: float
-    angle_rad: float
-    first_m: float
+    rise_m_per_rad: float  # along the axis; 0 for an arc
+    angle_rad: float  # the whole
+    first_m: float  # arc length at its start
 
     @property
     def length_m_per_rad(self) -> float:
@@ -130,7 +93,7 @@ class Curve:
         return self._at_angle(np.clip(angle, 0.0, self.angle_rad))
 
     def at(self, arc_m: Array) -> Foot:
-        """Finds its points at arc lengths, m, ``(...)``."""
+        """Finds its points at arc lengths, m, ``(...)``, which go on beyond its ends."""
         return self._at_angle((arc_m - self.first_m) / self.length_m_per_rad)
 
     def _at_angle(self, angle: Array) -> Foot:
@@ -147,15 +110,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class Course:
-    """A smooth centre line; it starts and ends in straights that go on for ever.
+    """A smooth centre line of pieces in order; it starts and ends in straights that go on for ever."""
 
-    Attributes:
-        pieces: Its pieces in order.
-        joints_m: Arc lengths at which one piece ends and the next begins, m.
-    """
+    pieces: tuple[Straight | Curve, ...]
 
-    pieces: tuple[Piece, ...]
-    joints_m: tuple[float, ...]
+    @property
+    def joints_m(self) -> tuple[float, ...]:
+        """Arc lengths at which one piece ends and the next begins, m."""
+        return tuple(piece.last_m for piece in self.pieces[:-1])
 
     def nearest(self, points_m: Array) -> Foot:
         """Finds the line's nearest points to points, m, ``(..., 3)``."""
@@ -182,17 +144,11 @@ def _chosen(feet: Sequence[Foot], piece: NDArray[np.intp]) -> Foot:
 
 @dataclass(frozen=True)
 class Bore:
-    """The radius of a pipe along its centre line: parabolas that join smoothly, constant beyond the ends.
+    """The radius of a pipe along its centre line: parabolas that join smoothly, constant beyond the ends."""
 
-    Attributes:
-        arc_m: Arc lengths between which the slope changes evenly, m, ``(n_knots,)``.
-        slope: Slope of the radius there, ``(n_knots,)``; 0 at both ends.
-        radius_m: Radius there, m, ``(n_knots,)``.
-    """
-
-    arc_m: Array
-    slope: Array
-    radius_m: Array
+    arc_m: Array  # arc lengths between which the slope changes evenly, (n_knots,)
+    slope: Array  # of the radius there, (n_knots,); 0 at both ends
+    radius_m: Array  # there, (n_knots,)
 
     def at(self, arc_m: Array) -> tuple[Array, Array]:
         """Returns radius, m, and slope at arc lengths from the worm's front, m."""

@@ -1,15 +1,19 @@
-"""The surface that an arena offers to the skin, as numbers: how far points are from it, and which way it faces."""
+"""The surface that an arena offers to the skin, as numbers: how far points are from it, and where it faces.
+
+Also the triangles by which a surface without end is drawn, and the direction of gravity.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from math import cos, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config.arena import ArenaKind, Walls
+from annelid.config.arena import ArenaKind
 from annelid.protocols import Array
 
 SETTLED = 1e-10
@@ -17,89 +21,57 @@ SETTLED = 1e-10
 MOST_ROUNDS = 60
 
 
-class Surface(Protocol):
+class Surface(ABC):
     """The boundary between free space and what a worm touches."""
 
+    @abstractmethod
     def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns signed distances and normals, as `distance_m` and `normal` do, for the price of one of them.
+        """Finds distance and normal at once.
 
         Args:
             points_m: Points, m, ``(..., 3)``.
             first_order: A distance d may be wrong by d^2 / 2 of the surface's curvature along the arena: for a strand's
                 radius 0.05 mm where a taper begins, and a few micrometres elsewhere.
-        """
-        ...
-
-    def distance_m(self, points_m: Array) -> Array:
-        """Returns signed distances of points from the surface, m: positive in free space, negative inside the ground.
-
-        Args:
-            points_m: Points, m, ``(..., 3)``.
 
         Returns:
-            Shape ``(...)``.
+            Signed distances from the surface, m, ``(...)``: positive in free space, negative inside the ground. And the
+            surface's unit normals at the nearest points, ``(..., 3)``, which face free space.
         """
-        ...
-
-    def normal(self, points_m: Array) -> Array:
-        """Returns the surface's unit normals nearest to points, which face free space.
-
-        Args:
-            points_m: Points, m, ``(..., 3)``.
-
-        Returns:
-            Shape ``(..., 3)``.
-        """
-        ...
-
-
-class Nearest(ABC):
-    """A surface that finds distance and normal at once."""
-
-    @abstractmethod
-    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns signed distances, m, ``(...)``, and unit normals, ``(..., 3)``."""
 
     def distance_m(self, points_m: Array) -> Array:
-        """Signed distances of points, m, ``(..., 3)``, from the surface, m, ``(...)``: positive in free space."""
+        """Returns signed distances, m, ``(...)``, of points, m, ``(..., 3)``, as `nearest` does."""
         return self.nearest(points_m)[0]
 
     def normal(self, points_m: Array) -> Array:
-        """Unit normals nearest to points, m, ``(..., 3)``; they face free space."""
+        """Returns unit normals, ``(..., 3)``, nearest to points, m, ``(..., 3)``, as `nearest` does."""
         return self.nearest(points_m)[1]
 
 
-@dataclass(frozen=True)
-class Plane(Nearest):
-    """An even surface.
+Nearest = Surface
+"""The name of `Surface` as a base class in annelid 0.1."""
 
-    Attributes:
-        facing: Its unit normal, ``(3,)``.
-        offset_m: Its distance from the origin along the normal, m.
-    """
+
+@dataclass(frozen=True)
+class Plane(Surface):
+    """An even surface, with its unit normal, ``(3,)``, and its distance from the origin along that, m."""
 
     facing: Array
     offset_m: float
 
     def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns heights above it, m, and its normal."""
+        """Returns heights above it and its normal, as `Surface.nearest`."""
         return points_m @ self.facing - self.offset_m, np.broadcast_to(self.facing, points_m.shape)
 
 
 @dataclass(frozen=True)
-class Round(Nearest):
-    """An upright post without an upper end.
+class Round(Surface):
+    """An upright post without an upper end."""
 
-    Attributes:
-        axis_m: x and y of its axis, m, ``(2,)``.
-        radius_m: Its radius, m.
-    """
-
-    axis_m: Array
+    axis_m: Array  # x and y, (2,)
     radius_m: float
 
     def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns distances from it, m, and directions away from its axis."""
+        """Returns distances from it and directions away from its axis, as `Surface.nearest`."""
         away = points_m[..., :2] - self.axis_m
         distance = lengths(away)
         outwards = away / np.maximum(distance, 1e-12)[..., np.newaxis]
@@ -107,17 +79,13 @@ class Round(Nearest):
 
 
 @dataclass(frozen=True)
-class Between(Nearest):
-    """Free space within several surfaces, as a floor, two rails and posts.
-
-    Attributes:
-        parts: The surfaces.
-    """
+class Between(Surface):
+    """Free space within several surfaces, as a floor, two rails and posts."""
 
     parts: tuple[Surface, ...]
 
     def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns distance and normal of the nearest part."""
+        """Returns distance and normal of the nearest part, as `Surface.nearest`."""
         found = [part.nearest(points_m, first_order=first_order) for part in self.parts]
         distance, normal = (np.stack(both) for both in zip(*found, strict=True))
         which = distance.argmin(axis=0)[np.newaxis]
@@ -138,7 +106,7 @@ class Level(NamedTuple):
     is_distance: NDArray[np.bool_]
 
 
-class Implicit(Nearest):
+class Implicit(Surface):
     """A surface known by a function that is positive in free space and zero on it."""
 
     @abstractmethod
@@ -167,20 +135,40 @@ class Implicit(Nearest):
 
 
 def lengths(vectors: Array) -> Array:
-    """Returns the lengths of vectors, ``(..., 3)``."""
+    """Returns the lengths of vectors, ``(..., 3)``; several times as fast as `numpy.linalg.norm`."""
     return np.sqrt((vectors * vectors).sum(axis=-1))
 
 
-def walls_of(walls: Walls) -> tuple[Surface, ...]:
-    """Returns the surfaces of what stands upright: the left and the right guard rail, and the posts."""
-    posts = tuple(Round(np.array([x, y]), radius) for x, y, radius in walls.posts)
-    if walls.rail_gap_m is None:
-        return posts
-    side = np.array([0.0, 1.0, 0.0])
-    return Plane(side, -walls.rail_gap_m / 2), Plane(-side, -walls.rail_gap_m / 2), *posts
-
-
 def surface_of(arena: ArenaKind) -> Surface:
-    """Returns the surface of a configured arena, in the coordinates of the worm's model (lowest line at z = 0)."""
-    ground, walls = arena.ground(), walls_of(arena.walls)
-    return Between((ground, *walls)) if walls else ground
+    """Returns the surface of an arena with its rails and posts, in the worm's model (its lowest line at z = 0)."""
+    gap_m, posts = arena.walls
+    side = np.array([0.0, 1.0, 0.0])
+    rails = () if gap_m is None else (Plane(side, -gap_m / 2), Plane(-side, -gap_m / 2))
+    walls = (*rails, *(Round(np.array([x, y]), radius) for x, y, radius in posts))
+    return Between((arena.ground(), *walls)) if walls else arena.ground()
+
+
+def gravity_of(arena: ArenaKind) -> Array:
+    """Returns the acceleration of gravity in the model's axes, m/s^2, ``(3,)``.
+
+    On a slope the axes lie in the ground, and gravity leans towards the rear of a worm that climbs.
+    """
+    slope = arena.slope_rad
+    # Level ground has no negative zeros to write into a model file.
+    return arena.gravity_m_per_s2 * np.array([sin(slope), 0.0, -cos(slope)])
+
+
+class Shape(NamedTuple):
+    """Triangles that face the viewer: corners, m, ``(n_vertices, 3)``, and per face three of them anticlockwise."""
+
+    vertices_m: Array
+    faces: NDArray[np.int32]
+
+
+def grid_faces(n_along: int, n_across: int, *, closed: bool = False) -> NDArray[np.int32]:
+    """Corners of the triangles between rows of vertices, ``(n_faces, 3)``; closed rows are rings."""
+    n_cells = n_across if closed else n_across - 1
+    row, column = np.meshgrid(np.arange(n_along - 1), np.arange(n_cells), indexing="ij")
+    a, b = row * n_across + column, row * n_across + (column + 1) % n_across
+    c, d = a + n_across, b + n_across
+    return np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3).astype(np.int32)

@@ -1,16 +1,28 @@
-"""Axial springs and ring actuators: tendons between the crossings, the same for every formulation."""
+"""Tendons between the crossings, the same for every formulation: axial springs, ring actuators, crossings' friction.
+
+Two strands that cross at the angle a span rhombi of side s, whose axial diagonal is ``d = 2 s cos(a/2)`` and whose
+hoop diagonal is ``h = 2 s sin(a/2)``. A change of the angle lengthens the axial diagonal by ``h/2`` a radian, and there
+is one rhombus for every crossing, so a torque T at the crossings does the work of a force ``2 T / h`` in the diagonals,
+and a torque c per angular velocity that of ``4 c / h^2`` per velocity. Force and damping of a diagonal are constant and
+set at rest: a Coulomb torque so given is exact at rest and proportional to h elsewhere, two thirds at a ring
+contracted to two thirds.
+"""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
+from annelid.arena.geoms import HIDDEN_GROUP
 from annelid.body.actuators import ActuatorKind
-from annelid.body.worm import Springs
-from annelid.morphology import Indices, MeshGeometry
+from annelid.body.worm import Joints, Springs
+from annelid.morphology import Array, Indices, MeshGeometry
 
 SPRING_RGBA = (0.75, 0.15, 0.1, 1.0)
+PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
 RING_RGBA = (0.85, 0.1, 0.1, 1.0)
+STICTION_IMPEDANCE = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+"""The engine's greatest: a diagonal that sticks creeps by a ten-thousandth of what it would do freely."""
 
 
 def crossing_site(crossing: int) -> str:
@@ -18,16 +30,23 @@ def crossing_site(crossing: int) -> str:
     return f"crossing_{crossing}"
 
 
+def mark_crossing(pin: mujoco.MjsBody, name: str, radius_m: float, mass_kg: float, place_m: Array) -> None:
+    """Adds the sphere by which a crossing is drawn, and its site, at a place of a body."""
+    ball = mujoco.mjtGeom.mjGEOM_SPHERE
+    size = [radius_m, 0.0, 0.0]
+    pin.add_geom(name=name, type=ball, pos=place_m, size=size, mass=mass_kg, contype=0, conaffinity=0, rgba=PIN_RGBA)
+    pin.add_site(name=name, pos=place_m, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
+
+
 def ring_names(n_segments: int, rings: ActuatorKind) -> list[str]:
     """Names of the ring actuators: segment by segment, left before right."""
-    if rings.layout == "whole":
-        return [f"ring_{segment}" for segment in range(n_segments)]
-    return [f"ring_{segment}_{side}" for segment in range(n_segments) for side in ("left", "right")]
+    sides = ("",) if rings.layout == "whole" else ("_left", "_right")
+    return [f"ring_{segment}{side}" for segment in range(n_segments) for side in sides]
 
 
 def add_springs(spec: mujoco.MjSpec, geometry: MeshGeometry, springs: Springs) -> None:
     """Adds one spatial tendon a spring: bilateral, or slack below its rest length."""
-    for index, (front, rear) in enumerate(geometry.springs):
+    for index, ends in enumerate(geometry.springs.tolist()):
         rest = springs.rest_length_m or float(geometry.spring_length_m[index])
         tendon = spec.add_tendon(
             name=f"spring_{index}",
@@ -36,8 +55,8 @@ def add_springs(spec: mujoco.MjSpec, geometry: MeshGeometry, springs: Springs) -
             width=0.0015,
             rgba=SPRING_RGBA,
         )
-        tendon.wrap_site(crossing_site(int(front)))
-        tendon.wrap_site(crossing_site(int(rear)))
+        for crossing in ends:
+            tendon.wrap_site(crossing_site(crossing))
         _add_length_sensor(spec, f"spring_{index}")
 
 
@@ -59,52 +78,62 @@ def add_ring_actuators(spec: mujoco.MjSpec, geometry: MeshGeometry, rings: Actua
     operating range is half that of the whole ring, and their force that of the whole ring.
     """
     n = geometry.n_segments
-    ranges = rings.length_ranges(n)
-    forces = rings.forces(n)
     names = iter(ring_names(n, rings))
-    for segment in range(n):
-        paths = ring_paths(geometry, segment, rings)
-        span = [bound / len(paths) for bound in ranges[segment]]
+    for segment, (span, force) in enumerate(zip(rings.length_ranges(n), rings.forces(n), strict=True)):
+        paths = _ring_paths(geometry, segment, rings)
         for path in paths:
             name = next(names)
-            _add_ring_tendon(spec, name, path)
-            rings.add(spec, name, span, forces[segment])
+            tendon = spec.add_tendon(name=name, width=0.003, rgba=RING_RGBA)
+            for crossing in path:
+                tendon.wrap_site(crossing_site(crossing))
+            rings.add(spec, name, [bound / len(paths) for bound in span], force)
             _add_length_sensor(spec, name)
-            spec.add_sensor(
-                name=f"{name}_force",
-                type=mujoco.mjtSensor.mjSENS_ACTUATORFRC,
-                objtype=mujoco.mjtObj.mjOBJ_ACTUATOR,
-                objname=name,
-            )
+            sensor, actuator = mujoco.mjtSensor.mjSENS_ACTUATORFRC, mujoco.mjtObj.mjOBJ_ACTUATOR
+            spec.add_sensor(name=f"{name}_force", type=sensor, objtype=actuator, objname=name)
 
 
-def ring_paths(geometry: MeshGeometry, segment: int, rings: ActuatorKind) -> list[list[int]]:
+def _ring_paths(geometry: MeshGeometry, segment: int, rings: ActuatorKind) -> list[list[int]]:
     """Crossings that each actuator of a segment runs through: one closed path, or a left and a right half."""
-    ring: Indices = geometry.rings[segment]
+    ring = geometry.rings[segment]
     if rings.layout == "whole":
         return [[*ring.tolist(), int(ring[0])]]
-    corners = geometry.crossings_m[ring]
-    top = int(np.argmax(corners[:, 2]))
-    half = len(ring) // 2
-    closed = np.roll(ring, -top)
-    first = closed[: half + 1].tolist()
-    second = [*closed[half:].tolist(), int(closed[0])]
+    top = int(np.argmax(geometry.crossings_m[ring, 2]))
+    half, closed = len(ring) // 2, np.roll(ring, -top).tolist()
+    halves = closed[: half + 1], [*closed[half:], closed[0]]
     # Segment 1 leads towards -x, so the worm's left is -y.
-    first_is_left = geometry.crossings_m[first, 1].mean() < geometry.crossings_m[second, 1].mean()
-    return [first, second] if first_is_left else [second, first]
-
-
-def _add_ring_tendon(spec: mujoco.MjSpec, name: str, path: list[int]) -> None:
-    tendon = spec.add_tendon(name=name, width=0.003, rgba=RING_RGBA)
-    for crossing in path:
-        tendon.wrap_site(crossing_site(crossing))
+    return sorted(halves, key=lambda path: geometry.crossings_m[path, 1].mean())
 
 
 def _add_length_sensor(spec: mujoco.MjSpec, tendon: str) -> None:
     """Adds the engine's own sensor of a tendon's length, for users of the written MJCF."""
-    spec.add_sensor(
-        name=f"{tendon}_length",
-        type=mujoco.mjtSensor.mjSENS_TENDONPOS,
-        objtype=mujoco.mjtObj.mjOBJ_TENDON,
-        objname=tendon,
+    sensor = mujoco.mjtSensor.mjSENS_TENDONPOS
+    spec.add_sensor(name=f"{tendon}_length", type=sensor, objtype=mujoco.mjtObj.mjOBJ_TENDON, objname=tendon)
+
+
+def add_joint_friction(spec: mujoco.MjSpec, geometry: MeshGeometry, joints: Joints) -> None:
+    """Adds one tendon along the axial diagonal of every rhombus, or nothing if there is no friction of crossings."""
+    dry, viscous = joints.dry_friction_Nm, joints.viscous_friction_Nms_per_rad
+    if not (dry or viscous):
+        return
+    for index, (front, left, rear, right) in enumerate(geometry.rhombi.tolist()):
+        lever = float(np.linalg.norm(geometry.crossings_m[left] - geometry.crossings_m[right])) / 2
+        sites = crossing_site(front), crossing_site(rear)
+        add_diagonal_friction(spec, f"diagonal_{index}", sites, dry / lever, viscous / lever**2)
+
+
+def add_diagonal_friction(
+    spec: mujoco.MjSpec, name: str, sites: tuple[str, str], dry_N: float, viscous_Ns_per_m: float
+) -> None:
+    """Adds a tendon between two sites that resists any change of its length, by a Coulomb force and per velocity."""
+    tendon = spec.add_tendon(
+        name=name,
+        width=0.0005,
+        group=5,
+        frictionloss=dry_N,
+        damping=[viscous_Ns_per_m, 0.0, 0.0],
+        # Velocity is stopped within one step: the fastest that a step resolves.
+        solref_friction=[-1e-12, -1.0 / spec.option.timestep],
+        solimp_friction=STICTION_IMPEDANCE,
     )
+    for site in sites:
+        tendon.wrap_site(site)

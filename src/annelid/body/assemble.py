@@ -1,18 +1,18 @@
-"""Assembles the spec of a worm in its arena: mesh, springs, muscles, floor."""
+"""Assembles the spec of a worm in its arena: mesh, springs, muscles, floor; and writes it as MJCF."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import add_moving_planes
-from annelid.arena.gravity import gravity_of
-from annelid.arena.scenery import add_scenery, add_walls
-from annelid.body.actuation import add_ring_actuators, add_springs
+from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
+from annelid.arena.surface import gravity_of
+from annelid.body.actuation import add_joint_friction, add_ring_actuators, add_springs
 from annelid.body.elimination import order_elimination
-from annelid.body.friction import add_joint_friction
 from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
@@ -20,8 +20,6 @@ from annelid.morphology import MeshGeometry, helical_mesh
 
 MOST_ORDERED_BODIES = 8192
 """Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
-
-
 _SHORT = "lengthen body.mesh.rear_overhang_m and body.mesh.radius_m, or lessen body.mesh.elements_per_side"
 _REMEDIES = {
     "mass and inertia of moving bodies": "a part is too light, so raise body.strands.linear_density_kg_per_m, "
@@ -34,17 +32,7 @@ _REMEDIES = {
 
 def mesh_of(mesh: Mesh) -> MeshGeometry:
     """Generates the geometry that a configuration asks for."""
-    return helical_mesh(
-        mesh.n_segments,
-        n_helices=mesh.n_helices,
-        radius_m=mesh.radius_m,
-        angular_rate_rad_per_m=mesh.angular_rate_rad_per_m,
-        elements_per_side=mesh.elements_per_side,
-        elements_per_end=mesh.elements_per_end,
-        planes_between_rings=mesh.planes_between_rings,
-        free_planes_at_ends=mesh.free_planes_at_ends,
-        rear_overhang_m=mesh.rear_overhang_m,
-    )
+    return helical_mesh(**mesh.model_dump())
 
 
 def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
@@ -56,9 +44,9 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
         for_plant: For a plant of annelid, which prepares every step: dampers whose coefficients follow the posture
-            (`annelid.simulation.damping`), and where the engine has no one plane for the ground planes that are laid
-            under the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: no
-            dampers, all that is seen, and panels that hold the worm in plain MuJoCo.
+            (`annelid.body.damping`), and where the engine has no one plane for the ground planes that are laid under
+            the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: no dampers,
+            all that is seen, and panels that support the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.
@@ -69,7 +57,6 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
-    laid = for_plant and arena.has_moving_planes
     geometry = mesh_of(body.mesh)
     spec = mujoco.MjSpec()
     spec.modelname = config.name
@@ -84,7 +71,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     add_ring_actuators(spec, geometry, body.rings)
     if body.joints is not None:
         add_joint_friction(spec, geometry, body.joints)
-    if laid:
+    if for_plant and arena.has_moving_planes:
         add_moving_planes(spec, arena)
         add_walls(spec, arena)
     else:
@@ -98,6 +85,9 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     Args:
         spec: What `build_spec` returned, with anything added to it.
 
+    Returns:
+        The engine's model.
+
     Raises:
         ConfigError: The engine refuses the model.
     """
@@ -105,10 +95,10 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         model = spec.compile()
     except ValueError as error:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
-        for words, remedy in _REMEDIES.items():
-            if words in reason:
-                raise ConfigError(f"the engine refuses this body ({reason}): {remedy}") from None
-        raise ConfigError(f"the engine refuses this body: {reason}") from None
+        remedy = next(
+            (f" ({reason}): {remedy}" for words, remedy in _REMEDIES.items() if words in reason), f": {reason}"
+        )
+        raise ConfigError(f"the engine refuses this body{remedy}") from None
     order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:
@@ -118,3 +108,37 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
             stacklevel=2,
         )
     return model
+
+
+def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) -> str:
+    """Writes a worm and its arena as MJCF.
+
+    A worm with servos also gets the keyframe ``rest``, in which their cables are paid out: the engine's own reset would
+    wind them up whole.
+
+    Args:
+        config: The run's configuration.
+        keyframes: States to add: what `mujoco.MjSpec.add_key` takes by name, and empty arrays that it is not to take.
+
+    Raises:
+        ConfigError: The body is planar or starts with a heading, friction depends on the direction, or the engine
+            refuses the model.
+    """
+    if config.arena is not None and config.arena.has_setae:
+        raise ConfigError(
+            f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
+            "the same in both directions: leave it out or run the worm with annelid"
+        )
+    spec = build_spec(config)
+    assert isinstance(config.body, WormBody)
+    if config.body.heading_deg:
+        raise ConfigError(
+            f"body.heading_deg = {config.body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
+            "frames of turned rods: set it to 0, or run the worm with annelid"
+        )
+    at_rest = config.body.rings.act_at_rest(spec)
+    rest = [{"name": "rest", "act": at_rest}] if len(at_rest) else []
+    for keyframe in (*rest, *keyframes):
+        spec.add_key(**{name: value for name, value in keyframe.items() if np.size(value)})
+    compile_spec(spec)
+    return spec.to_xml()

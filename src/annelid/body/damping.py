@@ -11,24 +11,38 @@ and in that of the front edge by the same with the cosine at e0' and with w0. Ei
 The elastic energy takes the mean over both frames; the damping takes one of them for each vertex, that of every second
 edge for the vertices at its two ends, since rows with two hinges take an eighth of a step longer. Times the material's
 time and its bending stiffness, it makes bending alike in all directions (Kelvin-Voigt).
+
+The coefficients follow the posture, step by step. As dampers of tendons they would cost twice the time of a step. A
+plant has constraint rows instead, which the engine solves at the end of the step too. The engine scales a row's damping
+by A, the ratio of the row's inverse inertia without the forces of the step to that with them: a row's force is
+``-A (I a + c v)``, with the wanted damping c and a small inertance I. A depends on step, posture and the world's axes,
+and would be 1 to 80. So every row also includes one dof that is fixed and so light that it alone decides about A, which
+then is 1.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
 from annelid.body.worm import Strands
-from annelid.morphology import Array
+from annelid.morphology import Array, cross
 
-AXES = "xyz"
 HELD = "damper_reference"
 HELD_MASS_KG = 1e-9
-_DAMPER = "_damper_"
+HELD_LEVER = 1e3
+"""Coefficient of the held dof in every row: its share of a row's inverse inertia is 1e15, of the others 1e9 at most."""
+HELD_INVERSE_KG = 1e-16
+"""The engine fixes a dof by a force in proportion to the inertia that it believes it to have."""
+INERTANCE = 1e-3
+"""Of a row, as a share of its damping times the step: nothing that could be seen."""
+IMPEDANCE = 0.01
 STRAIGHT = 1e-9
 """Sine of the bend below which a vertex is straight; there the engine itself damps every direction."""
+_DAMPER = "_damper_"
+_PER_ROW = 10
 
 
 def damper_name(rod: str, vertex: int) -> str:
@@ -41,14 +55,10 @@ def twist_name(rod: str, edge: int, n_edges: int) -> str:
     return f"{rod}_twist" if edge == n_edges - 1 else f"{rod}_twist_{edge}"
 
 
-def damper_coefficients(lengths_m: Array, strands: Strands, time_s: float) -> Array:
-    """Torque per rate at every inner vertex, N m s, ``(..., n_edges - 1)``.
-
-    Args:
-        lengths_m: Rest lengths of the edges, m, ``(..., n_edges)``.
-        strands: Material.
-        time_s: Its Kelvin-Voigt time, s.
-    """
+def _coefficients(lengths_m: Array, strands: Strands) -> Array:
+    """Torque per rate at every inner vertex between edges of rest lengths, N m s, ``(..., n_edges - 1)``."""
+    time_s = strands.material_damping_s
+    assert time_s is not None
     return 2.0 * time_s * strands.bending_rigidity_Nm2 / (lengths_m[..., :-1] + lengths_m[..., 1:])
 
 
@@ -66,68 +76,27 @@ def damper_rows(vertices_m: Array) -> Array:
     per_length = 1.0 / np.sqrt((edge * edge).sum(axis=0))
     tangent = edge * per_length
     t0, t1 = tangent[..., :-1], tangent[..., 1:]
-    across = t0[[1, 2, 0]] * t1[[2, 0, 1]] - t0[[2, 0, 1]] * t1[[1, 2, 0]]
+    across = cross(t0, t1)
     sine, cosine = np.sqrt((across * across).sum(axis=0)), (t0 * t1).sum(axis=0)
     per_cosine = 2.0 / (1.0 + cosine)
     b = across * (per_cosine * (sine > STRAIGHT) / np.maximum(sine, STRAIGHT))
-    in_rear = _takes_rear_edge(np.arange(1, sine.shape[-1] + 1))
+    # Vertices 1, 3, 5 are damped in the frame of the edge behind, the others in that of the edge in front.
+    in_rear = np.arange(1, sine.shape[-1] + 1) % 2 == 1
     front = b * (per_length[..., :-1] * np.where(in_rear, 1.0, cosine))
     rear = b * (per_length[..., 1:] * np.where(in_rear, cosine, 1.0))
     return np.concatenate([front, -front - rear, rear, -(sine * per_cosine)[None]])
 
 
-def hinge_of(vertex: int) -> int:
-    """Edge in whose frame a vertex is damped: the second, fourth, sixth of the rod, for the vertices at its ends."""
-    return vertex if _takes_rear_edge(vertex) else vertex - 1
-
-
-def _takes_rear_edge(vertex: Any) -> Any:
-    """Tells of one vertex or of many whether they are damped in the frame of the edge behind."""
-    return vertex % 2 == 1
-
-
 def add_held_coordinate(spec: mujoco.MjSpec) -> None:
-    """Adds, once, the coordinate that `annelid.simulation.damping` moves: to every model, so that all have as many."""
+    """Adds, once, the coordinate that every row includes: to every model, so that all have as many."""
     if spec.body(HELD) is None:
         held = add_holder(spec, HELD, HELD_MASS_KG, HELD_MASS_KG)
         held.gravcomp = 1.0
         held.add_joint(name=HELD, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
 
 
-def add_dampers(
-    spec: mujoco.MjSpec, rod: str, vertices_m: Array, bodies: list[str], strands: Strands, *, clamped: bool
-) -> None:
-    """Adds a fixed tendon for every inner vertex of a rod, with the coefficients of the posture at rest.
-
-    Args:
-        spec: The spec that holds the rod.
-        rod: Its name.
-        vertices_m: Rest positions, m, ``(n_vertices, 3)``.
-        bodies: Body of each vertex, "world" where it is fixed.
-        strands: Material.
-        clamped: The first edge has no twist hinge.
-    """
-    assert strands.material_damping_s is not None
-    lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
-    damping = damper_coefficients(lengths, strands, strands.material_damping_s)
-    rows = damper_rows(vertices_m.T)
-    clamped_hinge = twist_name(rod, 0, len(lengths)) if clamped else ""
-    for vertex in range(1, len(bodies) - 1):
-        joints = [f"{body}_{axis}" for body in bodies[vertex - 1 : vertex + 2] for axis in AXES]
-        joints.append(twist_name(rod, hinge_of(vertex), len(lengths)))
-        tendon = spec.add_tendon(name=damper_name(rod, vertex), damping=[damping[vertex - 1], 0.0, 0.0])
-        for joint, coefficient in zip(joints, rows[:, vertex - 1].tolist(), strict=True):
-            if not joint.startswith("world_") and joint != clamped_hinge:
-                tendon.wrap_joint(joint, coefficient)
-
-
-def is_damper(tendon: mujoco.MjsTendon) -> bool:
-    """Tells whether a tendon damps a strand."""
-    return _DAMPER in tendon.name
-
-
 def add_holder(spec: mujoco.MjSpec, name: str, mass_kg: float, inertia_kg_m2: float) -> mujoco.MjsBody:
-    """Adds a body of the world that is there for the sake of its joint."""
+    """Adds a body of the world, a point mass with the same small inertia about every axis."""
     return spec.worldbody.add_body(
         name=name,
         mass=mass_kg,
@@ -136,3 +105,84 @@ def add_holder(spec: mujoco.MjSpec, name: str, mass_kg: float, inertia_kg_m2: fl
         inertia=[inertia_kg_m2] * 3,
         explicitinertial=True,
     )
+
+
+def add_dampers(
+    spec: mujoco.MjSpec, rod: str, vertices_m: Array, bodies: list[str], strands: Strands, *, clamped: bool
+) -> None:
+    """Adds a fixed tendon for every inner vertex of a rod, with the coefficients of the posture at rest.
+
+    The vertices are ``(n_vertices, 3)``, the body of a fixed one is "world", and the first edge of a clamped rod has no
+    twist hinge.
+    """
+    lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
+    damping, rows = _coefficients(lengths, strands), damper_rows(vertices_m.T)
+    clamped_hinge = twist_name(rod, 0, len(lengths)) if clamped else ""
+    for vertex in range(1, len(bodies) - 1):
+        joints = [f"{body}_{axis}" for body in bodies[vertex - 1 : vertex + 2] for axis in "xyz"]
+        joints.append(twist_name(rod, vertex - 1 + vertex % 2, len(lengths)))
+        tendon = spec.add_tendon(name=damper_name(rod, vertex), damping=[damping[vertex - 1], 0.0, 0.0])
+        for joint, coefficient in zip(joints, rows[:, vertex - 1].tolist(), strict=True):
+            if not joint.startswith("world_") and joint != clamped_hinge:
+                tendon.wrap_joint(joint, coefficient)
+
+
+def add_damper_rows(spec: mujoco.MjSpec) -> None:
+    """Replaces the dampers of the rods' tendons by constraint rows, whose damping `MaterialDamping` completes."""
+    tendons = [tendon for tendon in spec.tendons if _DAMPER in tendon.name]
+    if not tendons:
+        return
+    add_row(spec, mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT, HELD, HELD)
+    # The engine wants a stiffness. Damping over inertance, times the impedance as the engine has it.
+    solref = [-1e-12, -IMPEDANCE / (INERTANCE * spec.option.timestep)]
+    for tendon in tendons:
+        tendon.damping = [0.0, 0.0, 0.0]
+        tendon.wrap_joint(HELD, HELD_LEVER)
+        limits = {"solref": solref, "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]}
+        add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, tendon.name, tendon.name, **limits)
+
+
+def add_row(
+    spec: mujoco.MjSpec, kind: mujoco.mjtEq, of: mujoco.mjtObj, name: str, *between: str, **options: Sequence[float]
+) -> None:
+    """Adds an equality constraint of one or two things of the spec, with no data unless options give some."""
+    names = dict(zip(("name1", "name2"), between, strict=False))
+    spec.add_equality(**{"name": name, "type": kind, "objtype": of, "data": [0.0] * 12, **names, **options})
+
+
+class MaterialDamping:
+    """Renews the rows of one worm, compiled with `add_damper_rows`, for its posture before every step.
+
+    They live in the compiled model, which no other worm may use. The posture alone decides, so a run continues and a
+    batch computes to the same bits.
+    """
+
+    def __init__(self, model: mujoco.MjModel, strands: Strands) -> None:
+        """Finds the rows and gives them the damping of a material with a damping time."""
+        n_strands, n_edges = model.nflex, int(model.flex_edgenum[0])
+        names = [f"strand_{strand}" for strand in range(n_strands)]
+        self._damping = _coefficients(model.flexedge_length0.reshape(n_strands, n_edges), strands)
+        tendons = np.array([[model.tendon(damper_name(name, v)).id for v in range(1, n_edges)] for name in names])
+        model.tendon_invweight0[tendons] = (
+            IMPEDANCE / (1.0 - IMPEDANCE) / (INERTANCE * self._damping * model.opt.timestep)
+        )
+        model.dof_invweight0[model.joint(HELD).dofadr] = HELD_INVERSE_KG
+        # The dampers' coefficients lie one after another, each damper's with that of the held dof at its end.
+        first, last = int(model.tendon_adr[tendons[0, 0]]), int(model.tendon_adr[tendons[-1, -1]]) + _PER_ROW + 1
+        shape = (*tendons.shape, _PER_ROW + 1)
+        assert np.array_equal(model.tendon_adr[tendons].ravel(), np.arange(first, last, _PER_ROW + 1))
+        self._row = model.wrap_prm[first:last].reshape(shape)[..., :_PER_ROW]
+        self._dof = model.jnt_dofadr[model.wrap_objid[first:last]].reshape(shape)[..., :_PER_ROW]
+        bodies = model.flex_vertbodyid.reshape(n_strands, n_edges + 1)
+        # A vertex sits on three slides along the world's axes.
+        self._slide = model.jnt_qposadr[model.body_jntadr[bodies]] + np.arange(3)[:, None, None]
+        self._place = model.body_pos[bodies].transpose(2, 0, 1).copy()
+
+    def renew(self, qpos: Array) -> None:
+        """Sets the rows for a posture, ``(nq,)``."""
+        self._row[:] = damper_rows(self._place + qpos[self._slide]).transpose(1, 2, 0)
+
+    def loss_W(self, qvel: Array) -> float:
+        """Power that the rows take at velocities, ``(nv,)``, W."""
+        rate = (self._row * qvel[self._dof]).sum(axis=-1)
+        return float((self._damping * rate * rate).sum())

@@ -2,7 +2,7 @@
 
 Each step factors matrices whose graph is the mesh. The engine orders their unknowns by minimum degree, which suits a
 short worm; along a long tube its fronts meet at random, and the factor of twelve segments takes five times the
-arithmetic it needs. Cutting the tube across where the fewest vertices hold it together, both halves likewise, and so
+arithmetic it needs. Cutting the tube across where the fewest vertices connect it, both halves likewise, and so
 on down to parts that minimum degree does well, makes fill and arithmetic proportional to length (George 1973).
 
 The order lives in the compiled model (``MjModel.efmC_perm``), from where the engine's constraint solver takes it too;
@@ -31,8 +31,7 @@ SAME_PLACE_M = 1e-6
 def order_elimination(model: mujoco.MjModel) -> None:
     """Makes the engine factor a long net of rods by nested dissection, in place; other models are left as they are.
 
-    Args:
-        model: A compiled worm. A later ``mj_setConst`` restores the engine's own order.
+    A later ``mj_setConst`` restores the engine's own order.
     """
     slots = model.efmC_perm
     dofs: Indices = np.sort(slots[slots >= 0])
@@ -64,45 +63,30 @@ def _couplings(model: mujoco.MjModel, bodies: Indices) -> Indices:
 
 
 def nested_dissection(pairs: Indices, position: Array, largest_part: int = LARGEST_PART) -> Indices:
-    """Orders the vertices of a graph that extends along one axis for elimination with little fill.
+    """Orders the vertices of a graph that extends along one axis for elimination with little fill, ``(n_vertices,)``.
 
-    Args:
-        pairs: The coupled vertices, both ways, shape ``(n_pairs, 2)``.
-        position: Each vertex's place along the axis, shape ``(n_vertices,)``.
-        largest_part: Vertices of a part that is not cut any further.
-
-    Returns:
-        The vertices in order of elimination, shape ``(n_vertices,)``.
+    Given are the coupled vertices, both ways, ``(n_pairs, 2)``, each one's place along the axis, and the size of a part
+    that is not cut any further.
     """
     neighbours: list[set[int]] = [set() for _ in position]
     for one, other in pairs.tolist():
         neighbours[one].add(other)
 
     def ordered(part: Indices, own: Indices) -> list[int]:
-        if len(part) <= largest_part:
-            return minimum_degree(neighbours, part.tolist())
-        halves = _cut(part, own, position)
+        halves = _cut(part, own, position) if len(part) > largest_part else None
         if halves is None:
             return minimum_degree(neighbours, part.tolist())
-        inner = [ordered(half, _within(own, half, len(position))) for half in halves]
+        inner = [ordered(half, own[np.isin(own, half).all(axis=1)]) for half in halves]
         separator = np.setdiff1d(part, np.concatenate(halves))
         return [*inner[0], *inner[1], *minimum_degree(neighbours, separator.tolist())]
 
     return np.array(ordered(np.arange(len(position)), pairs), dtype=np.int64)
 
 
-def _within(pairs: Indices, part: Indices, n_vertices: int) -> Indices:
-    """Pairs whose both ends belong to a part."""
-    inside = np.zeros(n_vertices, dtype=bool)
-    inside[part] = True
-    return pairs[inside[pairs].all(axis=1)]
-
-
 def _cut(part: Indices, pairs: Indices, position: Array) -> tuple[Indices, Indices] | None:
-    """Cuts a part across the axis where the fewest vertices hold its sides together, and of these the most evenly.
+    """Cuts a part across the axis where the fewest vertices connect its sides, and of these the most evenly.
 
-    Returns:
-        What a separator on one side of the cut leaves of the two sides; nothing if no cut divides the part.
+    Returns what a separator on one side of the cut leaves of the two sides, or None where no cut divides the part.
     """
     # A vertex separates at a cut between its own place and that of its farthest neighbour.
     foremost, rearmost = position.copy(), position.copy()
@@ -126,15 +110,7 @@ def _cut(part: Indices, pairs: Indices, position: Array) -> tuple[Indices, Indic
 
 
 def minimum_degree(neighbours: list[set[int]], vertices: list[int]) -> list[int]:
-    """Orders some vertices of a graph by greedy minimum degree, the others staying.
-
-    Args:
-        neighbours: Each vertex's neighbours in the whole graph.
-        vertices: The vertices to eliminate.
-
-    Returns:
-        The vertices in order of elimination.
-    """
+    """Orders some vertices of a graph for elimination by greedy minimum degree, the others staying."""
     coupled = {vertex: set(neighbours[vertex]) for vertex in vertices}
     queue = [(len(around), vertex) for vertex, around in coupled.items()]
     heapify(queue)

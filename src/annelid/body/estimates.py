@@ -1,4 +1,4 @@
-"""How much a mesh resists its rings, in closed form, and what is found by holding a worm's numbers against it.
+"""How much a mesh resists its rings, in closed form, and what is found by checking a worm's numbers against it.
 
 How much the mesh resists: where a ring of the length L = m c is drawn in (m crossings, c apart), the rhombi round it
 close. With h, the hypotenuse of a rhombus' two diagonals at rest, they keep ``c = h sin(a)`` and springs of the length
@@ -54,11 +54,17 @@ class Finding:
     value: object
     problem: str
     instead: str
-    severity: Literal["error", "warning"]
+    severity: Literal["error", "warning"] = "warning"
 
     def __str__(self) -> str:
         """Returns one sentence."""
         return f"{self.field} = {_text(self.value)}: {self.problem}; {self.instead}"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def rhombus_of(body: WormBody) -> Rhombus:
@@ -73,18 +79,11 @@ def touching_ring_m(body: WormBody) -> float:
 
 
 def bearable_force_N(body: WormBody, share: float = 1 / 3) -> float:
-    """Estimates the tension under which a ring closes, N: see the page's head.
-
-    Args:
-        body: The worm's body.
-        share: Opening of the rhombi up to which it is drawn in, over that at rest.
-    """
-    shape, strands, springs = rhombus_of(body), body.strands, body.springs
-    stiffness = strands.bending_rigidity_Nm2
+    """Estimates the tension at which a ring closes to a share of the rhombi's opening at rest, N: see the module."""
+    shape, springs = rhombus_of(body), body.springs
     rest, opening = shape.opening_rad, share * shape.opening_rad
-    bending = _BENDING * stiffness * (rest - opening) / (shape.side_m**2 * cos(opening))
-    length = hypot(shape.across_m, shape.along_m) * cos(opening)
-    stretch = length - (springs.rest_length_m or shape.along_m)
+    bending = _BENDING * body.strands.bending_rigidity_Nm2 * (rest - opening) / (shape.side_m**2 * cos(opening))
+    stretch = hypot(shape.across_m, shape.along_m) * cos(opening) - (springs.rest_length_m or shape.along_m)
     if springs.tension_only:
         stretch = max(0.0, stretch)
     return bending + springs.stiffness_N_per_m * stretch * tan(opening)
@@ -98,42 +97,32 @@ def strongest(rings: ActuatorKind, n_segments: int) -> Iterator[tuple[float, flo
 
 
 def weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
-    """Holds the greatest force of an actuator against what hardly closes a ring."""
+    """Checks the greatest force of an actuator against what hardly closes a ring."""
     needed = bearable_force_N(body, 1.0 - HARDLY)
     if force_N < needed / UNSURE:
-        yield Finding(
-            f"body.rings.{field}",
-            value,
-            f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {100 * HARDLY:g} %",
-            f"set at least {UNSURE * value * needed / force_N:.2g}" if force_N else "set more",
-            "warning",
+        problem = (
+            f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {100 * HARDLY:g} %"
         )
+        instead = f"set at least {UNSURE * value * needed / force_N:.2g}" if force_N else "set more"
+        yield Finding(f"body.rings.{field}", value, problem, instead)
 
 
-def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Finding:
-    """Tells of an actuator that closes its ring to a share of its length at rest."""
-    return Finding(
-        field,
-        force_N,
-        f"rings close under about {bearable_N:.2g} N, and nothing stops them above {100 * max(0.0, share):.0f} % of "
-        "their length at rest",
-        f"set at most {bearable_N:.2g}, or limit the length with body.rings.length_range_m",
-        "warning",
-    )
+def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Iterator[Finding]:
+    """Checks a force against what the mesh bears, where its actuator closes a ring to a share of its length at rest."""
+    if share < COLLAPSED and force_N > UNSURE * bearable_N:
+        problem = (
+            f"rings close under about {bearable_N:.2g} N, and nothing stops them above {100 * max(0.0, share):.0f} % "
+            "of their length at rest"
+        )
+        instead = f"set at most {bearable_N:.2g}, or limit the length with body.rings.length_range_m"
+        yield Finding(f"body.rings.{field}", force_N, problem, instead)
 
 
 def softened(field: str, value: float, what: str, step: float) -> Finding:
-    """Tells of a time constant that the engine cannot resolve."""
+    """Reports a time constant that the engine cannot resolve."""
     return Finding(
         field,
         value,
         f"the engine cannot resolve this in steps of {step:g} s and makes the {what} as soft as with {2 * step:g} s",
         f"set {2 * step:g}, or clock.physics_timestep_s = {value / 2:.1g}",
-        "warning",
     )
-
-
-def _text(value: object) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_text, value))}]"
-    return f"{value:g}" if isinstance(value, int | float) else str(value)

@@ -80,7 +80,7 @@ class Strands(Section):
         description="tan delta of the material at loss_frequency_Hz, instead of damping_time_s (not set: none)",
     )
     loss_frequency_Hz: Positive | None = Field(
-        default=None, description="frequency at which the loss factor holds (not set: none)"
+        default=None, description="frequency at which the loss factor applies (not set: none)"
     )
     joint_damping_Nms_per_rad: NonNegative = Field(
         default=JOINT_DAMPING,
@@ -89,20 +89,21 @@ class Strands(Section):
     )
 
     @model_validator(mode="after")
-    def _damped_in_one_way(self) -> Self:
-        if self.damping_time_s is not None and self.loss_factor is not None:
+    def _damped_once(self) -> Self:
+        time_s, loss, joint = self.damping_time_s, self.loss_factor, self.joint_damping_Nms_per_rad
+        if time_s is not None and loss is not None:
             raise ValueError(
-                f"body.strands.damping_time_s = {self.damping_time_s:g} and body.strands.loss_factor = "
-                f"{self.loss_factor:g} both give the damping of the material: set one of them to 'none'"
+                f"body.strands.damping_time_s = {time_s:g} and body.strands.loss_factor = {loss:g} both give the "
+                "damping of the material: set one of them to 'none'"
             )
-        if self.material_damping_s is not None and self.joint_damping_Nms_per_rad != JOINT_DAMPING:
+        if self.material_damping_s is not None and joint != JOINT_DAMPING:
             raise ValueError(
-                f"body.strands.joint_damping_Nms_per_rad = {self.joint_damping_Nms_per_rad:g} has no effect where the "
-                "damping of the material is given: set body.strands.damping_time_s, or set that to 'none'"
+                f"body.strands.joint_damping_Nms_per_rad = {joint:g} has no effect where the damping of the material "
+                "is given: set body.strands.damping_time_s, or set that to 'none'"
             )
-        if (self.loss_factor is None) != (self.loss_frequency_Hz is None):
+        if (loss is None) != (self.loss_frequency_Hz is None):
             raise ValueError(
-                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it holds, and "
+                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it applies, and "
                 "the other way round"
             )
         return self
@@ -162,7 +163,7 @@ class Springs(Section):
 
 
 class WormBody(BodyKind):
-    """Any 3D worm of helical strands, rings and springs on the ground; what the engine and the analysis are told."""
+    """Any 3D worm of helical strands, rings and springs on the ground."""
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (
         ("todorov2012", "the physics engine"),
@@ -204,11 +205,7 @@ class WormBody(BodyKind):
 
     @property
     def muscles(self) -> Rings:
-        """The ring muscles.
-
-        Raises:
-            ConfigError: The rings have actuators of another kind.
-        """
+        """The ring muscles; `ConfigError` where the rings have actuators of another kind."""
         if self.rings.muscle is None:
             raise ConfigError(
                 f"body.rings.kind = {self.rings.kind!r} has no muscles; this needs body.rings.kind = 'muscle'"
@@ -217,12 +214,13 @@ class WormBody(BodyKind):
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns the engine and the robot, and what formulation, strands and actuators rest on."""
-        robot = self.strands.radius_m == EQUAL_STIFFNESS_RADIUS_M
-        strands = (
-            ("riddle2025", "strands of the stiffness of the robot's tubes"),
-            ("riddle2025models", "its model files"),
-        )
-        return (*self.cites, *self.formulation.cited(), *(strands if robot else ()), *self.rings.cited())
+        strands: tuple[tuple[str, str], ...] = ()
+        if self.strands.radius_m == EQUAL_STIFFNESS_RADIUS_M:
+            strands = (
+                ("riddle2025", "strands of the stiffness of the robot's tubes"),
+                ("riddle2025models", "its model files"),
+            )
+        return (*self.cites, *self.formulation.cited(), *strands, *self.rings.cited())
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
@@ -242,28 +240,27 @@ class WormBody(BodyKind):
 
     @model_validator(mode="after")
     def _parts_fit_together(self) -> Self:
+        mesh, rings, n = self.mesh, self.rings, self.mesh.n_segments
         self.formulation.check_body(self)
-        if self.strands.radius_m >= self.mesh.radius_m:
+        if self.strands.radius_m >= mesh.radius_m:
             raise ValueError(
-                f"body.strands.radius_m = {self.strands.radius_m:g} must be less than "
-                f"body.mesh.radius_m = {self.mesh.radius_m:g}"
+                f"body.strands.radius_m = {self.strands.radius_m:g} must be less than body.mesh.radius_m = "
+                f"{mesh.radius_m:g}"
             )
-        if self.rings.layout == "halves" and self.mesh.n_helices % 4:
+        if self.has_halves and mesh.n_helices % 4:
             raise ValueError(
-                f"body.rings.layout = 'halves' needs body.mesh.n_helices to be a multiple of 4, "
-                f"not {self.mesh.n_helices}: equal halves need an even number of crossings round a ring"
+                "body.rings.layout = 'halves' needs body.mesh.n_helices to be a multiple of 4, "
+                f"not {mesh.n_helices}: equal halves need an even number of crossings round a ring"
             )
-        n = len(self.rings.length_ranges(self.mesh.n_segments))
-        if n != self.mesh.n_segments:
+        if (given := len(rings.length_ranges(n))) != n:
             raise ValueError(
-                f"body.rings.length_range_m gives {n} ranges for {self.mesh.n_segments} segments: "
+                f"body.rings.length_range_m gives {given} ranges for {n} segments: "
                 "give one pair for each, or one for all, for example body.rings.length_range_m=[0.566,1.067]"
             )
-        field, n = self.rings.force_field, len(self.rings.forces(self.mesh.n_segments))
-        if n != self.mesh.n_segments:
+        if (given := len(rings.forces(n))) != n:
             raise ValueError(
-                f"body.rings.{field} gives {n} values for {self.mesh.n_segments} segments: "
-                f"give one for each, or one for all, for example body.rings.{field}=13"
+                f"body.rings.{rings.force_field} gives {given} values for {n} segments: "
+                f"give one for each, or one for all, for example body.rings.{rings.force_field}=13"
             )
         return self
 

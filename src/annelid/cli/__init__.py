@@ -1,17 +1,17 @@
 """The command line, a thin skin over the library. Heavy imports are inside the commands, so help is quick."""
 
-from annelid.cli.calibrate import calibrate_command
-from annelid.cli.cite import cite
-from annelid.cli.compare import compare_command
-from annelid.cli.entry import Command, app, experiment, main
-from annelid.cli.export import export_command
-from annelid.cli.limit_cycle import limit_cycle_command
-from annelid.cli.results import plot, render, show
+from annelid.cli.entry import Command, app, experiments, main
+from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
 from annelid.cli.run import run_command
-from annelid.cli.studies import bench_command, paper_command, robustness_command
-from annelid.cli.sweep import sweep_command
-from annelid.cli.tune import tune_command
-from annelid.cli.view import view_command
+from annelid.cli.studies import (
+    bench_command,
+    calibrate_command,
+    limit_cycle_command,
+    paper_command,
+    robustness_command,
+    sweep_command,
+    tune_command,
+)
 from annelid.cli.worm import arenas, build, check, doctor, presets
 from annelid.registry import load_extensions, load_home
 
@@ -41,6 +41,6 @@ for _name, _command in (
     ("doctor", doctor),
 ):
     app.command(_name, cls=Command)(_command)
-app.add_typer(experiment, name="experiment")
+app.add_typer(experiments, name="experiment")
 load_home("annelid.cli.experiment")
 load_extensions()

@@ -70,7 +70,9 @@ ClusterName = Annotated[
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
+ResultsFolder = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
+OnlyPaths = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the paths.")]
 RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
 
@@ -81,18 +83,7 @@ def study_runs(
 ) -> Iterator[tuple[Workers, StudyProgress | None]]:
     """Gives the workers of a study and its progress display, and keeps other writers out of its folder.
 
-    The workers are processes of this machine where no cluster is named.
-
-    Args:
-        output: Folder of the results; runs are kept in ``runs`` below it.
-        jobs: As the user gave it.
-        cluster: As the user gave it.
-        quiet: Without progress.
-
-    Raises:
-        ConfigError: The folder is a file, or there is no such cluster.
-        RunFileError: Another process writes there.
-        typer.Exit: The user has interrupted it.
+    Runs are kept in ``runs`` below it. The workers are processes of this machine where no cluster is named.
     """
     from annelid.config import find_cluster
     from annelid.experiment.cluster import workers_of
@@ -116,16 +107,7 @@ def kept_runs(output: Path, *, jobs: int | None, cluster: str | None, quiet: boo
 
 @contextmanager
 def going_on(folder: Path, *further: str, kept: str = "finished runs are kept") -> Iterator[None]:
-    """Tells on Ctrl-C what is kept, and the command that goes on: the one that was given.
-
-    Args:
-        folder: Where it is kept.
-        further: Words that the command needs beside those that were given.
-        kept: What is kept.
-
-    Raises:
-        typer.Exit: The user has interrupted it.
-    """
+    """Says on Ctrl-C what is kept in a folder, and the command that goes on: the one given, with further words."""
     try:
         yield
     except KeyboardInterrupt:
@@ -134,18 +116,7 @@ def going_on(folder: Path, *further: str, kept: str = "finished runs are kept") 
 
 
 def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
-    """Joins the assignments of ``--set`` and the options that were given; the latter win.
-
-    Args:
-        assignments: Each ``FIELD=VALUE``.
-        **options: Fields by name, None where the option was left out.
-
-    Returns:
-        Values by dotted path.
-
-    Raises:
-        ConfigError: An assignment is malformed.
-    """
+    """Joins the assignments of ``--set`` and the options that were given, which win, as values by dotted path."""
     from annelid.config import parse_assignments
 
     given = {field: value for field, value in options.items() if value is not None}
@@ -164,9 +135,6 @@ def config_of(
 
     The worm of the first run is fitted to three segments, its own mesh and its own step: without a name, an option that
     changes these takes the worm with rigid crossings instead, and says so.
-
-    Raises:
-        ConfigError: There is no such preset, file, level of fidelity or arena, or a value is out of range.
     """
     from annelid.config import load_config
 
@@ -185,11 +153,7 @@ def config_of(
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Keeps what stands in the way of an output file that an option names, and sees that it can be written.
-
-    Raises:
-        RunFileError: The path is a folder, or a file that exists and ``force`` is false, or cannot be written.
-    """
+    """Raises `RunFileError` where an output file that an option names exists without --force, or cannot be written."""
     if path.is_dir():
         raise RunFileError(f"{path} is a folder: name a file")
     if path.exists() and not force:
@@ -215,13 +179,11 @@ def print_results(paths: Iterable[object], *tables: Table, quiet: bool) -> None:
 def print_table(run: Run) -> None:
     """Prints the numbers of a run, those to compare with beside them, and what follows."""
     from annelid.analysis import gait, summary
-    from annelid.draw.table import add_gait, closing_sentence, summary_table
+    from annelid.draw.table import closing_sentence, summary_table
     from annelid.terminal import Console
 
     numbers = summary(run)
-    table = summary_table(numbers, run.config)
-    add_gait(table, gait(run))
-    Console().print(table)
+    Console().print(summary_table(numbers, run.config, gait(run)))
     for doubt in run.warnings:
         typer.echo(f"warning: {doubt}")
     if closing := closing_sentence(numbers, run.config):

@@ -66,40 +66,43 @@ class _Sentences(TyperGroup):
             with ExitStack() as stack:
                 _locks.set(stack)
                 return super().invoke(ctx)
-        except SimulationStopped as stop:
-            complain(stop)
-            raise typer.Exit(EXIT_STOPPED) from None
-        except RunKilled as killed:
-            complain(killed)
-            raise typer.Exit(EXIT_SOME_FAILED) from None
-        except AnnelidError as error:
-            complain(error)
-            raise typer.Exit(EXIT_USAGE) from None
-        except BrokenPipeError:
-            raise
-        except RuntimeError as error:
-            # What the engine says on import to a back-end it does not know.
-            if "MUJOCO_GL" not in str(error):
+        except (Exception, KeyboardInterrupt) as error:
+            ending = _ending(error)
+            if ending is None:
                 raise
-            complain(error)
-            raise typer.Exit(EXIT_USAGE) from None
-        except OSError as error:
-            # A stream or a file that is already open tells no name.
+            sentence, code = ending
+            complain(sentence)
+            raise typer.Exit(code) from None
+
+
+def _ending(error: BaseException) -> tuple[object, int] | None:
+    """Returns the sentence and the exit code of an error that a user can act on."""
+    match error:
+        case SimulationStopped():
+            return error, EXIT_STOPPED
+        case RunKilled():
+            return error, EXIT_SOME_FAILED
+        case AnnelidError():
+            return error, EXIT_USAGE
+        case KeyboardInterrupt():
+            return "interrupted", EXIT_INTERRUPTED
+        case BrokenPipeError():
+            return None
+        # What the engine says on import to a back-end it does not know.
+        case RuntimeError() if "MUJOCO_GL" in str(error):
+            return error, EXIT_USAGE
+        case OSError():
+            # A stream or a file that is already open has no name.
             where = error.filename or "cannot print, or write a file"
-            complain(f"{where}: {error.strerror or error}")
-            raise typer.Exit(EXIT_USAGE) from None
-        except MemoryError:
-            complain("there is not enough memory for this: try fewer segments, or a smaller picture")
-            raise typer.Exit(EXIT_USAGE) from None
-        except UnicodeError as error:
-            complain(f"a text cannot be written or read: {error}")
-            raise typer.Exit(EXIT_USAGE) from None
-        except ArithmeticError as error:
-            complain(f"a number is too large or too small to compute with: {str(error) or type(error).__name__}")
-            raise typer.Exit(EXIT_USAGE) from None
-        except KeyboardInterrupt:
-            complain("interrupted")
-            raise typer.Exit(EXIT_INTERRUPTED) from None
+            return f"{where}: {error.strerror or error}", EXIT_USAGE
+        case MemoryError():
+            return "there is not enough memory for this: try fewer segments, or a smaller picture", EXIT_USAGE
+        case UnicodeError():
+            return f"a text cannot be written or read: {error}", EXIT_USAGE
+        case ArithmeticError():
+            what = str(error) or type(error).__name__
+            return f"a number is too large or too small to compute with: {what}", EXIT_USAGE
+    return None
 
 
 class Command(TyperCommand):
@@ -118,12 +121,12 @@ class Command(TyperCommand):
         return rest
 
 
-experiment = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm.")
+experiments = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm.")
 
 
 def study(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Returns a decorator that makes a function the command `annelid experiment NAME`, its parameters as Typer's."""
-    return experiment.command(name, cls=Command)
+    return experiments.command(name, cls=Command)
 
 
 app = typer.Typer(
@@ -138,8 +141,11 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the command ``annelid``."""
-    warnings.showwarning = _complain_of_warning
-    _end_as_ctrl_c_does("SIGTERM", "SIGHUP")
+    warnings.showwarning = lambda message, *_, **__: complain(f"warning: {message}")
+    # Further signals end a command in good order; one that the process ignores from its start stays ignored.
+    for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
     _open_what_is_closed()
     # Pictures are drawn into files only; another back-end, or one that does not exist, would serve nothing.
     os.environ["MPLBACKEND"] = "agg"
@@ -162,13 +168,6 @@ def _throw_away(stream: TextIO) -> None:
     """Sends nowhere what is still to be written to a stream that fails: it would fail again when Python ends."""
     with suppress(OSError, ValueError), open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), stream.fileno())
-
-
-def _end_as_ctrl_c_does(*signals: str) -> None:
-    """Has further signals end a command in good order; one that the process was told to ignore stays ignored."""
-    for number in (getattr(signal, name) for name in signals if hasattr(signal, name)):
-        if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
 
 
 def _print_version(wanted: bool) -> None:
@@ -199,31 +198,18 @@ def _start(
 
 
 def end_study(n_runs: int, failed: int, reasons: object, *, stopped: int = 0) -> None:
-    """Ends a study's command with a sentence and an exit code where runs failed or were stopped.
+    """Ends a study's command with a sentence and an exit code where runs failed, or were stopped by a guard.
 
-    Args:
-        n_runs: All runs.
-        failed: Those that could not be computed.
-        reasons: Where the reasons can be read.
-        stopped: Those that a guard stopped.
-
-    Raises:
-        typer.Exit: Not all runs are complete.
+    The sentence names where the reasons can be read.
     """
-    if not failed and not stopped:
-        return
-    counts = [f"{n} {what}" for n, what in ((failed, "failed"), (stopped, "were stopped by a guard")) if n]
-    complain(f"of {n_runs} runs {' and '.join(counts)}: the reasons are in {reasons}")
-    raise typer.Exit(EXIT_ALL_FAILED if failed == n_runs else EXIT_SOME_FAILED if failed else EXIT_STOPPED)
+    if counts := [f"{n} {what}" for n, what in ((failed, "failed"), (stopped, "were stopped by a guard")) if n]:
+        complain(f"of {n_runs} runs {' and '.join(counts)}: the reasons are in {reasons}")
+        raise typer.Exit(EXIT_ALL_FAILED if failed == n_runs else EXIT_SOME_FAILED if failed else EXIT_STOPPED)
 
 
 def typed_command(*further: str) -> str:
     """Returns the command line that the user gave, with further words."""
     return shlex.join(["annelid", *_typed.get(), *further])
-
-
-def _complain_of_warning(message: Warning | str, *_: object, **__: object) -> None:
-    complain(f"warning: {message}")
 
 
 def lock(folder: Path, *, new: bool = False) -> None:

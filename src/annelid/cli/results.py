@@ -1,21 +1,40 @@
-"""The commands on a finished run: `show`, `plot` and `render`."""
+"""The commands on finished runs: `show`, `compare`, `plot`, `render`, `view`, `export` and `cite`."""
 
 from __future__ import annotations
 
 import json
+import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from annelid.cli.common import Force, RunPath, print_table, refuse_existing
+from annelid.cli.common import (
+    RIGID_PRESET,
+    ArenaName,
+    Assignments,
+    FidelityLevel,
+    Force,
+    RunPath,
+    Segments,
+    config_of,
+    overrides_of,
+    print_table,
+    refuse_existing,
+)
+from annelid.cli.entry import complain, lock
+from annelid.errors import ConfigError, RunFileError, suggest
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+    from annelid.simulation.runfile import Run
 
 
 def show(
     run: RunPath,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON, in SI units.")] = False,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Only tell whether every byte of the file is as it was when the run ended.")
+        bool, typer.Option("--verify", help="Only say whether every byte of the file is as it was when the run ended.")
     ] = False,
 ) -> None:
     """Print the numbers of a run.
@@ -48,6 +67,67 @@ def show(
         typer.echo(opened.message)
 
 
+def compare_command(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN RUN..", help="Folders of runs, or their run.nc; differences are to the first."),
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON, in SI units.")] = False,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the figures and comparison.json  [default: only print]"),
+    ] = None,
+    potentials: Annotated[bool, typer.Option("--potentials", help="Draw the potentials of the neurons too.")] = False,
+    force: Force = False,
+) -> None:
+    """Lay runs side by side: numbers, differences, figures.
+
+    Prints the numbers of every run with their differences to the first, and the fields in which the configurations
+    differ. What a run lacks is a dash, so worms of any kinds can be compared. With -o it draws all runs into one
+    figure each: lengths.png, travel.png, and potentials.png with --potentials.
+
+    \b
+    annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
+    annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
+    annelid compare runs/* --json | jq .numbers.period_s
+    """
+    from annelid.analysis.comparison import compare
+    from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
+    from annelid.draw.table import comparison_table, fields_table
+    from annelid.output import write_json
+    from annelid.simulation.runfile import open_run
+    from annelid.terminal import Console
+
+    if len(runs) < 2:
+        raise typer.BadParameter("name at least two runs to compare")
+    if potentials and output is None:
+        raise typer.BadParameter("--potentials draws a figure, so it needs a folder: -o FOLDER")
+    figures = {"lengths.png": lengths_figure, "travel.png": travel_figure}
+    if potentials:
+        figures["potentials.png"] = potentials_figure
+    if output is not None:
+        lock(output)
+        for name in ("comparison.json", *figures):
+            refuse_existing(output / name, force)
+    opened = [open_run(run) for run in runs]
+    comparison = compare(opened)
+    if as_json:
+        typer.echo(json.dumps(comparison.to_dict(), indent=2, allow_nan=False))
+    else:
+        Console().print(comparison_table(comparison))
+        Console().print(fields_table(comparison) if comparison.fields else "the configurations are the same")
+    if output is None:
+        return
+    written = [write_json(output / "comparison.json", comparison.to_dict())]
+    for name, draw in figures.items():
+        try:
+            written.append(draw(opened, comparison.labels, output / name))
+        except RunFileError as error:
+            complain(f"{name} not drawn: {error}")
+    for path in written:
+        typer.echo(path, err=as_json)
+
+
 def plot(
     run: RunPath,
     output: Annotated[
@@ -55,13 +135,13 @@ def plot(
         typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: FIGURE.png in the run]"),
     ] = None,
     figure: Annotated[
-        str, typer.Option(metavar="FIGURE", help="figure7: potentials and lengths; track: the way, seen from above.")
+        str, typer.Option(metavar="FIGURE", help="figure7: potentials and lengths; track: the path, seen from above.")
     ] = "figure7",
     force: Force = False,
 ) -> None:
     """Draw potentials and lengths over time, or the track.
 
-    The counterpart of the paper's figure 7, or where the worm crawled: the ways of its middle and of its front, its
+    The counterpart of the paper's figure 7, or where the worm crawled: the paths of its middle and of its front, its
     outline at several times, and what stood in the way.
 
     \b
@@ -124,3 +204,194 @@ def render(
         with task_bar(VIDEO_TASK) as progress:
             render_video(opened, video, fps=fps, speed=speed, camera=camera, progress=progress)
         typer.echo(video)
+
+
+def view_command(
+    source: Annotated[
+        str | None,
+        typer.Argument(metavar="[PRESET|FILE.toml|RUN]", help="A worm to run, or a run's folder or run.nc to play."),
+    ] = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    fidelity: FidelityLevel = None,
+    arena: ArenaName = None,
+    speed: Annotated[float, typer.Option(min=0.05, max=10.0, help="Simulated seconds a second at the start.")] = 1.0,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write one HTML page that opens from disk and plays, and show nothing."),
+    ] = None,
+    native: Annotated[
+        bool, typer.Option("--native", help="In MuJoCo's own window instead of a browser; needs a display.")
+    ] = False,
+    open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 lets in other machines that know the token.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: the first from 8080]")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Watch a worm in the browser while it runs, turn its knobs and poke it; or play a run.
+
+    Shows the mesh, ring muscles coloured by activation, springs by strain, the forces of the ground, and the neurons
+    of the last five seconds. Sliders change friction, stiffness, sensors and drive of the running worm; a click
+    pokes it. A recorded run is played the same way. Needs viser: pip install "annelid[view]". Nothing is loaded from
+    the network, and the page is for this machine only unless --host says otherwise. Ctrl-C ends it.
+
+    \b
+    annelid view                                         riddle2023-rods, live
+    annelid view riddle2025-adaptive --arena pipe.taper  another one, elsewhere
+    annelid view --set arena.friction=0.3 --speed 0.5    changed, in slow motion
+    annelid view runs/riddle2023-rods-001                a run, as it was recorded
+    annelid view runs/riddle2023-rods-001 --export walk.html   as one page to send by mail
+    annelid view --native                                in MuJoCo's own window
+    """
+    worm: RunConfig | Run
+    if source and not source.endswith(".toml") and Path(source).exists():
+        from annelid.simulation.runfile import open_run
+
+        if (assignments, segments, fidelity, arena) != (None, None, None, None):
+            raise typer.BadParameter("a run is played as it was: give no --set, --segments, --fidelity or --arena")
+        worm = open_run(source)
+    else:
+        preset = RIGID_PRESET if source is None else source
+        worm = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
+    if export is not None:
+        if native:
+            raise typer.BadParameter("--export writes a page: it does not go with --native")
+        from annelid.draw.gallery import task_bar
+        from annelid.live.page import export_page, page_path
+
+        page = page_path(export)
+        refuse_existing(page, force, "--export")
+        with task_bar("writing the page") as progress:
+            typer.echo(export_page(worm, page, speed=speed, progress=progress))
+        return
+    if native:
+        from annelid.live.native import show_native
+
+        show_native(worm, speed=speed)
+        return
+    from annelid.live.server import free_port, warning_of
+    from annelid.live.show import Show
+
+    if (warning := warning_of(host)) is not None:
+        complain(f"warning: {warning}")
+    with Show(worm, host=host, port=free_port(host, port), speed=speed) as show:
+        typer.echo(f"{show.address}  (Ctrl-C ends)")
+        if open_browser:
+            webbrowser.open(show.address)
+        try:
+            show.run()
+        except KeyboardInterrupt:
+            typer.echo("")
+
+
+def export_command(
+    run: RunPath,
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, mp4, gif, html or mjcf.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write, or folder of csv and parquet  [default: in the run]"),
+    ] = None,
+    signals: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,NAME,..", help="Only these signals (csv, mat, parquet)  [default: all]"),
+    ] = None,
+    every: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=10_000_000, metavar="N", help="Only every Nth sample, and every Nth frame (csv, mat, parquet)."
+        ),
+    ] = None,
+    from_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="From this time on (not mjcf).")] = None,
+    to_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Up to this time (not mjcf).")] = None,
+    force: Force = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
+) -> None:
+    """Write a run as tables, MATLAB, video, HTML or MJCF.
+
+    \b
+    csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
+    mat      one MATLAB file: a variable for each signal; structs with units, labels and the configuration
+    parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
+    mp4 gif  a video; annelid render has camera, speed and frame rate
+    html     one page that needs nothing else: numbers, figures, configuration, what to cite
+    mjcf     the model for plain MuJoCo, the last state as a keyframe
+
+    \b
+    annelid export runs/riddle2023-rods-001 --to csv
+    annelid export runs/riddle2023-rods-001 --to csv --signals ring_length,muscle_force -o rings.csv
+    annelid export runs/riddle2023-rods-001 --to mat --every 10 --from-time 2 --to-time 4 -o two_seconds.mat
+    annelid export runs/riddle2023-rods-001 --to html -o report.html
+    """
+    from annelid.draw.gallery import task_bar
+    from annelid.export import Selection, find_format, selected
+    from annelid.simulation.lock import LOCK_NAME
+    from annelid.simulation.runfile import open_run
+
+    kind = find_format(to)
+    given = {"--signals": signals, "--every": every, "--from-time": from_time, "--to-time": to_time}
+    for option, value in given.items():
+        if value is not None and option not in kind.options:
+            valid = f"takes {', '.join(sorted(kind.options))}" if kind.options else "takes the whole run"
+            raise RunFileError(f"{option} has no effect on {kind.name}, which {valid}")
+    kind.require()
+    opened = open_run(run)
+    target = kind.target(opened, output)
+    if output is not None:
+        if kind.many and target.suffix.lower() != kind.suffix:
+            lock(target)
+        # A folder of tables may be there already, but not with something in it.
+        if not kind.many or target.is_file():
+            refuse_existing(target, force)
+        elif not force and target.is_dir() and any(entry.name != LOCK_NAME for entry in target.iterdir()):
+            raise RunFileError(f"the folder {target} is not empty: name another with -o, or write into it with --force")
+    names = None if signals is None else [name.strip() for name in signals.split(",") if name.strip()]
+    part = selected(opened, Selection(names, every or 1, from_time, to_time))
+    with task_bar(f"exporting to {kind.name}", quiet=quiet) as progress:
+        written = kind.write(part, target, progress or (lambda done, total: None))
+    for path in written:
+        typer.echo(path)
+
+
+def cite(
+    source: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[RUN|PRESET|FILE.toml]", help="What was used  [default: only annelid and the paper behind it]"
+        ),
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Print every entry that annelid knows.")] = False,
+) -> None:
+    """Print BibTeX of what a run or a preset rests on.
+
+    Above each entry stands what it is cited for. Fields that annelid does not know for certain are left out, and
+    the entry's note says which to complete.
+
+    \b
+    annelid cite
+    annelid cite runs/riddle2023-rods-001 > references.bib
+    annelid cite wang
+    annelid cite --all
+    """
+    from annelid.references import bibtex, entries, references_of
+
+    if everything and source is not None:
+        raise typer.BadParameter("--all prints every entry: name no run or preset with it")
+    if source is None:
+        typer.echo(bibtex(entries().keys() if everything else references_of()), nl=False)
+        return
+    from annelid.config import load_config, preset_names
+    from annelid.simulation.runfile import FILE_NAME, read_config
+
+    # A name may be all of these: a run comes first, then a file or a preset.
+    known, path = source.endswith(".toml") or source in preset_names(), Path(source)
+    if (path / FILE_NAME).exists() or (path.exists() and not known):
+        config = read_config(path)
+    elif known:
+        config = load_config(source)
+    else:
+        raise ConfigError(f"{source!r} is neither a run nor a preset: {suggest(source, preset_names())}")
+    typer.echo(bibtex(references_of(config)), nl=False)

@@ -6,7 +6,7 @@ import os
 import re
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -24,10 +24,6 @@ from annelid.cli.common import (
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
 from annelid.errors import ConfigError, SimulationStopped
-
-if TYPE_CHECKING:
-    from annelid.config import RunConfig
-    from annelid.experiment.uncertainty import Uncertainty
 
 
 def run_command(
@@ -72,7 +68,7 @@ def run_command(
     jobs: Annotated[
         int | None, typer.Option(min=1, max=4096, help="Runs at a time with --uncertainty  [default: as many as cores]")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the run that the folder holds.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars and no table.")] = False,
 ) -> None:
@@ -104,7 +100,7 @@ def run_command(
     from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
-    from annelid.simulation.runfile import open_run
+    from annelid.simulation.runfile import FILE_NAME, open_run
 
     if uncertainty is None and (uncertainty_from, vary, jobs) != (None, None, None):
         raise typer.BadParameter("--uncertainty-from, --vary and --jobs need --uncertainty N")
@@ -126,12 +122,24 @@ def run_command(
         if uncertainty is None:
             done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
         else:
-            errors = _errors(vary)
-            with going_on(folder, *(["--out", str(folder)] if out is None else [])):
-                result = _run_with_error_bars(config, uncertainty, folder, uncertainty_from, errors, jobs, force, quiet)
+            from annelid.experiment import uncertainty as study
+            from annelid.experiment.progress import in_stage, study_progress
+
+            spread = study.read_spread(uncertainty_from).but(_errors(vary))
+            further = ["--out", str(folder)] if out is None else []
+            with going_on(folder, *further), study_progress(quiet=quiet) as progress:
+                report = in_stage(progress, "error bars")
+                result = study.uncertainty(
+                    config, uncertainty, folder, spread=spread, jobs=jobs, overwrite=force, progress=report
+                )
             done = open_run(folder)
     except SimulationStopped as stop:
-        raise SimulationStopped(f"{stop}{_show_what_is_left(folder, quiet)}") from None
+        if not (folder / FILE_NAME).exists():
+            raise
+        left = open_run(folder)
+        if not quiet:
+            print_table(left)
+        raise SimulationStopped(f"{stop}; what was computed is in {left.path}") from None
     if not quiet:
         print_table(done)
     if done.status == "interrupted":
@@ -149,32 +157,8 @@ def run_command(
         end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
 
 
-def _run_with_error_bars(
-    config: RunConfig,
-    n: int,
-    folder: Path,
-    source: Path | None,
-    errors: dict[str, float],
-    jobs: int | None,
-    overwrite: bool,
-    quiet: bool,
-) -> Uncertainty:
-    """Runs a worm and its variants behind one progress bar, as `annelid.experiment.uncertainty.uncertainty` does."""
-    from annelid.experiment.progress import in_stage, study_progress
-    from annelid.experiment.uncertainty import read_spread, uncertainty
-
-    spread = read_spread(source).but(errors)
-    with study_progress(quiet=quiet) as progress:
-        told = in_stage(progress, "error bars")
-        return uncertainty(config, n, folder, spread=spread, jobs=jobs, overwrite=overwrite, progress=told)
-
-
 def _errors(vary: list[str] | None) -> dict[str, float]:
-    """Reads relative errors, each ``PARAMETER=ERROR``.
-
-    Raises:
-        ConfigError: One is no number.
-    """
+    """Reads relative errors, each ``PARAMETER=ERROR``."""
     from annelid.config import parse_assignments
 
     errors: dict[str, float] = {}
@@ -205,15 +189,3 @@ def _locked_folder(out: Path | None, name: str) -> Path:
             number += 1
         else:
             return folder
-
-
-def _show_what_is_left(folder: Path, quiet: bool) -> str:
-    """Prints the table of a run that a guard stopped; returns the words that name its file."""
-    from annelid.simulation.runfile import FILE_NAME, open_run
-
-    if not (folder / FILE_NAME).exists():
-        return ""
-    left = open_run(folder)
-    if not quiet:
-        print_table(left)
-    return f"; what was computed is in {left.path}"

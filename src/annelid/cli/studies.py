@@ -1,15 +1,97 @@
-"""The commands `paper`, `robustness` and `bench`, each a whole study."""
+"""The commands that compute many runs: `paper`, `bench`, `robustness`, `sweep`, `tune`, `calibrate`, `limit-cycle`."""
 
 from __future__ import annotations
 
+import json
+import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast, get_args
 
 import typer
 
-from annelid.cli.common import ClusterName, Jobs, Quiet, going_on, print_results, study_runs
-from annelid.cli.entry import end_study, lock
+from annelid.cli.common import (
+    RIGID_PRESET,
+    Assignments,
+    ClusterName,
+    Force,
+    Jobs,
+    NamedPreset,
+    OnlyPaths,
+    Output,
+    Preset,
+    Quiet,
+    ResultsFolder,
+    Segments,
+    config_of,
+    going_on,
+    kept_runs,
+    overrides_of,
+    print_results,
+    refuse_existing,
+    study_runs,
+)
+from annelid.cli.entry import EXIT_ALL_FAILED, complain, end_study, lock, typed_command
 from annelid.errors import RunFileError
+
+
+def limit_cycle_command(
+    preset: Preset = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    neuron: Annotated[
+        str, typer.Option(help="The cycle begins when this neuron's potential rises through the threshold.")
+    ] = "contraction_1",
+    threshold: Annotated[
+        float | None, typer.Option(help="Threshold, mV above rest.  [default: half the operating range]")
+    ] = None,
+    times: Annotated[
+        list[str] | None,
+        typer.Option("--time", metavar="WAY", help="continuous, located or stepped; may be repeated.  [default: all]"),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the numbers and the phase response curves as JSON, in SI units.")
+    ] = False,
+    force: Force = False,
+) -> None:
+    """Find a planar worm's limit cycle, and how stable it is.
+
+    Follows the worm until its states repeat, then disturbs each state a little at a hundred points of the
+    cycle. Prints the period and the Floquet multipliers: what one cycle leaves of a deviation. All but one
+    below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
+
+    Time is taken in three ways: continuous, for the multipliers; located, in the worm's own steps, but each
+    ended where a stretch sensor switches; and stepped, in its own steps as they are in a run. The picture
+    shows the phase response too: by how much a kick of a neuron, at each phase, advances the rhythm.
+    Takes about ten seconds for 3 segments, twenty for 6; default preset: riddle2022-planar.
+
+    \b
+    annelid limit-cycle riddle2022-planar --segments 6
+    annelid limit-cycle riddle2022-planar --time continuous -o cycle.png
+    annelid limit-cycle --set controller.gate_time_constant_ms=200 --set body.gain=1.9
+    annelid limit-cycle --json | jq .continuous.multipliers[0]
+    """
+    from annelid.analysis.limit_cycle import Time, limit_cycle
+    from annelid.draw.figures.limit_cycle import limit_cycle_figure
+    from annelid.draw.plots import plot_path
+    from annelid.draw.table import TIMES, cycle_numbers, cycle_table
+    from annelid.terminal import Console
+
+    if output is not None:
+        output = plot_path(output)
+        refuse_existing(output, force)
+    config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
+    wanted = cast(list["Time"], times or list(get_args(Time)))
+    cycles = {time: limit_cycle(config, time=time, neuron=neuron, threshold_mV=threshold) for time in wanted}
+    if as_json:
+        typer.echo(json.dumps({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)))
+    else:
+        Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
+    if output is not None:
+        named = {TIMES[time]: cycle for time, cycle in cycles.items()}
+        typer.echo(limit_cycle_figure(named, output), err=as_json)
 
 
 def paper_command(
@@ -17,14 +99,14 @@ def paper_command(
     quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 6 minutes.")] = False,
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
+        typer.Option(metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
     ] = None,
     jobs: Jobs = None,
     cluster: ClusterName = None,
     claims: Annotated[
         Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the paths.")] = False,
+    quiet: OnlyPaths = False,
 ) -> None:
     """Reproduce the paper's figures and claims, and examine them.
 
@@ -38,7 +120,7 @@ def paper_command(
     annelid paper --only pins --only friction          these examinations only
     annelid paper -o report --claims docs/paper.md     and the table of claims for the repository
     """
-    from annelid.output import whole_file, with_suffix
+    from annelid.output import with_suffix, write_text
     from annelid_studies.riddle2023.paper import reproduce
     from annelid_studies.riddle2023.report import claims_page, write_report
 
@@ -52,29 +134,74 @@ def paper_command(
         effort = "quick" if quick else "full"
         report = reproduce(output, effort, only=only or None, workers=workers, progress=progress)
         html = write_report(report, output)
+    written = [html, html.with_suffix(".md")]
     if claims is not None:
-        with whole_file(claims) as draft:
-            draft.write_text(claims_page(report), encoding="utf-8")
-    print_results((html, html.with_suffix(".md"), *([claims] if claims else [])), quiet=quiet)
+        written.append(write_text(claims, claims_page(report)))
+    print_results(written, quiet=quiet)
+
+
+def bench_command(
+    output: ResultsFolder = Path("bench"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, one converged run: 3 minutes.")] = False,
+    cases: Annotated[
+        list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure speed and error side by side.
+
+    Times closed loops with their recording, each in a process of its own on one core, and compares their
+    elongation and period with runs that are converged in time. Writes bench.json, bench.png and bench.svg:
+    error against speed, cost against the number of segments, and where the time of a step goes.
+
+    \b
+    --cases levels      the levels of --fidelity
+    --cases steps       physics steps of 1 to 40 ms
+    --cases elements    1 to 6 elements a rhombus side
+    --cases segments    rods of 3 to 30 segments
+    --cases chain       the paper's formulation, 3 to 12 segments
+    --cases duration    10 and 60 s, for the memory
+    --cases peer        free rods of PyElastica, if it is installed
+
+    The whole takes about 15 minutes. Leave the machine alone meanwhile: what else runs is measured too.
+    Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
+    a full run takes over what --quick measured. Delete that folder to measure again.
+
+    \b
+    annelid bench                                   everything, into the folder bench
+    annelid bench --quick                           an overview
+    annelid bench --cases levels -o levels          the levels of fidelity only
+    annelid bench --cases segments --cases chain    how the cost grows with the worm
+    """
+    from annelid.experiment.progress import study_progress
+    from annelid_studies.bench.benchmark import bench
+    from annelid_studies.bench.report import bench_figure, bench_table
+
+    lock(output)
+    with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
+        path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
+    report = json.loads(path.read_text(encoding="utf-8"))
+    tables = [] if quiet else [bench_table(report)]
+    print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
+    end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)
 
 
 def robustness_command(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("robustness"),
-    points: Annotated[int, typer.Option("--points", min=1, max=1_000_000, help="How many points of the sample.")] = 300,
+    output: ResultsFolder = Path("robustness"),
+    points: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many points of the sample.")] = 300,
     segments: Annotated[
         int | None,
         typer.Option(min=3, max=200, help="Give every worm this many segments.  [default: as drawn, 3 to 24]"),
     ] = None,
     controller: Annotated[
-        list[str] | None,
-        typer.Option("--controller", metavar="KIND", help="Only this one; may be repeated.  [default: all four]"),
+        list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
     ] = None,
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
     ] = False,
     jobs: Jobs = None,
     cluster: ClusterName = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the paths.")] = False,
+    quiet: OnlyPaths = False,
 ) -> None:
     """Compare how often controllers walk over a designed sample of worms.
 
@@ -104,54 +231,173 @@ def robustness_command(
         )
     if not quiet:
         typer.echo(shares_table(shares(judged)))
-    for name in ("robustness.json", "robustness.md"):
-        typer.echo(output / name)
+    print_results((output / "robustness.json", output / "robustness.md"), quiet=quiet)
 
 
-def bench_command(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")] = Path("bench"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, one converged run: 3 minutes.")] = False,
-    cases: Annotated[
-        list[str] | None,
-        typer.Option("--cases", metavar="LINE", help="Only these cases; may be repeated.  [default: all]"),
+def sweep_command(
+    study: Annotated[
+        Path | None, typer.Argument(metavar="STUDY.toml", help="What is varied, and how; --example prints one.")
     ] = None,
+    output: Output = Path("sweep"),
+    cluster: ClusterName = None,
+    jobs: Jobs = None,
+    samples: Annotated[
+        int | None, typer.Option(min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]")
+    ] = None,
+    example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Measure speed and error side by side.
+    """Vary fields over a grid or in samples, on this machine or on a cluster.
 
-    Times closed loops with their recording, each in a process of its own on one core, and compares their
-    elongation and period with runs that are converged in time. Writes bench.json, bench.png and bench.svg:
-    error against speed, cost against the number of segments, and where the time of a step goes.
+    A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
+    ranges, in every combination or as random, Latin hypercube or Sobol samples.
 
-    \b
-    --cases levels      the levels of --fidelity
-    --cases steps       physics steps of 1 to 40 ms
-    --cases elements    1 to 6 elements a rhombus side
-    --cases segments    rods of 3 to 30 segments
-    --cases chain       the paper's formulation, 3 to 12 segments
-    --cases duration    10 and 60 s, for the memory
-    --cases peer        free rods of PyElastica, if it is installed
-
-    The whole takes about 15 minutes. Leave the machine alone meanwhile: what else runs is measured too.
-    Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
-    a full run takes over what --quick measured. Delete that folder to measure again.
+    Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, a row a run; sweep.png and
+    .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A run
+    that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
+    the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the study
+    describes is used where --cluster names the file.
 
     \b
-    annelid bench                                   everything, into the folder bench
-    annelid bench --quick                           an overview
-    annelid bench --cases levels -o levels          the levels of fidelity only
-    annelid bench --cases segments --cases chain    how the cost grows with the worm
+    annelid sweep --example > study.toml
+    annelid sweep study.toml
+    annelid sweep study.toml --cluster tcp://10.0.0.1:8786
+    annelid sweep study.toml --cluster study.toml
+    annelid sweep study.toml --samples 512
     """
-    import json
+    if example:
+        from importlib.resources import files
 
+        typer.echo((files("annelid.experiment") / "sweep_example.toml").read_text(encoding="utf-8"), nl=False)
+        return
+    if study is None:
+        raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
+    from annelid.config import load_study
     from annelid.experiment.progress import study_progress
-    from annelid_studies.bench.benchmark import bench
-    from annelid_studies.bench.report import bench_figure, bench_table
+    from annelid.experiment.sweep import results_table, swept, write_results
 
+    loaded = load_study(study)
+    if samples is not None:
+        loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
     lock(output)
-    with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
-        path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
-    report = json.loads(path.read_text(encoding="utf-8"))
-    tables = [] if quiet else [bench_table(report)]
-    print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
-    end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)
+    with going_on(output / "runs"), study_progress(quiet=quiet) as progress:
+        to_use = f"add --cluster {shlex.quote(str(study))}"
+        done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
+    print_results(write_results(done), results_table(done), quiet=quiet)
+    failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
+    end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)
+
+
+def tune_command(
+    preset: NamedPreset = RIGID_PRESET,
+    output: Output = Path("tune"),
+    objective: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="speed, cost-of-transport or slip; one or two of them.  [default: speed]"),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FIELD=RANGE",
+            help="A field as LOW:HIGH, LOW:HIGH:log or VALUE,VALUE,..; may be repeated."
+            "  [default: timing and sensors of the preset's controller]",
+        ),
+    ] = None,
+    assignments: Assignments = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Simulated time of each run, s.  [default: the preset's]")
+    ] = None,
+    trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Runs that the search may take.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of the optimiser.")] = 0,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Search for a faster, cheaper or less slipping gait.
+
+    An optimiser (CMA-ES for one objective, a tree-structured Parzen estimator for two or where there are choices)
+    varies fields of controller and body. Every run is judged over its complete cycles; one that stops, falls silent or
+    out of order, or does not advance counts as no speed, a cost of transport of 100 and a slip ratio of 10.
+
+    Writes after every generation: best.toml, which `annelid run` takes; trials.csv; tuning.png and .svg; with two
+    objectives also front/, a file for each gait of the Pareto front. Runs are kept, so that a second call, also one
+    with more trials, goes on where the first was stopped. Needs the extra: pip install 'annelid[tune]'.
+
+    \b
+    annelid tune riddle2025-muscles
+    annelid tune riddle2025-muscles --vary controller.gate_time_constant_ms=80:600:log --vary sensor.tolerance_m=0:0.02
+    annelid tune riddle2025 --objective speed --objective slip --trials 200 -o front
+    annelid run tune/best.toml
+    """
+    from annelid.experiment import tune
+    from annelid.experiment.case import Case
+    from annelid.plausibility import refuse_nonsense
+
+    changes, objectives = overrides_of(assignments, duration_s=duration), tune.objectives_of(objective or ["speed"])
+    base = Case(preset, changes).config
+    for doubt in refuse_nonsense(base):
+        complain(f"warning: {doubt}")
+    task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed)
+    found: list[tune.Trial] = []
+    written: list[Path] = []
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        for generation in tune.search(task, store, progress=store.progress):
+            found += generation
+            written = tune.write_results(task, found, typed_command(), output)
+    print_results(written, tune.results_table(task, found), quiet=quiet)
+    end_study(len(found), sum(trial.failed for trial in found), output / tune.HISTORY)
+    if tune.leader(found, objectives) is None:
+        complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / tune.HISTORY}")
+        raise typer.Exit(EXIT_ALL_FAILED)
+
+
+def calibrate_command(
+    preset: NamedPreset = RIGID_PRESET,
+    output: ResultsFolder = Path("calibration"),
+    assignments: Assignments = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: the first three]"),
+    ] = None,
+    data: Annotated[Path | None, typer.Option(help="Measured loop to fit.  [default: the one of annelid]")] = None,
+    quiet: Quiet = False,
+    force: Force = False,
+) -> None:
+    """Fit the rod worm to a measured load-frame loop.
+
+    Strands of the stiffness-equivalent radius 0.00299 m and 571.6 kg/m^3, unless --set says otherwise. Takes a
+    few minutes. Writes calibration.json, calibration.png and .svg, and calibrated.toml: the fields to put into
+    a file of your own.
+
+    \b
+    --free young_modulus         of the strands; the shear modulus keeps its ratio to it
+    --free dry_friction          Coulomb torque of a crossing
+    --free cable_friction        of the cable round the ring: coefficient times angle
+    --free spring_rate           of the axial springs
+    --free spring_rest_length    of the axial springs
+    --free viscous_friction      torque of a crossing per angular velocity
+
+    \b
+    annelid calibrate
+    annelid calibrate --set body.strands.radius_m=0.002
+    annelid calibrate --set body.springs.stiffness_N_per_m=24.5 --set body.springs.rest_length_m=0.065
+    annelid calibrate --free young_modulus --free dry_friction --data mine.csv
+    """
+    from annelid.experiment.calibration import DEFAULT_FREE, EQUAL_STIFFNESS, calibrate, fit_tables, write_calibration
+    from annelid.experiment.load_frame import draw_loops, read_loop
+    from annelid.experiment.progress import study_progress
+
+    report = output / "calibration.json"
+    lock(output)
+    refuse_existing(report, force)
+    measured, changes = read_loop(data), EQUAL_STIFFNESS | overrides_of(assignments)
+    config = config_of(preset, dict(changes))
+    with study_progress(quiet=quiet) as progress:
+
+        def simulated(loops: int, rms_N: float) -> None:
+            if progress is not None:
+                progress(f"calibrating, {rms_N:.2f} N off after {loops} loops", 0, 0, 0.0)
+
+        fit = calibrate(config, measured, free=free or DEFAULT_FREE, progress=simulated)
+    picture = draw_loops({"fitted": fit.simulated, "measured": measured}, report.with_suffix(""))
+    print_results((*write_calibration(fit, preset, changes, report), picture), *fit_tables(fit), quiet=quiet)

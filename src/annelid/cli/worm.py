@@ -32,7 +32,7 @@ def check(
     arena: ArenaName = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
 ) -> None:
-    """Hold the numbers of a 3D worm against one another, before anything is computed.
+    """Compare the numbers of a 3D worm with one another, before anything is computed.
 
     Lengths against the ring at rest, forces against what the mesh bears, the step against stiffness, the sensors'
     tolerance against the mesh. A finding says what is wrong and what to set instead. With an error a run can mean
@@ -73,28 +73,26 @@ def build(
     annelid build riddle2025 --arena pipe.s -o worm_in_pipe.xml
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
-    from annelid.body.mjcf import mjcf_text
-    from annelid.output import whole_file
+    from annelid.body.assemble import mjcf_text
+    from annelid.output import write_text
 
     refuse_existing(output, force)
     config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
-    text = mjcf_text(config)
-    with whole_file(output) as draft:
-        draft.write_text(text, encoding="utf-8")
-    typer.echo(output)
+    typer.echo(write_text(output, mjcf_text(config)))
 
 
 def presets(
-    name: Annotated[str | None, typer.Argument(help="Print this preset's commented TOML.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
 ) -> None:
-    """List the presets, or print one.
+    """List the presets, or print one: every field with its source, and the preset that it is inherited from.
 
-    What it prints is a start for a file of your own.
+    What it prints is a start for a file of your own. Of a file that extends a preset it prints the whole worm, too.
 
     \b
     annelid presets
     annelid presets riddle2023 > my.toml
+    annelid presets my.toml
     annelid presets riddle2023 --fields
     """
     from annelid.config import load_config, preset_names, preset_text
@@ -137,7 +135,7 @@ def doctor(
         bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
     ] = False,
 ) -> None:
-    """Tell what is missing and how to install it.
+    """Say what is missing and how to install it.
 
     The report names no user, no machine and no folder.
 
@@ -148,10 +146,8 @@ def doctor(
     from annelid.draw.doctor import examine
 
     if report:
-        from annelid.draw.bug_report import bug_report
+        from annelid.draw.doctor import bug_report
 
         typer.echo(bug_report(list(examine())))
-        return
-
-    for finding in examine():
-        typer.echo(finding.line())
+    else:
+        typer.echo("\n".join(finding.line() for finding in examine()))

@@ -1,46 +1,39 @@
 """What a user may set: frozen models with the unit in every field's name, and the named presets.
 
-A configuration is a tree of sections (`run`, `sensor`); which controllers, bodies, their parts, arenas and turnings
-there are, `kinds` finds. A preset is a commented TOML file in ``annelid/presets`` that states every field with its
-source; a user's own TOML file may start from one (``extends = "riddle2023"``), and any field can be overridden by its
-dotted path (``body.mesh.n_segments=4``). A level of `fidelity` sets how finely a 3D worm is resolved.
-
-The names below are loaded on first use: a kind's module imports what it needs of this package before there is a whole
-configuration.
+A configuration is a tree of sections (`run`); which controllers, bodies, their parts, arenas and turnings there are,
+`kinds` finds. A preset is a commented TOML file in ``annelid/presets`` that states its fields with their sources, or
+those in which it differs from another (``extends = "riddle2023"``), as a user's own TOML file may. Any field can be
+overridden by its dotted path (``body.mesh.n_segments=4``). A level of `fidelity` sets how finely a 3D worm is resolved.
 """
 
 from __future__ import annotations
 
 import warnings
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from annelid.lazy import lazy
-
-if TYPE_CHECKING:
-    from annelid.config.arena import ArenaKind
-    from annelid.config.checking import check_config, field_paths, field_value, fields_of, unit_of, whole_path
-    from annelid.config.cluster import Cluster, find_cluster
-    from annelid.config.fidelity import LEVELS, Fidelity, find_level
-    from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, kinds_of
-    from annelid.config.loading import (
-        arena_names,
-        arena_summary,
-        arena_text,
-        as_config,
-        load_config,
-        parse_assignments,
-        preset_names,
-        preset_text,
-    )
-    from annelid.config.run import Clock, Guard, Record, RunConfig
-    from annelid.config.sections import Section
-    from annelid.config.sensor import StretchSensor
-    from annelid.config.study import Study, Vary, load_study
-    from annelid.textfiles import toml_value
+from annelid.config.arena import ArenaKind
+from annelid.config.checking import check_config, field_paths, field_value, fields_of, unit_of, whole_path
+from annelid.config.cluster import Cluster, find_cluster
+from annelid.config.fidelity import LEVELS, Fidelity, find_level
+from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, class_named, kinds_of
+from annelid.config.loading import (
+    arena_names,
+    arena_summary,
+    arena_text,
+    as_config,
+    load_config,
+    parse_assignments,
+    preset_names,
+    preset_text,
+)
+from annelid.config.run import Clock, Guard, Record, RunConfig, StretchSensor
+from annelid.config.sections import Section
+from annelid.config.study import Study, Vary, load_study
+from annelid.textfiles import toml_value
 
 _MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
-    "Contraction": "annelid.control.program",
+    "Contraction": "annelid.control.open_loop",
     "DescendingDrive": "annelid.control.robust",
 }
 """Sections that are no kinds, which the first edition had here."""
@@ -86,15 +79,8 @@ __all__ = [
 ]
 
 
-_offered, __dir__ = lazy(__name__)
-
-
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        return _offered(name)
-    from annelid.config.kinds import class_named
-
-    # Where the first edition had them; for one release.
+    """Finds names of the first edition where they are now, for one release."""
     if name in _MOVED:
         found = getattr(import_module(_MOVED[name]), name)
     else:

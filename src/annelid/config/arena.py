@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from annelid.arena.course import Bore, Course
-    from annelid.arena.shapes import Shape
-    from annelid.arena.surface import Surface
+    from annelid.arena.surface import Shape, Surface
 
 Friction = Annotated[float, Field(ge=0.01, le=100)]
 Place = Annotated[float, Field(ge=-1e4, le=1e4)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, TypeVar, get_origin
 
@@ -30,21 +30,14 @@ def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
         raise ConfigError(_explain_all(error, section, tree)) from None
 
 
-def field_paths(model: type[BaseModel] = RunConfig, prefix: str = "") -> dict[str, str]:
+def field_paths(model: type[BaseModel] = RunConfig) -> dict[str, str]:
     """Returns the dotted path and the description of every field, for help texts and suggestions."""
-    paths: dict[str, str] = {}
-    for name, info in model.model_fields.items():
-        if _is_branch(info.annotation):
-            for section in sections_in(info.annotation):
-                paths.update(field_paths(section, f"{prefix}{name}."))
-        else:
-            paths[f"{prefix}{name}"] = info.description or ""
-    return paths
+    return dict(_fields_below(model))
 
 
 def fields_of(config: RunConfig) -> dict[str, str]:
     """Returns the dotted path and the description of every field that this configuration's kinds have."""
-    return _fields_of_section(config, "")
+    return dict(_fields_below(config))
 
 
 def field_value(config: RunConfig, path: str) -> Any:
@@ -55,15 +48,15 @@ def field_value(config: RunConfig, path: str) -> Any:
     return value
 
 
-def _fields_of_section(section: BaseModel, prefix: str) -> dict[str, str]:
-    paths: dict[str, str] = {}
-    for name, info in type(section).model_fields.items():
-        value = getattr(section, name)
-        if isinstance(value, BaseModel):
-            paths.update(_fields_of_section(value, f"{prefix}{name}."))
-        elif not _is_branch(info.annotation):
-            paths[f"{prefix}{name}"] = info.description or ""
-    return paths
+def _fields_below(section: BaseModel | type[BaseModel], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yields path and description of every field: of a section those that it has, of a class those of every kind."""
+    is_class = isinstance(section, type)
+    for name, info in (section if is_class else type(section)).model_fields.items():
+        if not _is_branch(info.annotation):
+            yield f"{prefix}{name}", info.description or ""
+            continue
+        for inner in sections_in(info.annotation) if is_class else filter(None, [getattr(section, name)]):
+            yield from _fields_below(inner, f"{prefix}{name}.")
 
 
 def _is_branch(annotation: Any) -> bool:
@@ -108,14 +101,15 @@ def whole_path(path: str, tree: Mapping[str, Any]) -> str:
     members: Sequence[type[BaseModel]] = [RunConfig]
     level: Any = tree
     for name in sections:
-        found = [s for member in members if name in member.model_fields for s in _field_sections(member, name)]
+        fields = [member.model_fields[name] for member in members if name in member.model_fields]
         level = level.get(name) if isinstance(level, Mapping) else None
         kind = level.get("kind") if isinstance(level, Mapping) else None
-        members = [s for s in found if kind is not None and _kind_of(s) == kind] or found
-    fields = dict.fromkeys(field for member in members for field in member.model_fields)
-    if leaf in fields:
+        members = _of_kind([section for field in fields for section in sections_in(field.annotation)], kind)
+    names = dict.fromkeys(name for member in members for name in member.model_fields)
+    if leaf in names:
         return path
-    whole = [field for field in fields if field.startswith(f"{leaf}_") and _is_unit(field.removeprefix(f"{leaf}_"))]
+    start = f"{leaf}_"
+    whole = [n for n in names if n.startswith(start) and UNITS.issuperset(n.removeprefix(start).split("_"))]
     if len(whole) > 1:
         raise ConfigError(f"{path} is ambiguous: name one of {', '.join('.'.join((*sections, w)) for w in whole)}")
     return ".".join((*sections, *(whole or [leaf])))
@@ -129,16 +123,13 @@ def unit_of(path: str) -> str:
     return f"{above.strip() or 1}/{below}" if below else above
 
 
-def _field_sections(section: type[BaseModel], field: str) -> list[type[Section]]:
-    return sections_in(section.model_fields[field].annotation)
-
-
 def _kind_of(section: type[Section]) -> Any:
     return section.model_fields["kind"].default if "kind" in section.model_fields else None
 
 
-def _is_unit(words: str) -> bool:
-    return UNITS.issuperset(words.split("_"))
+def _of_kind(sections: list[type[Section]], kind: Any) -> list[type[Section]]:
+    """Returns the sections of a kind, all where none is."""
+    return [section for section in sections if kind is not None and _kind_of(section) == kind] or sections
 
 
 _WORDS = {
@@ -216,7 +207,7 @@ def _place(loc: tuple[int | str, ...], root: type[Section], tree: Any) -> tuple[
             tree = tree.get(part) if isinstance(tree, Mapping) else getattr(tree, str(part), None)
             members = sections_in(field.annotation)
             kind = tree.get("kind", _kind_of(members[0])) if isinstance(tree, Mapping) and members else None
-            members = [member for member in members if kind is not None and _kind_of(member) == kind] or members
+            members = _of_kind(members, kind)
         elif members and part in {_kind_of(member) for member in members}:
             continue
         elif isinstance(part, int):

@@ -7,13 +7,14 @@ user names that file (`find_cluster`), and what goes into a script is checked wo
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from annelid.config.checking import check_section
-from annelid.config.sections import Section, kind_or
+from annelid.config.sections import Section
 from annelid.errors import ConfigError, shown
 from annelid.textfiles import read_json, read_toml
 
@@ -125,12 +126,16 @@ class Slurm(Section):
         )
 
 
+def _kind_of(value: Any) -> Any:
+    return value.get("kind", "processes") if isinstance(value, Mapping) else getattr(value, "kind", "processes")
+
+
 Cluster = Annotated[
     Annotated[Pool, Tag("processes")]
     | Annotated[Pool, Tag("local")]
     | Annotated[Scheduler, Tag("scheduler")]
     | Annotated[Slurm, Tag("slurm")],
-    kind_or("processes"),
+    Discriminator(_kind_of),
 ]
 KINDS = ("processes", "local", "slurm")
 """Clusters that a word names; a scheduler is named by its address."""

@@ -1,6 +1,6 @@
 """Levels of fidelity: how finely the worm of rods is resolved in space and time, never which worm it is.
 
-Errors over mesh and time step come from the study ``docs/studies/resolution.toml`` and stand in ``docs/speed.md``. The
+Errors over mesh and time step come from the study ``docs/results/resolution.toml`` and stand in ``docs/speed.md``. The
 paper's own worm, a chain of capsules, is no level but the preset ``riddle2023``.
 """
 
@@ -55,22 +55,6 @@ LEVELS = {
 """The levels by name, from the slowest to the fastest."""
 
 
-def fidelity_changes(level: str, home: Mapping[str, Any]) -> dict[str, Any]:
-    """Tells what a level changes in a configuration.
-
-    Args:
-        level: One of `LEVELS`.
-        home: The tree of the preset `HOME`.
-
-    Returns:
-        Values of `RESOLUTION` by dotted path.
-
-    Raises:
-        ConfigError: There is no such level.
-    """
-    return {path: _value(home, path) for path in RESOLUTION} | dict(find_level(level).changes)
-
-
 def find_level(name: str) -> Fidelity:
     """Returns the level of that name.
 
@@ -85,10 +69,3 @@ def find_level(name: str) -> Fidelity:
     if name not in LEVELS:
         raise ConfigError(f"unknown fidelity {name!r}: {suggest(name, list(LEVELS))}")
     return LEVELS[name]
-
-
-def _value(tree: Mapping[str, Any], path: str) -> Any:
-    value: Any = tree
-    for key in path.split("."):
-        value = value.get(key) if isinstance(value, Mapping) else None
-    return value

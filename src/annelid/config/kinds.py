@@ -10,7 +10,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from inspect import get_annotations
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, TypeVar
 
@@ -23,8 +22,8 @@ from annelid.registry import Registry
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
-    from annelid.control.program import Contraction
-    from annelid.control.steering import Steering
+    from annelid.control.open_loop import Contraction
+    from annelid.control.turning import Steering
     from annelid.protocols import Controller, Plant
 
 
@@ -153,7 +152,7 @@ class Goals(NamedTuple):
 class TurningKind(Kind):
     """Base of the sections that scale the two sides of a worm with half-rings."""
 
-    registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.steering")
+    registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.turning")
     default: ClassVar[str] = "constant"
 
     def check_with(self, config: RunConfig) -> None:
@@ -212,10 +211,6 @@ class BodyKind(Kind):
         """Distance of the walls that a planar worm crawls between; None where there are none."""
         return None
 
-    def published_period_s(self, config: RunConfig) -> float | None:
-        """Returns the period that was published for this very worm, s; None where none was."""
-        return None
-
     if TYPE_CHECKING:
 
         @property
@@ -252,8 +247,7 @@ def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
 
 def every_kind() -> list[type[Kind]]:
     """Returns the kinds of all families."""
-    # The families of arenas and of the body's parts are defined beside them.
-    import_module("annelid.config.run")
+    # The families of the body's parts are defined beside them.
     BodyKind.registry.all()
     return [kind for family in Kind.__subclasses__() for kind in family.registry.all().values()]
 

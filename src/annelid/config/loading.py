@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import reduce
 from importlib import resources
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 from annelid.config.arena import SHARED
-from annelid.config.checking import check_config, whole_path
-from annelid.config.fidelity import HOME, fidelity_changes, find_level
+from annelid.config.checking import check_config, field_value, whole_path
+from annelid.config.fidelity import HOME, RESOLUTION, find_level
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
-from annelid.textfiles import check_depth, parse_toml, read_toml
+from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
 
 DEFAULT_BASE = "riddle2023-rods"
 """What a user's file starts from unless it says otherwise or states its own kind of body."""
@@ -26,13 +29,34 @@ def preset_names() -> list[str]:
     return _names("presets")
 
 
-def preset_text(name: str) -> str:
-    """Returns the commented TOML of a preset.
+def preset_text(source: str | Path) -> str:
+    """Returns a preset whole, as TOML that stands alone: its own fields and the inherited ones, each with its source.
+
+    Args:
+        source: Name of a preset, or path of a TOML file, whose own fields go without their comments.
+
+    Returns:
+        The text; the comment of an inherited field begins with the preset that states it, or is ``default``.
 
     Raises:
-        ConfigError: No preset has that name; the sentence suggests the nearest.
+        ConfigError: As `load_config`.
     """
-    return _text("presets", "preset", name)
+    import tomlkit
+
+    defaults = load_config(source).model_dump(exclude_none=True)
+    headings: list[str] = []
+    tree: dict[str, Any] = {}
+    layers = _layers(source)
+    for depth, (name, fields) in enumerate(layers, start=1):
+        origin, heading = name if depth < len(layers) else "", []
+        if name in preset_names():
+            text = _text("presets", "preset", name)
+            fields = tomlkit.parse(text)
+            fields.pop("extends", None)
+            heading = takewhile(lambda line: line.startswith("#"), text.splitlines())
+        headings = [*(["", f"# Inherited from {name}:"] if origin else []), *heading, *headings]
+        tree = _merge(tree, _noted(fields, origin))
+    return "\n".join([*headings, "", *_lines(_merge(_noted(defaults, "default"), tree)), ""])
 
 
 def arena_names() -> list[str]:
@@ -100,9 +124,10 @@ def load_config(
     if arena is not None:
         tree = {**tree, "arena": _arena_instead(tree.get("arena"), arena)}
     if fidelity is not None:
-        find_level(fidelity)
+        level = find_level(fidelity)
         check_config(_overridden(tree, overrides or {})).body.refuse_fidelity(fidelity)
-        tree = _overridden(tree, fidelity_changes(fidelity, _read_tree(HOME)))
+        home = check_config(_read_tree(HOME))
+        tree = _overridden(tree, {path: field_value(home, path) for path in RESOLUTION} | dict(level.changes))
     return check_config(_overridden(tree, overrides or {}))
 
 
@@ -167,14 +192,22 @@ def _parse_value(text: str) -> Any:
     return tree["value"] if len(tree) == 1 else text
 
 
-def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()) -> dict[str, Any]:
+def _read_tree(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+    return reduce(_merge, (tree for _, tree in _layers(source)), {})
+
+
+def _layers(
+    source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()
+) -> list[tuple[str, Mapping[str, Any]]]:
+    """Returns what a source states and what each states that it extends, with their names, the outermost first."""
+    default = None
     if isinstance(source, Mapping):
         check_depth(source, "the configuration")
-        own = dict(source)
-        base = own.pop("extends", None)
+        name, own = "", dict(source)
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
-        own = read_toml(path)
+        # Without line breaks, so that it stands in a comment.
+        name, own = shown(path.name), read_toml(path)
         own.setdefault("name", path.stem)
         if path.resolve() in above:
             raise ConfigError(f"{path} extends itself: {listed(each.name for each in (*above, path))}")
@@ -183,14 +216,55 @@ def _read_tree(source: str | Path | Mapping[str, Any], above: tuple[Path, ...] =
         above = (*above, path.resolve())
         body = own.get("body")
         stands_alone = isinstance(body, Mapping) and "kind" in body
-        base = own.pop("extends", None if stands_alone else DEFAULT_BASE)
+        default = None if stands_alone else DEFAULT_BASE
     else:
-        return parse_toml(preset_text(str(source)), str(source))
+        name, own = str(source), parse_toml(_text("presets", "preset", str(source)), str(source))
+    base = own.pop("extends", default)
     if base is None:
-        return own
+        return [(name, own)]
     if not isinstance(base, str):
         raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML file")
-    return _merge(_read_tree(base, above), own)
+    return [*_layers(base, above), (name, own)]
+
+
+@dataclass(frozen=True)
+class _Stated:
+    """A value as TOML writes it; equal to another of the same text, whatever is noted beside it."""
+
+    value: str
+    note: str = field(compare=False)
+
+
+def _noted(table: Mapping[str, Any], origin: str) -> dict[str, Any]:
+    """Returns the fields of a table, each with its origin and its comment, which only tables of tomlkit have."""
+    from tomlkit.container import Container
+    from tomlkit.items import Item, Table
+
+    tree: dict[str, Any] = {}
+    # As a mapping, a container gives truth values without their comments.
+    pairs = [(key.key, item) for key, item in table.body if key] if isinstance(table, Container) else table.items()
+    for key, item in pairs:
+        if isinstance(item, Mapping):
+            tree[key] = _noted(item.value if isinstance(item, Table) else item, origin)
+        else:
+            written = isinstance(item, Item)
+            comment = item.trivia.comment.lstrip("# ") if written else ""
+            note = ": ".join(filter(None, (origin, comment)))
+            tree[key] = _Stated(item.as_string() if written else toml_value(item), note)
+    return tree
+
+
+def _lines(tree: Mapping[str, Any], table: str = "") -> Iterator[str]:
+    """Writes fields as TOML, those of a table before the tables in it."""
+    from tomlkit import key
+
+    named = {key(name).as_string(): field for name, field in tree.items()}
+    for name, stated in named.items():
+        if isinstance(stated, _Stated):
+            yield f"{f'{name} = {stated.value}':<30}  # {stated.note}" if stated.note else f"{name} = {stated.value}"
+    for name, inner in named.items():
+        if isinstance(inner, Mapping):
+            yield from ("", f"[{table}{name}]", *_lines(inner, f"{table}{name}."))
 
 
 def _kinds_first(override: tuple[str, Any]) -> float:

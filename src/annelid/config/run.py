@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from importlib import resources
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from annelid.config.arena import ArenaKind
 from annelid.config.kinds import BodyKind, Choice, ControllerKind, TurningKind, default_of, kinds_of
 from annelid.config.sections import Line, NonNegative, Positive, Section, Seed
-from annelid.config.sensor import StretchSensor
+from annelid.errors import listed
+from annelid.textfiles import parse_toml
 
 Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
 MOST_SAMPLES = 10_000_000
@@ -19,6 +22,19 @@ MOST_SAMPLES = 10_000_000
 def _is_multiple(large: float, small: float) -> bool:
     ratio = large / small
     return round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-6 * ratio
+
+
+@cache
+def published_worms() -> Mapping[str, list[dict[str, Any]]]:
+    """Returns what ``data/published.toml`` has under each name: worms, each with the fields given and its numbers."""
+    file = resources.files("annelid") / "data" / "published.toml"
+    return parse_toml(file.read_text(encoding="utf-8"), file.name)
+
+
+def _known(name: str) -> str:
+    if name not in published_worms():
+        raise ValueError(f"must be one of {listed(sorted(published_worms()))}")
+    return name
 
 
 class Clock(Section):
@@ -36,6 +52,17 @@ class Clock(Section):
                 f"{self.physics_timestep_s:g}: one must be an integer multiple of the other"
             )
         return self
+
+
+class StretchSensor(Section):
+    """How the nervous system reads its segments' lengths."""
+
+    tolerance_m: NonNegative = Field(default=0.010, description="on while a segment is within this of its rest length")
+    hysteresis_m: NonNegative = Field(default=0.0, description="once on, stays on until this much beyond the tolerance")
+    startup_hold_s: NonNegative = Field(
+        default=0.2, description="sensor of segment 1 held off for this long at the start"
+    )
+    noise_m: NonNegative = Field(default=0.0, description="standard deviation of the noise on every reading")
 
 
 class Record(Section):
@@ -69,6 +96,9 @@ class RunConfig(Section):
         default="custom", max_length=200, description="name of the preset or of the user's own configuration"
     )
     summary: Line = Field(default="", max_length=1000, description="one line for the list of presets")
+    published: Annotated[str, AfterValidator(_known)] | None = Field(
+        default=None, description="published numbers that its runs are compared with, where they are of such a worm"
+    )
     duration_s: Positive = Field(default=5.0, description="simulated time")
     seed: Seed = Field(default=0, description="seed of every random draw")
     body: Annotated[BodyKind, Choice()] = Field(default_factory=lambda: default_of(BodyKind))
@@ -102,7 +132,7 @@ class RunConfig(Section):
         return self
 
     @model_validator(mode="after")
-    def _intervals_are_whole_steps(self) -> Self:
+    def _intervals_divide_the_run(self) -> Self:
         step = self.clock.control_timestep_s
         for field, value in (
             ("record.signals_interval_s", self.record.signals_interval_s),
@@ -113,17 +143,9 @@ class RunConfig(Section):
                 raise ValueError(
                     f"{field} = {value:g} must be an integer multiple of clock.control_timestep_s = {step:g}"
                 )
-        return self
-
-    @model_validator(mode="after")
-    def _samples_have_an_end(self) -> Self:
-        for field, interval in (
-            ("record.signals_interval_s", self.record.signals_interval_s),
-            ("record.frames_interval_s", self.record.frames_interval_s),
-        ):
-            if self.duration_s / interval > MOST_SAMPLES:
+            if self.duration_s / value > MOST_SAMPLES:
                 raise ValueError(
-                    f"duration_s = {self.duration_s:g} at {field} = {interval:g} makes more than {MOST_SAMPLES:,} "
+                    f"duration_s = {self.duration_s:g} at {field} = {value:g} makes more than {MOST_SAMPLES:,} "
                     "samples: shorten the run or lengthen the interval"
                 )
         return self

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from annelid.text import is_line
 
@@ -42,12 +42,3 @@ class Section(BaseModel):
             return given
         absent = {name for name, field in cls.model_fields.items() if field.default is None}
         return {name: None if name in absent and value == "none" else value for name, value in given.items()}
-
-
-def kind_or(default: str) -> Discriminator:
-    """Tells a union's member by its ``kind``, or takes the default kind where none is given."""
-
-    def kind_of(value: Any) -> Any:
-        return value.get("kind", default) if isinstance(value, Mapping) else getattr(value, "kind", default)
-
-    return Discriminator(kind_of)

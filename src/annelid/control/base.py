@@ -3,44 +3,44 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Generic, TypeVar
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Annotated, ClassVar, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 
-from annelid.config.sections import Section
+from annelid.config.kinds import ControllerKind
+from annelid.config.sections import Positive, Section
 from annelid.errors import ConfigError
-from annelid.protocols import Array, Recordable, Sensation, Signal, State, Values
+from annelid.nervous import Network, NetworkState, Scheme
+from annelid.nervous.half_centre import HalfCentre
+from annelid.protocols import Array, Recordable, SavedAndRecorded, Sensation, Values
 
+Share = Annotated[float, Field(ge=0, le=1)]
+Level = Annotated[float, Field(gt=0, le=1)]
+Slope = Annotated[float, Field(ge=-100, le=100)]
+TimeConstant = Annotated[float, Field(ge=1e-3, le=1e4)]
 Pattern = TypeVar("Pattern", bound=Section)
+Design = TypeVar("Design", bound=HalfCentre)
 
 
-def muscles_per_segment(n_segments: int, n_muscles: int) -> int:
-    """Returns 1 for whole rings and 2 for half-rings.
+class SegmentController(SavedAndRecorded, ABC):
+    """A controller that makes one activation per segment; both halves of a ring take it alike.
 
-    Raises:
-        ConfigError: Muscles that are neither one nor two a segment.
-    """
-    if n_muscles not in (n_segments, 2 * n_segments):
-        raise ConfigError(
-            f"n_muscles = {n_muscles} does not fit {n_segments} segments: "
-            f"give {n_segments} (rings) or {2 * n_segments} (half-rings)"
-        )
-    return n_muscles // n_segments
-
-
-class SegmentController(ABC):
-    """A controller that makes one activation a segment; both halves of a ring take it alike.
+    Its state is ``_now``, a dictionary of arrays, and what it records is listed in ``recorded``, with values from
+    ``_values``, labels from ``_coords`` and constants from ``_attrs``.
 
     Attributes:
         name: What the run file calls it.
         recorded: Name, dimensions, unit and meaning of what it may record.
 
     Raises:
-        ConfigError: Muscles that are neither one nor two a segment.
+        ConfigError: Muscles that are neither one nor two per segment.
     """
 
     name: ClassVar[str]
-    recorded: ClassVar[tuple[tuple[str, tuple[str, ...], str, str], ...]] = ()
 
     def __init__(self, n_segments: int, n_muscles: int) -> None:
         """Takes the size of the worm.
@@ -49,8 +49,14 @@ class SegmentController(ABC):
             n_segments: Segments.
             n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
         """
+        if n_muscles not in (n_segments, 2 * n_segments):
+            raise ConfigError(
+                f"n_muscles = {n_muscles} does not fit {n_segments} segments: "
+                f"give {n_segments} (rings) or {2 * n_segments} (half-rings)"
+            )
         self._n_segments = n_segments
-        self._muscles_per_segment = muscles_per_segment(n_segments, n_muscles)
+        self._muscles_per_segment = n_muscles // n_segments
+        self._now = {}
 
     @abstractmethod
     def reset(self, seed: int) -> None:
@@ -61,7 +67,7 @@ class SegmentController(ABC):
         """Advances by one control step.
 
         Args:
-            sensation: What the body feels at the beginning of the step.
+            sensation: What the body senses at the beginning of the step.
 
         Returns:
             Activation of every muscle in [0, 1], shape ``(n_muscles,)``.
@@ -69,44 +75,21 @@ class SegmentController(ABC):
 
     def recordable(self) -> Recordable:
         """Names the signals that `read` returns."""
-        values = self._values()
-        signals = (
-            Signal(name, dims, np.shape(values[name]), units, meaning)
-            for name, dims, units, meaning in self.recorded
-            if name in values
-        )
-        return Recordable(tuple(signals), self._coords(), {"controller": self.name, **self._attrs()})
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        return {} if frame else self._values()
-
-    def _values(self) -> Values:
-        """Present values of all that is recorded."""
-        return {}
-
-    def _coords(self) -> dict[str, list[int] | list[str]]:
-        """Labels of the signals' dimensions."""
-        return {}
-
-    def _attrs(self) -> dict[str, float]:
-        """Constants worth an attribute of the run file."""
-        return {}
-
-    @abstractmethod
-    def get_state(self) -> State:
-        """Returns copies of all that the next step depends on."""
-
-    @abstractmethod
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
+        own = super().recordable()
+        return Recordable(own.signals, own.coords, {"controller": self.name, **own.attrs})
 
 
 class OpenLoopController(SegmentController, Generic[Pattern]):
-    """Contracts segments by the clock: during the step from t to t + dt as its pattern says for t."""
+    """Contracts segments by the clock: during the step from t to t + dt as its pattern says for t; has no state."""
 
     def __init__(self, pattern: Pattern, n_segments: int, n_muscles: int) -> None:
-        """Takes the pattern, its section of the configuration, and the size of the worm as `SegmentController`."""
+        """Takes a pattern and the size of the worm.
+
+        Args:
+            pattern: Its section of the configuration.
+            n_segments: Segments.
+            n_muscles: As `SegmentController`.
+        """
         self._pattern = pattern
         super().__init__(n_segments, n_muscles)
 
@@ -118,12 +101,104 @@ class OpenLoopController(SegmentController, Generic[Pattern]):
         """Does nothing: there is no state, and nothing is random."""
 
     def step(self, sensation: Sensation) -> Array:
-        """Returns the activation of the step that begins now; nothing but the time is felt."""
+        """Returns the activation of the step that begins now; nothing but the time is sensed."""
         return self.activation(sensation.time_s).repeat(self._muscles_per_segment)
 
-    def get_state(self) -> State:
-        """Returns nothing: the next step depends on time alone."""
-        return {}
 
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned: nothing."""
+class HalfCentreKind(ControllerKind):
+    """The fields of a network's half-centres, `annelid.nervous.HalfCentre`; the defaults are those of the papers."""
+
+    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C of the fast neurons")
+    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
+    range_mV: Positive = Field(default=20.0, description="operating range R")
+    bifurcation_mV: float = Field(default=0.01, description="delta: how far past the bifurcation the half-centre sits")
+    offset_mV: Positive = Field(default=0.1, description="how far beyond the range a suppressed half-centre lies")
+    inhibitory_reversal_mV: float = Field(default=-40.0, lt=0, description="relative to rest")
+    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
+    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
+    gate_slope_per_mV: float = Field(default=0.05, gt=0, le=10, description="slope S of the sodium gates")
+    gate_time_constant_ms: Positive = Field(
+        default=300.0, description="tau_h,max; sets the period of the paper's network: 300, 200 or 100"
+    )
+
+
+def design_of(kind: type[Design], section: Section) -> Design:
+    """Returns the design whose parameters a section of the configuration has under the same names."""
+    return kind(**{field.name: getattr(section, field.name) for field in fields(kind)})
+
+
+class NeuralController(SegmentController):
+    """A compiled network whose potentials drive the muscles.
+
+    A segment's activation is a function of its contraction minus its expansion neuron, U1 - U2:
+    ``1 / (1 + exp(-slope (U1 - U2)))`` (Riddle et al. 2023, Eq. 2, whose printed exponent has the other sign), or
+    ``0.5 + clip(U1 - U2, -R, R) / (2 R)`` (Riddle et al. 2022).
+    """
+
+    _GATE = "inactivation gate h of the persistent sodium channel; NaN for neurons without one"
+    recorded = (
+        ("potential", ("neuron",), "mV", "membrane potential relative to rest"),
+        ("sodium_gate", ("neuron",), "1", _GATE),
+    )
+    _range_mV: float
+
+    def __init__(
+        self,
+        network: Network,
+        roles: Sequence[str],
+        n_segments: int,
+        n_muscles: int,
+        control_timestep_s: float,
+        *,
+        scheme: Scheme,
+        slope_per_mV: float,
+        linear_range_mV: float | None = None,
+    ) -> None:
+        """Compiles the network, whose neurons are those of one segment after another by ``roles``, then any others.
+
+        ``linear_range_mV`` is the R of the linear activation, which then takes the sigmoid's place.
+        """
+        super().__init__(n_segments, n_muscles)
+        self._timestep_s = control_timestep_s
+        self._stepper = network.compile(1e3 * control_timestep_s, scheme)
+        self._of_role = {role: slice(place, n_segments * len(roles), len(roles)) for place, role in enumerate(roles)}
+        self._slope_per_mV = slope_per_mV
+        self._linear_range_mV = linear_range_mV
+        self.reset(0)
+
+    def _start_at(self, state: NetworkState, **others: NDArray) -> None:
+        """Begins with a state of the network, and other arrays that the next step depends on."""
+        self._state = state
+        self._now = {"potential": state.potential, "gate": state.gate, **others}
+
+    def step(self, sensation: Sensation) -> Array:
+        """Advances by one control step, as `stride`."""
+        return self.stride(sensation, 1)
+
+    @abstractmethod
+    def stride(self, sensation: Sensation, n_steps: int) -> Array:
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
+
+    def _activation(self, potential: Array) -> Array:
+        """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""
+        difference = potential[..., self._of_role["contraction"]] - potential[..., self._of_role["expansion"]]
+        reach = self._linear_range_mV
+        if reach is not None:
+            activation = 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
+        else:
+            activation = 1.0 / (1.0 + np.exp(-self._slope_per_mV * difference))
+        return activation if self._muscles_per_segment == 1 else activation.repeat(self._muscles_per_segment, axis=-1)
+
+    def _activity(self, name: str) -> float:
+        """Activity of a neuron: its potential over the range, in [0, 1]."""
+        potential = self._state.potential[0, self._stepper.arrays.neurons.index(name)]
+        return min(max(float(potential) / self._range_mV, 0.0), 1.0)
+
+    def _values(self) -> Values:
+        arrays = self._stepper.arrays
+        gate = np.full(len(arrays.neurons), np.nan)
+        gate[arrays.channel_neuron] = self._state.gate[0, 0]
+        return {"potential": self._state.potential[0].copy(), "sodium_gate": gate}
+
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        return {"neuron": list(self._stepper.arrays.neurons), "segment": list(range(1, self._n_segments + 1))}

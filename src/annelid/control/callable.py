@@ -23,16 +23,13 @@ class CallableController:
     """
 
     def __init__(
-        self,
-        function: Callable[[Sensation], ArrayLike],
-        n_muscles: int,
-        on_reset: Callable[[int], None] | None = None,
+        self, function: Callable[[Sensation], ArrayLike], n_muscles: int, on_reset: Callable[[int], None] | None = None
     ) -> None:
         """Wraps a function.
 
         Args:
             function: Takes the present `Sensation`; returns activation in [0, 1], shape ``(n_muscles,)``, or
-                one number for all muscles. Called once a control step.
+                one number for all muscles. Called once per control step.
             n_muscles: Number of muscles of the worm.
             on_reset: Called with the seed at every reset, for functions that keep a state.
         """
@@ -52,26 +49,21 @@ class CallableController:
         Raises:
             ConfigError: The activation is no number, has another shape, or leaves [0, 1].
         """
-        result = self._function(sensation)
+        result, n, time = self._function(sensation), self._n_muscles, f"at {sensation.time_s:g} s; it must"
+        returned = "the controller function returned"
         try:
             activation = np.array(result, dtype=np.float64)
         except (TypeError, ValueError):
-            raise ConfigError(
-                f"the controller function returned {type(result).__name__} at {sensation.time_s:g} s; "
-                f"it must return {self._n_muscles} numbers in [0, 1]"
-            ) from None
+            problem = f"{returned} {type(result).__name__} {time} return {n} numbers in [0, 1]"
+            raise ConfigError(problem) from None
         if activation.ndim == 0:
-            activation = np.full(self._n_muscles, activation)
-        if activation.shape != (self._n_muscles,):
-            raise ConfigError(
-                f"the controller function returned shape {activation.shape} at {sensation.time_s:g} s; "
-                f"it must return shape ({self._n_muscles},)"
-            )
+            activation = np.full(n, activation)
+        if activation.shape != (n,):
+            raise ConfigError(f"{returned} shape {activation.shape} {time} return shape ({n},)")
         within = (activation >= 0.0) & (activation <= 1.0)
         if not within.all():
             worst = int(np.argmin(within))
             raise ConfigError(
-                f"the controller function returned activation {activation[worst]:g} for muscle {worst + 1} at "
-                f"{sensation.time_s:g} s; it must lie in [0, 1]"
+                f"{returned} activation {activation[worst]:g} for muscle {worst + 1} {time} lie in [0, 1]"
             )
         return activation

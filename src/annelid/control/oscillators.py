@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.adaptive import DRIVE_HINT
-from annelid.control.base import SegmentController
+from annelid.control.base import SegmentController, Share, Slope
+from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous import (
-    HeteroclinicRing,
-    HeteroclinicStepper,
-    PhaseState,
-    PhaseStepper,
-    handover_input,
-    largest_gain_per_s,
-    phase_chain,
-)
-from annelid.nervous.phase_chain import BODY
-from annelid.protocols import Array, Plant, Sensation, State, Values
+from annelid.nervous import HeteroclinicRing, HeteroclinicStepper, PhaseState, PhaseStepper
+from annelid.nervous.phase_chain import BODY, phase_chain
+from annelid.nervous.shc import handover_input, largest_gain_per_s
+from annelid.protocols import Array, Plant, Sensation, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 
+Gain = Annotated[float, Field(ge=0, le=100)]
+
+
 class HeteroclinicChannel(ControllerKind):
-    """A stable heteroclinic channel (Horchler 2015, Daltorio 2013): one saddle a segment, visited in order.
+    """A stable heteroclinic channel (Horchler 2015, Daltorio 2013): one saddle per segment, visited in order.
 
     A segment's activation is its node's activity. Alone it dwells at a node for about ``ln(1 / noise)`` or
     ``ln(1 / bias)`` over the leaving rate ``growth_rate_per_s / saddle_value``; feedback from the body ends the dwell.
@@ -38,42 +34,34 @@ class HeteroclinicChannel(ControllerKind):
     interval from segment to segment.
     """
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (
+    cites = (
         ("daltorio2013", "a channel that waits for the body"),
         ("horchler2015", "the stable heteroclinic channel"),
         ("shaw2012", "limit cycles near a heteroclinic orbit"),
         ("stone1990", "the dwell time under noise"),
     )
-    tuned: ClassVar[tuple[str, ...]] = (
+    tuned = (
         "controller.growth_rate_per_s=5:100:log",
         "controller.bias_per_s=1e-5:0.1:log",
         "controller.stretch_cue_m=0.005:0.08:log",
     )
     kind: Literal["shc"] = "shc"
-    growth_rate_per_s: Annotated[float, Field(gt=0, le=500)] = Field(
-        default=20.0, description="rate at which activities settle and decay; at most 0.5 over the control timestep"
+    growth_rate_per_s: float = Field(
+        default=20.0, gt=0, le=500, description="rate at which activities settle and decay"
     )
-    saddle_value: Annotated[float, Field(gt=1, le=100)] = Field(
-        default=2.0, description="that rate over the rate at which a node is left"
-    )
-    noise: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=1e-6, description="standard deviation of the noise, per square root of a second"
-    )
-    bias_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
-        default=5e-4, description="constant input to every node; a larger one shortens the dwell"
-    )
+    saddle_value: float = Field(default=2.0, gt=1, le=100, description="that over the rate at which a node is left")
+    noise: Share = Field(default=1e-6, description="standard deviation of the noise, per square root of a second")
+    bias_per_s: Gain = Field(default=5e-4, description="constant input to every node; a larger one shortens the dwell")
     feedback: Literal["none", "stretch", "contact"] = Field(
         default="stretch",
         description="what excites a node's successor: nothing, the present segment having lengthened by "
         "stretch_cue_m, or the segment before it bearing contact_cue_N",
     )
-    feedback_gain_per_s: Annotated[float, Field(ge=0, le=100)] = Field(
-        default=0.1, description="input to the successor of an active node whose cue is on"
+    feedback_gain_per_s: Gain = Field(
+        default=0.1, description="input to the successor of an active node with its cue on"
     )
     stretch_cue_m: NonNegative = Field(default=0.02, description="lengthening at which a segment has its shape")
-    contact_cue_N: NonNegative = Field(
-        default=0.2, description="size of the force of the ground with which a segment holds fast"
-    )
+    contact_cue_N: NonNegative = Field(default=0.2, description="size of the force of the ground on an anchor")
 
     @model_validator(mode="after")
     def _it_leaves_its_first_node(self) -> Self:
@@ -103,25 +91,15 @@ class PhaseChain(ControllerKind):
     Activation is an oscillator's output over its largest, ``r (1 + cos theta) / (2 R(5))``.
     """
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("ijspeert2007", "the phase oscillators under a drive"),)
-    tuned: ClassVar[tuple[str, ...]] = (
-        "controller.slowing=0.3:10:log",
-        "controller.waves=0.5:3",
-        "controller.drive=3:5",
-    )
+    cites = (("ijspeert2007", "the phase oscillators under a drive"),)
+    tuned = ("controller.slowing=0.3:10:log", "controller.waves=0.5:3", "controller.drive=3:5")
     kind: Literal["phase-chain"] = "phase-chain"
-    drive: Annotated[float, Field(ge=0, le=10)] = Field(
-        default=4.0, description="descending drive at the start: the body swims in 3 .. 5, is silent outside 1 .. 5"
+    drive: float = Field(
+        default=4.0, ge=0, le=10, description="descending drive; the body swims in 3 .. 5, rests beyond 1 .. 5"
     )
-    drive_slope_per_s: Annotated[float, Field(ge=-100, le=100)] = Field(
-        default=0.0, description="change of the drive, which stays in 0 .. 10"
-    )
-    limbs: bool = Field(
-        default=False, description="true: limb oscillators force a standing wave below drive 3 (walking)"
-    )
-    waves: Annotated[float, Field(ge=-100, le=100)] = Field(
-        default=1.0, description="waves on the body at once, by the phase bias; the salamander's swimming has 1"
-    )
+    drive_slope_per_s: Slope = Field(default=0.0, description="change of the drive, within 0 .. 10")
+    limbs: bool = Field(default=False, description="limb oscillators force a standing wave below drive 3 (walking)")
+    waves: Slope = Field(default=1.0, description="waves on the body at once; the salamander's swimming has 1")
     coupling_per_s: Positive = Field(default=10.0, description="coupling of neighbours")
     slowing: Positive = Field(default=1.0, description="times slower than the salamander, in all of its rates")
 
@@ -140,11 +118,11 @@ class HeteroclinicController(SegmentController):
     Node i is segment i: its activity, cut off at 1, is the segment's activation, so one segment after another
     contracts. The cue of a node lets its successor grow. ``"stretch"``: the segment has become as long as
     ``stretch_cue_m`` beyond rest, hence has its contracted shape. ``"contact"``: the segment before it, which widens
-    again behind the wave, bears ``contact_cue_N`` and so holds fast (Daltorio et al. 2013: waves that wait for the
+    again behind the wave, bears ``contact_cue_N`` and so is an anchor (Daltorio et al. 2013: waves that wait for the
     ground slip less). Noise of a step is a function of seed and step number.
 
     Raises:
-        ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, a control step too long
+        ConfigError: Fewer than 3 segments, muscles that are neither one nor two per segment, a control step too long
             for the growth rate, or a feedback gain at which the channel can come to rest.
     """
 
@@ -160,7 +138,7 @@ class HeteroclinicController(SegmentController):
         Args:
             config: Its section of the configuration.
             n_segments: Segments, at least 3.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
+            n_muscles: As `SegmentController`.
             control_timestep_s: Step of the oscillator, s.
         """
         super().__init__(n_segments, n_muscles)
@@ -177,18 +155,25 @@ class HeteroclinicController(SegmentController):
 
     def reset(self, seed: int) -> None:
         """Returns to node 1: segment 1 contracted, all others at rest."""
-        self._activity = self._stepper.initial_state()
-        self._cue = np.zeros(self._n_segments)
-        self._seed, self._n_steps = seed, 0
+        self._now = {
+            "activity": self._stepper.initial_state(),
+            "cue": np.zeros(self._n_segments),
+            "seed": np.array(seed, dtype=np.uint64),
+            "n_steps": np.array(0),
+        }
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step, as `SegmentController.step`; lengths or contact forces are felt."""
-        config = self._config
-        self._cue = self._cues(sensation)
-        pushed = config.bias_per_s + handover_input(self._activity, self._cue, config.feedback_gain_per_s)
-        self._activity = self._stepper.advance(self._activity, pushed, self._kick())
-        self._n_steps += 1
-        return np.minimum(self._activity[0], 1.0).repeat(self._muscles_per_segment)
+        """Advances by one control step, as `SegmentController.step`; lengths or contact forces are sensed."""
+        config, now = self._config, self._now
+        now["cue"] = self._cues(sensation)
+        pushed = config.bias_per_s + handover_input(now["activity"], now["cue"], config.feedback_gain_per_s)
+        kick = 0.0
+        if config.noise:
+            place = np.random.Philox(key=int(now["seed"]), counter=[0, 0, 0, int(now["n_steps"])])
+            kick = config.noise * np.random.Generator(place).standard_normal(now["activity"].shape)
+        now["activity"] = self._stepper.advance(now["activity"], pushed, kick)
+        now["n_steps"] += 1
+        return np.minimum(now["activity"][0], 1.0).repeat(self._muscles_per_segment)
 
     def _cues(self, sensation: Sensation) -> Array:
         if self._config.feedback == "stretch":
@@ -199,35 +184,14 @@ class HeteroclinicController(SegmentController):
             return np.roll(load >= self._config.contact_cue_N, 1).astype(float)
         return np.zeros(self._n_segments)
 
-    def _kick(self) -> Array | float:
-        if not self._config.noise:
-            return 0.0
-        random = np.random.Generator(np.random.Philox(key=self._seed, counter=[0, 0, 0, self._n_steps]))
-        return self._config.noise * random.standard_normal(self._activity.shape)
-
     def _values(self) -> Values:
-        return {"node_activity": self._activity[0].copy(), "cue_on": self._cue.copy()}
+        return {"node_activity": self._now["activity"][0].copy(), "cue_on": self._now["cue"].copy()}
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         return {"segment": list(range(1, self._n_segments + 1))}
 
-    def _attrs(self) -> dict[str, float]:
+    def _attrs(self) -> dict[str, float | int | str]:
         return {"leaving_rate_per_s": self._stepper.ring.leaving_rate_per_s}
-
-    def get_state(self) -> State:
-        """Returns copies of activities and cues, the seed and the number of steps taken."""
-        return {
-            "activity": self._activity.copy(),
-            "cue": self._cue.copy(),
-            "seed": np.array(self._seed, dtype=np.uint64),
-            "n_steps": np.array(self._n_steps),
-        }
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._activity = np.array(state["activity"], dtype=float)
-        self._cue = np.array(state["cue"], dtype=float)
-        self._seed, self._n_steps = int(state["seed"]), int(state["n_steps"])
 
 
 class PhaseChainController(SegmentController):
@@ -236,7 +200,7 @@ class PhaseChainController(SegmentController):
     The chain starts as a wave with the phase lags of its couplings, the first oscillator at its largest output.
 
     Raises:
-        ConfigError: Muscles that are neither one nor two a segment, or a control step too long for the oscillators.
+        ConfigError: Muscles that are neither one nor two per segment, or a control step too long for the oscillators.
     """
 
     name = "chain of phase oscillators"
@@ -252,7 +216,7 @@ class PhaseChainController(SegmentController):
         Args:
             config: Its section of the configuration.
             n_segments: Segments, each with a body oscillator.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
+            n_muscles: As `SegmentController`.
             control_timestep_s: Step of the oscillators, s.
         """
         super().__init__(n_segments, n_muscles)
@@ -266,16 +230,18 @@ class PhaseChainController(SegmentController):
 
     def reset(self, seed: int) -> None:
         """Returns to the initial wave; nothing here is random."""
-        segment = np.arange(self._n_segments)
         limbs = [0.0, np.pi] if self._config.limbs else []
-        self._state = self._stepper.initial_state(self._drive(0), np.append(-self._lag * segment, limbs))
-        self._n_steps = 0
+        phase = np.append(-self._lag * np.arange(self._n_segments), limbs)
+        self._now = vars(self._stepper.initial_state(self._drive(0), phase)) | {"n_steps": np.array(0)}
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step, as `SegmentController.step`; nothing is felt."""
-        self._state = self._stepper.advance(self._state, self._drive(self._n_steps))
-        self._n_steps += 1
-        output = self._stepper.output(self._state)[0, : self._n_segments]
+        """Advances by one control step, as `SegmentController.step`; nothing is sensed."""
+        now = self._now
+        state = PhaseState(now["phase_rad"], now["amplitude"], now["amplitude_rate_per_s"])
+        state = self._stepper.advance(state, self._drive(int(now["n_steps"])))
+        now |= vars(state)
+        now["n_steps"] += 1
+        output = self._stepper.output(state)[0, : self._n_segments]
         most = 2.0 * float(BODY.amplitude(BODY.highest_drive))
         return np.clip(output / most, 0.0, 1.0).repeat(self._muscles_per_segment)
 
@@ -285,20 +251,11 @@ class PhaseChainController(SegmentController):
 
     def _values(self) -> Values:
         return {
-            "oscillator_phase": self._state.phase_rad[0].copy(),
-            "oscillator_amplitude": self._state.amplitude[0].copy(),
-            "drive": self._drive(max(self._n_steps - 1, 0)),
+            "oscillator_phase": self._now["phase_rad"][0].copy(),
+            "oscillator_amplitude": self._now["amplitude"][0].copy(),
+            "drive": self._drive(max(int(self._now["n_steps"]) - 1, 0)),
         }
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         limbs = ["fore_limb", "hind_limb"] if self._config.limbs else []
         return {"oscillator": [f"body_{segment}" for segment in range(1, self._n_segments + 1)] + limbs}
-
-    def get_state(self) -> State:
-        """Returns copies of phases, amplitudes and their rates, and the number of steps taken."""
-        return {name: array.copy() for name, array in vars(self._state).items()} | {"n_steps": np.array(self._n_steps)}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._state = PhaseState(**{name: np.array(state[name], dtype=float) for name in vars(self._state)})
-        self._n_steps = int(state["n_steps"])

@@ -2,87 +2,65 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field
 
-from annelid.config.kinds import ControllerKind, Knob
+from annelid.config.kinds import Knob
 from annelid.config.sections import Positive, Section
-from annelid.control.adaptive import DRIVE_HINT
-from annelid.control.neural import NeuralController, design_of
+from annelid.control.base import HalfCentreKind, NeuralController, Share, TimeConstant, design_of
+from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous.adaptive import DRIVE_NEURON
-from annelid.nervous.driven import MOTOR, MOTOR_SHARE, DriveParameters, add_motor_neurons, driven_robust_network
-from annelid.nervous.robust import ROLES, RobustParameters, robust_network
+from annelid.nervous import robust
+from annelid.nervous.peristalsis import DRIVE_NEURON
 from annelid.protocols import SIDES, Array, Plant, Sensation, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
+BACK = SIDES.index("back")
+
 
 class DescendingDrive(Section):
-    """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe."""
+    """A descending neuron that makes the robust network's wave faster where backs are pressed, as in a narrow pipe.
 
-    lift: Annotated[float, Field(ge=0, lt=0.5)] = Field(
-        default=0.0,
-        description="share of the range to which full drive lifts resting relays; 0: there is no such neuron; 0.45: "
-        "full drive makes six segments' wave 3.9 times as fast",
+    With a ``lift`` of 0.45 full drive makes six segments' wave 3.9 times as fast.
+    """
+
+    lift: float = Field(
+        default=0.0, ge=0, lt=0.5, description="share of R to which full drive lifts resting relays; 0: no drive"
     )
-    drive: Annotated[float, Field(ge=0, le=1)] = Field(default=0.0, description="manual drive, to which pressure adds")
-    per_segment: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.5, description="drive that one segment gives whose back is pressed fully"
-    )
+    drive: Share = Field(default=0.0, description="manual drive, to which pressure adds")
+    per_segment: Share = Field(default=0.5, description="drive that one segment gives whose back is pressed fully")
     full_pressure_N: Positive = Field(
-        default=3.0, description="force on a segment's back that presses it fully; about a segment's weight"
+        default=3.0, description="force that presses a back fully; about a segment's weight"
     )
-    pressure_time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant of the pressure neurons"
-    )
-    time_constant_s: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=0.2, description="time constant of the descending neuron"
-    )
+    pressure_time_constant_s: TimeConstant = Field(default=0.2, description="of the pressure neurons")
+    time_constant_s: TimeConstant = Field(default=0.2, description="of the descending neuron")
 
 
-class RobustSns(ControllerKind):
+class RobustSns(HalfCentreKind):
     """A peristalsis network made to keep its rhythm under wrong sensor signals: `annelid.nervous.robust`.
 
     All contraction neurons suppress each other, a slow relay counts each turn, and the stretch sensors entrain it
-    within bounds. The `sensor` section's noise acts; its tolerance, hysteresis and hold are not used. With
-    ``descending.lift`` the wave adapts to narrow pipes: `annelid.nervous.driven`.
+    within bounds. The `sensor` section's noise acts; its other fields are not used. With ``descending.lift`` the wave
+    adapts to narrow pipes. Motor neurons (``let_go_s``) relax slowly, so that several segments share the wave; without
+    them contraction and expansion neurons drive the muscles.
     """
 
-    sensor_fields: ClassVar[frozenset[str]] = frozenset({"noise_m"})
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (
-        ("riddle2022", "the neurons"),
-        ("szczecinski2017", "the rules by which synapses are designed"),
-    )
-    tuned: ClassVar[tuple[str, ...]] = (
-        "controller.turn_ms=150:1500:log",
-        "controller.activation_slope_per_mV=0.1:2:log",
-    )
+    sensor_fields = frozenset({"noise_m"})
+    cites = (("riddle2022", "the neurons"), ("szczecinski2017", "the rules by which synapses are designed"))
+    tuned = ("controller.turn_ms=150:1500:log", "controller.activation_slope_per_mV=0.1:2:log")
     kind: Literal["sns-robust"] = "sns-robust"
-    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C of the fast neurons")
-    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
-    range_mV: Positive = Field(default=20.0, description="operating range R")
-    bifurcation_mV: Annotated[float, Field(lt=0)] = Field(
-        default=-1.0, description="delta: below 0, so that the half-centre stays in either state"
+    bifurcation_mV: float = Field(
+        default=-1.0, lt=0, description="delta: below 0, so that the half-centre stays in either state"
     )
-    offset_mV: Positive = Field(default=0.1, description="how far beyond the range a held half-centre lies")
-    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
-    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
-    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
-    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
-        default=0.05, description="slope S of the sodium gates"
-    )
-    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; does not set the period here")
     turn_ms: Positive = Field(default=875.0, description="time from one segment's contraction to the next one's")
-    push_nA: Positive = Field(
-        default=6.0, description="current of a full relay into the next contraction neuron at rest"
-    )
-    entrainment: Annotated[float, Field(ge=0, le=0.03)] = Field(
-        default=0.02, description="share of the relay's drive that the sensor may add or take; 0 for none"
+    push_nA: Positive = Field(default=6.0, description="current of a full relay into the next contraction neuron")
+    entrainment: float = Field(
+        default=0.02, ge=0, le=0.03, description="share of the relay's drive that the sensor may add"
     )
     habit_ms: Positive = Field(default=10000.0, description="time constant with which the sensor adapts")
     full_stretch_m: Positive = Field(default=0.08, description="mean lengthening that drives a stretch neuron to R")
@@ -92,10 +70,8 @@ class RobustSns(ControllerKind):
         default="design",
         description="state of the network at the start: segment 1 contracted, all neurons at rest, or drawn by seed",
     )
-    let_go_s: Annotated[float, Field(ge=0, le=100)] = Field(
-        default=0.0,
-        description="time constant with which motor neurons let go, so that several segments share the wave; 0: there "
-        "are none, and contraction and expansion neurons drive the muscles",
+    let_go_s: float = Field(
+        default=0.0, ge=0, le=100, description="time constant of the motor neurons; 0: there are none"
     )
     descending: DescendingDrive = DescendingDrive()
 
@@ -110,19 +86,15 @@ class RobustSns(ControllerKind):
         return (Knob("controller.descending.drive", "drive", 1.0, 0.0, 1.0, 0.01, DRIVE_HINT),)
 
 
-BACK = SIDES.index("back")
-
-
 class RobustController(NeuralController):
-    """Drives a worm by `annelid.nervous.robust`, or with a drive by `annelid.nervous.driven`.
+    """Drives a worm by `annelid.nervous.robust`.
 
-    One step, from t to t + dt: the segments' mean lengthening at t, graded and clipped, drives the stretch neurons
-    during the whole step; activation is ``1 / (1 + exp(-slope (U1 - U2)))`` of the contraction and expansion neurons at
-    t + dt, or that of the motor neurons, if there are any. The forces of the ground on the segments' backs drive the
-    pressure neurons likewise, if there are any. Nothing but potentials and gates is remembered.
+    One step, from t to t + dt: the segments' mean lengthening at t, and the forces of the ground on their backs, drive
+    stretch and pressure neurons during the whole step; activation at t + dt is that of `NeuralController`, or that of
+    the motor neurons, if there are any. The state is potentials and gates alone.
 
     Raises:
-        ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, network parameters for
+        ConfigError: Fewer than 3 segments, muscles that are neither one nor two per segment, network parameters for
             which a design rule has no solution, or a control step at which the network would not be stable.
     """
 
@@ -132,27 +104,26 @@ class RobustController(NeuralController):
         ("stretch_activity", ("segment",), "1", "activity of the stretch neuron"),
         ("drive", (), "1", "activity of the descending neuron"),
     )
-    _parameters: RobustParameters
 
     def __init__(self, config: RobustSns, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
-        """Builds the controller in its initial state.
-
-        Args:
-            config: Its section of the configuration.
-            n_segments: Segments, at least 3.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-            control_timestep_s: Step of the network, s.
-        """
         self._config, drive = config, config.descending
-        self._parameters = parameters = design_of(RobustParameters, config)
+        self._parameters = parameters = design_of(robust.RobustParameters, config)
+        self._range_mV, self._full_nA = config.range_mV, config.leak_conductance_uS * config.range_mV
         if drive.lift:
-            times_ms = 1e3 * drive.time_constant_s, 1e3 * drive.pressure_time_constant_s
-            pathway = DriveParameters(drive.lift, drive.per_segment, *times_ms)
-            network = driven_robust_network(n_segments, parameters, pathway)
+            network = robust.driven_robust_network(
+                n_segments,
+                parameters,
+                lift=drive.lift,
+                per_segment=drive.per_segment,
+                drive_ms=1e3 * drive.time_constant_s,
+                pressure_ms=1e3 * drive.pressure_time_constant_s,
+            )
         else:
-            network = robust_network(n_segments, parameters)
+            network = robust.robust_network(n_segments, parameters)
+        # The motor neurons come last.
+        self._motor = slice(len(network.neurons), None)
         if config.let_go_s:
-            add_motor_neurons(network, n_segments, parameters, 1e3 * config.let_go_s)
+            robust.add_motor_neurons(network, n_segments, parameters, 1e3 * config.let_go_s)
         longest_s = network.stable_timestep_ms() / 1e3
         if control_timestep_s > longest_s:
             raise ConfigError(
@@ -161,71 +132,55 @@ class RobustController(NeuralController):
             )
         super().__init__(
             network,
-            ROLES,
+            robust.ROLES,
             n_segments,
             n_muscles,
             control_timestep_s,
             scheme=config.scheme,
             slope_per_mV=config.activation_slope_per_mV,
         )
-        neurons = self._stepper.arrays.neurons
-        first = neurons.index(f"{MOTOR}_1") if config.let_go_s else len(neurons)
-        self._motor = slice(first, first + n_segments)
-        self._range_mV, self._full_nA = config.range_mV, config.leak_conductance_uS * config.range_mV
-        self.reset(0)
 
     def reset(self, seed: int) -> None:
         """Returns to the state that ``start`` names.
 
-        It is segment 1 contracted and the others held (``"design"``); all potentials at rest, gates steady there
-        (``"silent"``); or potentials drawn evenly from the inhibitory reversal to three ranges and gates from 0 to 1
-        (``"random"``).
-
-        Args:
-            seed: Of what is drawn.
+        ``"silent"`` is all potentials at rest with steady gates, ``"random"`` potentials drawn evenly from the
+        inhibitory reversal to three ranges and gates from 0 to 1.
         """
-        self._state = self._stepper.initial_state()
-        config, potential, gate = self._config, self._state.potential, self._state.gate
+        state, config = self._stepper.initial_state(), self._config
         if config.start == "silent":
-            potential[...] = 0.0
+            state.potential[...] = 0.0
             [inactivation] = self._parameters.sodium_channel.slow_gates
-            gate[...] = inactivation.steady(0.0)
+            state.gate[...] = inactivation.steady(0.0)
         elif config.start == "random":
             rng = np.random.default_rng(seed)
-            potential[...] = rng.uniform(config.inhibitory_reversal_mV, 3.0 * config.range_mV, potential.shape)
-            gate[...] = rng.random(gate.shape)
+            low, high = config.inhibitory_reversal_mV, 3.0 * config.range_mV
+            state.potential[...] = rng.uniform(low, high, state.potential.shape)
+            state.gate[...] = rng.random(state.gate.shape)
+        self._start_at(state)
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps, as `NeuralController.stride`."""
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
+        drive = self._config.descending
         longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         inputs = np.clip(longer_m / self._config.full_stretch_m, 0.0, 1.0)
-        if self._config.descending.lift:
-            inputs = np.concatenate([inputs, [self._config.descending.drive], self._pressure(sensation)])
+        if drive.lift:
+            # A body without a skin has no row of touch.
+            back_N = sensation.touch_N[:, BACK] if len(sensation.touch_N) else np.zeros(self._n_segments)
+            inputs = np.concatenate([inputs, [drive.drive], np.clip(back_N / drive.full_pressure_N, 0.0, 1.0)])
         self._stepper.advance(self._state, self._full_nA * inputs, n_steps)
         return self._activation(self._state.potential[0])
-
-    def _pressure(self, sensation: Sensation) -> Array:
-        """Force on every segment's back over its full scale, in [0, 1], ``(n_segments,)``; 0 for one without skin."""
-        if not len(sensation.touch_N):
-            return np.zeros(self._n_segments)
-        return np.clip(sensation.touch_N[:, BACK] / self._config.descending.full_pressure_N, 0.0, 1.0)
 
     def _activation(self, potential: Array) -> Array:
         """Activation of every muscle, ``(.., n_muscles)``: the motor neurons' activity, if there are any."""
         if not self._config.let_go_s:
             return super()._activation(potential)
-        full = MOTOR_SHARE * self._parameters.range_mV
+        full = robust.MOTOR_SHARE * self._range_mV
         return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_per_segment, axis=-1)
 
     def _values(self) -> Values:
         stretch = self._state.potential[0, self._of_role["stretch"]]
-        values = {
-            **super()._values(),
-            "stretch_activity": np.clip(stretch / self._parameters.range_mV, 0.0, 1.0),
-        }
-        if self._config.descending.lift:
-            values["drive"] = self._activity(self._stepper.arrays.neurons.index(DRIVE_NEURON))
-        return values
+        values = {**super()._values(), "stretch_activity": np.clip(stretch / self._range_mV, 0.0, 1.0)}
+        return values | ({"drive": self._activity(DRIVE_NEURON)} if self._config.descending.lift else {})
 
-    def _attrs(self) -> dict[str, float]:
+    def _attrs(self) -> dict[str, float | int | str]:
         return {"turn_ms": self._parameters.turn_ms}

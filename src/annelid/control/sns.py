@@ -1,59 +1,50 @@
-"""The paper's controller: stretch sensors, the peristalsis network, and the muscles' activation."""
+"""The paper's controller, and two that extend its network: by a descending drive, and by feedback from pressure."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Hashable, Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Hashable, Iterable, Iterator
+from dataclasses import asdict, astuple, dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, ClassVar, Generic, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from annelid.config.kinds import ControllerKind
+from annelid.config.kinds import ControllerKind, Knob
+from annelid.config.run import StretchSensor
 from annelid.config.sections import NonNegative, Positive
-from annelid.config.sensor import StretchSensor
-from annelid.control.neural import NeuralController, design_of
+from annelid.control.base import HalfCentreKind, NeuralController, Share, Slope, TimeConstant, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
-from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis_network
-from annelid.nervous.peristalsis import ROLES
+from annelid.control.stretch_sensor import lengthening_m
+from annelid.errors import ConfigError
+from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis
 from annelid.protocols import Array, Plant, Sensation, State, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 Config = TypeVar("Config", bound=ControllerKind)
-NETWORK_CITES = (("riddle2022", "the network"), ("szczecinski2017", "the rules by which synapses are designed"))
-"""What every controller with the paper's network rests on."""
+Strength = Annotated[float, Field(ge=0, le=5)]
+DRIVE_HINT = "Descending drive: more of it makes the wave faster."
 
 
-class Sns(ControllerKind):
-    """The paper's synthetic nervous system: one half-centre a segment, gated by its neighbour's stretch."""
+class Sns(HalfCentreKind):
+    """The paper's synthetic nervous system: one half-centre per segment, gated by its neighbour's stretch."""
 
-    sensor_fields: ClassVar[frozenset[str]] = frozenset({"tolerance_m", "noise_m"})
-    tuned: ClassVar[tuple[str, ...]] = (
+    sensor_fields = frozenset({"tolerance_m", "noise_m"})
+    tuned = (
         "controller.gate_time_constant_ms=80:900:log",
         "controller.activation_slope_per_mV=0.1:2:log",
         "sensor.tolerance_m=0.001:0.03:log",
         "sensor.hysteresis_m=0:0.02",
     )
     kind: Literal["sns"] = "sns"
-    capacitance_nF: Positive = Field(default=5.0, description="membrane capacitance C")
-    leak_conductance_uS: Positive = Field(default=1.0, description="leak conductance Gm")
-    range_mV: Positive = Field(default=20.0, description="operating range R")
     bifurcation_mV: Positive = Field(
         default=0.01, description="delta: how far past the bifurcation the half-centre sits"
     )
-    offset_mV: Positive = Field(default=0.1, description="how far below rest an inhibited neuron is held")
-    inhibitory_reversal_mV: Annotated[float, Field(lt=0)] = Field(default=-40.0, description="relative to rest")
-    excitatory_reversal_mV: Positive = Field(default=194.0, description="relative to rest")
-    sodium_reversal_mV: Positive = Field(default=110.0, description="relative to rest")
-    gate_slope_per_mV: Annotated[float, Field(gt=0, le=10)] = Field(
-        default=0.05, description="slope S of the sodium gates"
-    )
-    gate_time_constant_ms: Positive = Field(default=300.0, description="tau_h,max; sets the period: 300, 200 or 100")
     sensor_current_nA: NonNegative = Field(default=20.0, description="current of a stretch sensor that is on")
     kick_nA: NonNegative = Field(default=1.0, description="current into the first contraction neuron at the first step")
     activation: Literal["sigmoid", "linear"] = Field(
@@ -61,8 +52,7 @@ class Sns(ControllerKind):
     )
     activation_slope_per_mV: Positive = Field(default=0.35, description="slope of the sigmoid")
     scheme: Literal["euler", "toolbox", "heun"] = Field(
-        default="euler",
-        description="forward Euler, SNS-Toolbox's order (gates before potentials), or second order",
+        default="euler", description="forward Euler, SNS-Toolbox's order (gates before potentials), or second order"
     )
     gate_start: Literal["steady", "toolbox"] = Field(
         default="steady", description="gates start at h_inf(U), or as SNS-Toolbox starts them"
@@ -74,137 +64,14 @@ class Sns(ControllerKind):
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns the network, and SNS-Toolbox where the steps are in its order."""
+        network = ("riddle2022", "the network"), ("szczecinski2017", "the rules by which synapses are designed")
         toolbox = ("nourse2023", "how the gates start, or the order of their steps")
-        return (*NETWORK_CITES, *((toolbox,) if "toolbox" in (self.scheme, self.gate_start) else ()))
-
-
-def paper_network(controller: ControllerKind) -> Sns | None:
-    """Returns the section of the paper's network: a controller's own or its field ``network``, else None."""
-    network = getattr(controller, "network", controller)
-    return network if isinstance(network, Sns) else None
+        return (*network, toolbox) if "toolbox" in (self.scheme, self.gate_start) else network
 
 
 def paper_controller(controller: ControllerKind) -> Sns | None:
     """Returns a controller's section if it is the paper's network and nothing else, else None."""
     return controller if isinstance(controller, Sns) else None
-
-
-class PeristalsisController(NeuralController, Generic[Config]):
-    """A controller of the paper's network, or of one that extends it, held and let go by stretch sensors.
-
-    One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
-    during the whole step; the activation is read from the potentials at t + dt and drives the body from t on.
-    This is the order of the authors' loop. The kick acts during the first step only.
-
-    Raises:
-        ConfigError: Fewer than 3 segments, muscles that are neither one nor two a segment, network parameters for
-            which a design rule has no solution, or a control step beyond a neuron's time constant.
-    """
-
-    recorded = (
-        *NeuralController.recorded,
-        (
-            "sensor_on",
-            ("segment",),
-            "1",
-            "stretch sensor during the last control step: 1 while the segment is at rest length",
-        ),
-    )
-    _parameters: PeristalsisParameters
-    _every_step_differs = False
-
-    def __init__(
-        self,
-        config: Config,
-        sensor: StretchSensor,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
-    ) -> None:
-        """Builds the controller in its initial state.
-
-        Args:
-            config: Its section of the configuration, which is or has that of the paper's network.
-            sensor: Section of the stretch sensors; their noise is the simulation's business, not used here.
-            n_segments: Segments, at least 3.
-            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
-            control_timestep_s: Step of the network, s.
-        """
-        self._config = config
-        sns = paper_network(config)
-        assert sns is not None
-        self._sns = sns
-        self._parameters = design_of(PeristalsisParameters, sns)
-        self._range_mV, self._full_nA = sns.range_mV, sns.leak_conductance_uS * sns.range_mV
-        super().__init__(
-            self._network(n_segments, control_timestep_s),
-            ROLES,
-            n_segments,
-            n_muscles,
-            control_timestep_s,
-            scheme=sns.scheme,
-            slope_per_mV=sns.activation_slope_per_mV,
-            linear_range_mV=sns.range_mV if sns.activation == "linear" else None,
-        )
-        self._sensor = StretchThreshold(sensor, n_segments)
-        self._inputs_nA = np.zeros(len(self._stepper.arrays.inputs))
-        self.reset(0)
-
-    @abstractmethod
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
-        """Returns the paper's network, with any further neurons and inputs behind its own."""
-
-    def _set_inputs(self, sensation: Sensation, time_s: float) -> None:
-        """Writes the currents of the further inputs behind those of the sensors and the kick."""
-
-    def reset(self, seed: int) -> None:
-        """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
-        self._state = self._stepper.initial_state(self._sns.gate_start)
-        self._sensor.reset()
-        self._n_steps = 0
-
-    def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps, as `NeuralController.stride`."""
-        n_segments, inputs = self._n_segments, self._inputs_nA
-        for n, time_s in self._pieces(self._n_steps, sensation.time_s, n_steps):
-            on = self._sensor.read(sensation.stretch_m, sensation.rest_stretch_m, time_s)
-            np.multiply(on, self._sns.sensor_current_nA, out=inputs[:n_segments])
-            inputs[n_segments] = self._sns.kick_nA if self._n_steps == 0 else 0.0
-            self._set_inputs(sensation, time_s)
-            self._stepper.advance(self._state, inputs, n)
-            self._n_steps += n
-        return self._activation(self._state.potential[0])
-
-    def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
-        """Cuts steps under one sensation where the inputs change: after the kick, and at the end of the hold.
-
-        Returns:
-            For every piece its number of steps and the time at its beginning, s.
-        """
-        held = self._sensor.held_at(time_s)
-        if n_steps == 1 or (n_taken > 0 and not held and not self._every_step_differs):
-            return [(n_steps, time_s)]
-        first = round(time_s / self._timestep_s)
-        times_s = [time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
-        if self._every_step_differs:
-            return [(1, time_s) for time_s in times_s]
-        cuts = {0, n_steps} | ({1} if n_taken == 0 else set())
-        if held:
-            cuts.add(sum(self._sensor.held_at(time) for time in times_s))
-        return [(end - start, times_s[start]) for start, end in pairwise(sorted(cuts))]
-
-    def _values(self) -> Values:
-        return {**super()._values(), "sensor_on": self._sensor.on.astype(np.float64)}
-
-    def get_state(self) -> State:
-        """Returns copies of potentials (mV), gates, sensors and the number of steps taken."""
-        return super().get_state() | {"sensor_on": self._sensor.on.copy(), "n_steps": np.array(self._n_steps)}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        super().set_state(state)
-        self._sensor.on[...] = state["sensor_on"]
-        self._n_steps = int(state["n_steps"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,20 +93,129 @@ class CopySettings:
     @classmethod
     def of(cls, copies: Iterable[Self]) -> Self:
         """Returns those of all copies, each given with one number."""
-        each = [(one.tolerance_m, one.hysteresis_m, one.sensor_current_nA, one.kick_nA) for one in copies]
-        return cls(*np.array(each).reshape(-1, 4).T)
+        return cls(*np.array([astuple(one) for one in copies]).reshape(-1, 4).T)
+
+
+class PeristalsisController(NeuralController, Generic[Config]):
+    """A controller of the paper's network, or of one that extends it, gated by stretch sensors.
+
+    One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
+    during the whole step; the activation is read from the potentials at t + dt and drives the body from t on.
+    This is the order of the authors' loop. The kick acts during the first step only.
+
+    Attributes:
+        own: What may differ between copies that are advanced together.
+
+    Raises:
+        ConfigError: Fewer than 3 segments, muscles that are neither one nor two per segment, network parameters for
+            which a design rule has no solution, or a control step beyond a neuron's time constant.
+    """
+
+    _SENSOR_ON = "stretch sensor during the last control step: 1 while the segment is at rest length"
+    recorded = (*NeuralController.recorded, ("sensor_on", ("segment",), "1", _SENSOR_ON))
+    _every_step_differs = False
+
+    def __init__(
+        self, config: Config, sensor: StretchSensor, n_segments: int, n_muscles: int, control_timestep_s: float
+    ) -> None:
+        """Builds the controller in its initial state.
+
+        Args:
+            config: Its section of the configuration, which is that of the paper's network or has it as ``network``.
+            sensor: Section of the stretch sensors; the simulation adds their noise, which is not used here.
+            n_segments: Segments, at least 3.
+            n_muscles: ``n_segments``, or twice that for half-rings (left, right, segment by segment).
+            control_timestep_s: Step of the network, s.
+        """
+        self._config = config
+        self._sns = sns = cast(Sns, getattr(config, "network", config))
+        self._parameters = design_of(PeristalsisParameters, sns)
+        self._range_mV, self._full_nA = sns.range_mV, sns.leak_conductance_uS * sns.range_mV
+        self._timestep_s = control_timestep_s
+        self._sensor = StretchThreshold(sensor, n_segments)
+        self.own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, sns.sensor_current_nA, sns.kick_nA)
+        super().__init__(
+            self._network(n_segments),
+            peristalsis.ROLES,
+            n_segments,
+            n_muscles,
+            control_timestep_s,
+            scheme=sns.scheme,
+            slope_per_mV=sns.activation_slope_per_mV,
+            linear_range_mV=sns.range_mV if sns.activation == "linear" else None,
+        )
+
+    @abstractmethod
+    def _network(self, n_segments: int) -> Network:
+        """Returns the paper's network, with any further neurons and inputs behind its own."""
+
+    def _time_constant_s(self, field: str) -> float:
+        """A time constant of the section, refused if it is shorter than the control step."""
+        value = float(getattr(self._config, field))
+        if not self._timestep_s <= value:
+            raise ConfigError(
+                f"controller.{field} = {value:g}: must be at least {self._timestep_s:g}, the control timestep"
+            )
+        return value
+
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        """Writes the currents of the inputs behind those of the sensors and the kick, after so many steps."""
+
+    def reset(self, seed: int) -> None:
+        """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
+        off = np.zeros(self._n_segments, dtype=bool)
+        self._start_at(self._stepper.initial_state(self._sns.gate_start), sensor_on=off, n_steps=np.array(0))
+
+    def stride(self, sensation: Sensation, n_steps: int) -> Array:
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
+        for n, inputs_nA in self._inputs(self._now, sensation, n_steps, self.own):
+            self._stepper.advance(self._state, inputs_nA, n)
+        return self._activation(self._state.potential[0])
+
+    def _inputs(
+        self, now: dict[str, NDArray[Any]], sensation: Sensation, n_steps: int, each: CopySettings
+    ) -> Iterator[tuple[int, Array]]:
+        """Yields numbers of steps and the inputs' currents during them, nA, for one network or many copies.
+
+        Replaces ``sensor_on`` and ``n_steps`` of the state. All arrays of copies have one more axis in front.
+        """
+        n_segments, shape = self._n_segments, (len(self._stepper.arrays.inputs),)
+        for n, time_s in self._pieces(int(now["n_steps"]), sensation.time_s, n_steps):
+            lengths, n_taken = (sensation.stretch_m, sensation.rest_stretch_m), int(now["n_steps"])
+            on = self._sensor.reading(now["sensor_on"], *lengths, time_s, each.tolerance_m, each.hysteresis_m)
+            inputs_nA = np.zeros(on.shape[:-1] + shape)
+            inputs_nA[..., :n_segments] = each.sensor_current_nA * on
+            inputs_nA[..., n_segments] = each.kick_nA if n_taken == 0 else 0.0
+            self._set_further(inputs_nA[..., n_segments + 1 :], sensation, time_s, n_taken)
+            yield n, inputs_nA
+            now["sensor_on"], now["n_steps"] = on, np.array(n_taken + n)
+
+    def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
+        """Cuts steps under one sensation where the inputs change: after the kick, and when segment 1 is released.
+
+        Returns the number of steps of every piece, and the time at its beginning, s.
+        """
+        held = self._sensor.held_at(time_s)
+        if n_steps == 1 or (n_taken > 0 and not held and not self._every_step_differs):
+            return [(n_steps, time_s)]
+        first = round(time_s / self._timestep_s)
+        times_s = [time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
+        if self._every_step_differs:
+            return [(1, time_s) for time_s in times_s]
+        cuts = {0, n_steps} | ({1} if n_taken == 0 else set())
+        if held:
+            cuts.add(sum(self._sensor.held_at(time) for time in times_s))
+        return [(end - start, times_s[start]) for start, end in pairwise(sorted(cuts))]
+
+    def _values(self) -> Values:
+        return {**super()._values(), "sensor_on": self._now["sensor_on"].astype(np.float64)}
 
 
 class SnsController(PeristalsisController[Sns]):
     """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023, as `PeristalsisController` does.
 
-    Many copies of it can be advanced at once. A segment's activation is that of
-    `annelid.control.neural.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023, ``"linear"`` as in Riddle et al.
-    2022.
-
-    Attributes:
-        alike: Equal for controllers that can be advanced together as copies.
-        own: What may differ between those.
+    A segment's activation is that of `annelid.control.base.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023,
+    ``"linear"`` as in Riddle et al. 2022. Many copies of it can be advanced at once.
 
     Raises:
         ConfigError: As `PeristalsisController`.
@@ -247,26 +223,18 @@ class SnsController(PeristalsisController[Sns]):
 
     name = "synthetic nervous system"
 
-    def __init__(
-        self,
-        config: Sns,
-        sensor: StretchSensor,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
-    ) -> None:
-        """Builds the controller in its initial state, as `PeristalsisController`."""
-        super().__init__(config, sensor, n_segments, n_muscles, control_timestep_s)
-        self.own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, config.sensor_current_nA, config.kick_nA)
+    @cached_property
+    def alike(self) -> Hashable:
+        """Equal for controllers that can be advanced together as copies, which may differ in `own`."""
         differing = {"sensor_current_nA", "kick_nA"}
-        self.alike: Hashable = config.model_dump_json(exclude=differing), sensor.startup_hold_s
-        drive = (config.sensor_current_nA + config.kick_nA) / config.leak_conductance_uS
-        reversals = config.excitatory_reversal_mV, config.sodium_reversal_mV
-        self._explicable_mV = config.inhibitory_reversal_mV - drive, max(reversals) + drive
-        self._batches: dict[int, tuple[Stepper, NetworkState]] = {}
+        return self._config.model_dump_json(exclude=differing), self._sensor.settings.startup_hold_s
 
-    def _network(self, n_segments: int, control_timestep_s: float) -> Network:
-        return peristalsis_network(n_segments, self._parameters)
+    @cached_property
+    def _batches(self) -> dict[int, tuple[Stepper, NetworkState]]:
+        return {}
+
+    def _network(self, n_segments: int) -> Network:
+        return peristalsis.peristalsis_network(n_segments, self._parameters)
 
     def step_copies(
         self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
@@ -284,44 +252,30 @@ class SnsController(PeristalsisController[Sns]):
             The states that many steps on, and their activation, ``(n_copies, n_muscles)``.
         """
         each = each or self.own
-        tolerance, hysteresis, current = (
-            np.asarray(value)[..., np.newaxis]
-            for value in (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
-        )
-        on = states["sensor_on"].astype(bool)
-        n_copies, n_taken = len(on), int(states["n_steps"])
-        stepper, batch = self._batch(n_copies)
-        batch.potential[:n_copies] = states["potential"][:, 0]
-        batch.gate[:n_copies] = states["gate"][:, 0]
-        inputs = np.zeros((stepper.n_worms, self._n_segments + 1))
-        for n, time_s in self._pieces(n_taken, sensation.time_s, n_steps):
-            lengths = sensation.stretch_m, sensation.rest_stretch_m
-            on = self._sensor.reading(on, *lengths, time_s, tolerance, hysteresis)
-            inputs[:n_copies, :-1] = current * on
-            inputs[:n_copies, -1] = each.kick_nA if n_taken == 0 else 0.0
-            stepper.advance(batch, inputs, n)
-            n_taken += n
-        potential, gate = batch.potential[:n_copies].copy(), batch.gate[:n_copies].copy()
-        after: State = {
-            "potential": potential[:, np.newaxis],
-            "gate": gate[:, np.newaxis],
-            "sensor_on": on,
-            "n_steps": np.array(n_taken),
-        }
-        return after, self._activation(potential)
-
-    def _batch(self, n_copies: int) -> tuple[Stepper, NetworkState]:
-        """A stepper for at least this many copies, and room for their state."""
+        per_segment = (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
+        tolerance, hysteresis, current = (np.asarray(value)[..., np.newaxis] for value in per_segment)
+        each = CopySettings(tolerance, hysteresis, current, each.kick_nA)
+        switches: dict[str, Any] = {"sensor_on": states["sensor_on"].astype(bool), "n_steps": states["n_steps"]}
+        n_copies = len(switches["sensor_on"])
         # Few widths of buffers serve any number of copies.
         width = 1 << (n_copies - 1).bit_length()
         if width not in self._batches:
             own = self._stepper
             stepper = Stepper(own.arrays, own.timestep_ms, own.scheme, width)
             self._batches[width] = stepper, stepper.initial_state(self._sns.gate_start)
-        return self._batches[width]
+        stepper, batch = self._batches[width]
+        batch.potential[:n_copies] = states["potential"][:, 0]
+        batch.gate[:n_copies] = states["gate"][:, 0]
+        of_all = np.zeros((width, self._n_segments + 1))
+        for n, inputs_nA in self._inputs(switches, sensation, n_steps, each):
+            of_all[:n_copies] = inputs_nA
+            stepper.advance(batch, of_all, n)
+        potential, gate = batch.potential[:n_copies].copy(), batch.gate[:n_copies].copy()
+        after: State = {"potential": potential[:, np.newaxis], "gate": gate[:, np.newaxis], **switches}
+        return after, self._activation(potential)
 
     def pieces_copies(self, states: State) -> NDArray[np.bool_]:
-        """Tells in which piece of its piecewise smooth equations each of many copies is.
+        """Finds in which piece of its piecewise smooth equations each of many copies is.
 
         Synapses open between two potentials, and a linear activation saturates: there the equations have kinks.
 
@@ -342,8 +296,10 @@ class SnsController(PeristalsisController[Sns]):
 
     def alarm(self) -> str | None:
         """Returns a sentence if a potential has left the range that currents and reversals can explain."""
-        low, high = self._explicable_mV
-        potential = self._state.potential[0]
+        sns, potential = self._sns, self._state.potential[0]
+        drive = (sns.sensor_current_nA + sns.kick_nA) / sns.leak_conductance_uS
+        low = sns.inhibitory_reversal_mV - drive
+        high = max(sns.excitatory_reversal_mV, sns.sodium_reversal_mV) + drive
         # Written so that NaN fails it.
         if np.minimum.reduce(potential) >= low and np.maximum.reduce(potential) <= high:
             return None
@@ -353,5 +309,157 @@ class SnsController(PeristalsisController[Sns]):
             f"{low:g} .. {high:g} mV: the control timestep of {self._stepper.timestep_ms:g} ms is too long"
         )
 
-    def _attrs(self) -> dict[str, float]:
+    def _attrs(self) -> dict[str, float | int | str]:
         return {f"conductance_{name}_uS": value for name, value in asdict(self._parameters.conductances).items()}
+
+
+class AdaptiveSns(ControllerKind):
+    """The synthetic nervous system with a descending neuron, whose activity sets the rate of all half-centres.
+
+    The wanted activity is ``drive + drive_slope_per_s time + stretch_gain_per_m stretch``, clipped to 0 .. 1, with the
+    mean lengthening of all segments as stretch: a manual, a timed and a sensory drive. The descending neuron follows it
+    with its time constant.
+    """
+
+    sensor_fields = Sns.sensor_fields
+    tuned = (
+        "controller.drive=0:1",
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "sensor.tolerance_m=0.001:0.03:log",
+        "sensor.hysteresis_m=0:0.02",
+    )
+    kind: Literal["adaptive"] = "adaptive"
+    network: Sns = Sns()
+    drive: Share = Field(default=0.0, description="0: the half-centres' slow rhythm; 1: about three times as fast")
+    drive_slope_per_s: Slope = Field(default=0.0, description="change of the manual drive")
+    stretch_gain_per_m: float = Field(
+        default=0.0, ge=-1000, le=1000, description="drive per mean lengthening of the segments"
+    )
+    drive_time_constant_s: TimeConstant = Field(default=0.05, description="of the descending neuron")
+
+    def build(self, config: RunConfig, plant: Plant) -> AdaptiveController:
+        """Builds the controller, as `ControllerKind.build`."""
+        size = plant.n_segments, plant.n_muscles
+        return AdaptiveController(self, config.sensor, *size, config.clock.control_timestep_s)
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns what the network rests on, and its drive."""
+        return (*self.network.cited(), ("nourse", "the idea of half-centres that adapt their rate"))
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the manual drive."""
+        return (Knob("controller.drive", "drive", 1.0, 0.0, 1.0, 0.01, DRIVE_HINT),)
+
+
+class AdaptiveController(PeristalsisController[AdaptiveSns]):
+    """Drives a worm by the peristalsis network with a descending neuron that sets the rate of its half-centres.
+
+    It starts with that neuron silent. The rest, errors too, is as for `annelid.control.SnsController`.
+    """
+
+    name = "synthetic nervous system with a descending drive"
+    recorded = (*PeristalsisController.recorded, ("drive", (), "1", "activity of the descending neuron"))
+
+    def _network(self, n_segments: int) -> Network:
+        self._every_step_differs = self._config.drive_slope_per_s != 0.0
+        tau_ms = 1e3 * self._time_constant_s("drive_time_constant_s")
+        return peristalsis.adaptive_peristalsis_network(n_segments, self._parameters, tau_ms)
+
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        manual = self._config.drive + self._config.drive_slope_per_s * n_taken * self._timestep_s
+        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        drive = manual + self._config.stretch_gain_per_m * float(longer_m.mean())
+        leak, reach = self._parameters.leak_conductance_uS, self._parameters.range_mV
+        inputs_nA[...] = min(max(drive, 0.0), 1.0) * leak * reach
+
+    def _values(self) -> Values:
+        return {**super()._values(), "drive": self._activity(peristalsis.DRIVE_NEURON)}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        return {"conductance_drive_uS": peristalsis.drive_conductance_uS(self._parameters)}
+
+
+class PressureSns(ControllerKind):
+    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
+
+    A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
+    the contraction two segments before; any of the four strengths may be 0. Lengths and loads are those of the
+    six-segment robot (0.16 m radius, 19 N).
+    """
+
+    sensor_fields = Sns.sensor_fields
+    tuned = (
+        "controller.network.gate_time_constant_ms=80:900:log",
+        "controller.hold=0:2",
+        "controller.release=0:6",
+        "controller.landing=0:0.2",
+        "controller.exchange=0:2",
+        "sensor.tolerance_m=0.001:0.03:log",
+    )
+    kind: Literal["sns-pressure"] = "sns-pressure"
+    network: Sns = Sns()
+    light_N: NonNegative = Field(default=2.5, description="load of a segment up to which its pressure neuron rests")
+    full_N: Positive = Field(default=9.0, description="load that drives it to R")
+    extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
+    extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
+    hold: Strength = Field(default=1.0, description="potential over R that full pressure gives its sensory neuron")
+    release: float = Field(
+        default=1.8, ge=0, le=20, description="sensors' currents that a full extension neuron cancels"
+    )
+    landing: Strength = Field(default=0.1, description="potential over R that it gives the sensory neuron before")
+    exchange: Strength = Field(default=0.8, description="potential over R that a contraction gives the one two before")
+    pressure_time_constant_s: float = Field(
+        default=0.03, ge=1e-3, le=10, description="time constant of the pressure neurons"
+    )
+
+    @model_validator(mode="after")
+    def _scales_rise(self) -> Self:
+        for low, high in (("light_N", "full_N"), ("extending_m", "extended_m")):
+            if not getattr(self, low) < getattr(self, high):
+                raise ValueError(
+                    f"controller.{low} = {getattr(self, low):g} must be less than controller.{high} = "
+                    f"{getattr(self, high):g}"
+                )
+        return self
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has a skin that senses pressure."""
+        if not config.body.has_skin:
+            raise ValueError(
+                f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {config.body.kind!r} "
+                "has not; only the 3D worm ('worm') has"
+            )
+
+    def build(self, config: RunConfig, plant: Plant) -> PressureController:
+        """Builds the controller, as `ControllerKind.build`."""
+        size = plant.n_segments, plant.n_muscles
+        return PressureController(self, config.sensor, *size, config.clock.control_timestep_s)
+
+    def cited(self) -> tuple[tuple[str, str], ...]:
+        """Returns what the network rests on, and the feedback."""
+        return (*self.network.cited(), ("daltorio2013", "the aim of feedback from contact"))
+
+
+class PressureController(PeristalsisController[PressureSns]):
+    """Drives a worm by `annelid.nervous.peristalsis.pressure_network`.
+
+    A segment's load is the sum of the normal forces on its four sides, its length the mean of its stretch sensors, both
+    rising linearly from nothing to R. As long as segment 1's stretch sensor is kept off at the start, so is its load.
+    The rest, errors too, is as for `annelid.control.SnsController`.
+    """
+
+    name = "synthetic nervous system with pressure feedback"
+
+    def _network(self, n_segments: int) -> Network:
+        strengths = self._config.model_dump(include={"hold", "release", "landing", "exchange"})
+        tau_ms = 1e3 * self._time_constant_s("pressure_time_constant_s")
+        return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=tau_ms)
+
+    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+        config, longer_m = self._config, lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        loads = (sensation.touch_N.sum(axis=1) - config.light_N) / (config.full_N - config.light_N)
+        extensions = (longer_m - config.extending_m) / (config.extended_m - config.extending_m)
+        inputs_nA[::2] = self._full_nA * np.clip(loads, 0.0, 1.0)
+        inputs_nA[1::2] = self._full_nA * np.clip(extensions, 0.0, 1.0)
+        if self._sensor.held_at(time_s):
+            inputs_nA[0] = 0.0

@@ -1,4 +1,4 @@
-"""The stretch sensor: tells which segments are back at rest length."""
+"""The stretch sensor: which segments are back at rest length."""
 
 from __future__ import annotations
 
@@ -6,20 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.clock import SLACK_S
-from annelid.config.sensor import StretchSensor as StretchSettings
+from annelid.config.run import StretchSensor as StretchSettings
 from annelid.errors import require_at_least
 from annelid.protocols import Array
 
 
 def lengthening_m(stretch_m: Array, rest_stretch_m: Array) -> Array:
-    """Returns by how much each segment's mean length exceeds that at rest.
+    """Returns by how much each segment's mean length exceeds that at rest, m, the same bits for one worm and for many.
 
     Args:
         stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.
         rest_stretch_m: Their lengths at rest, m, same shape.
-
-    Returns:
-        Lengthening, m, shape ``(.., n_segments)``; the same bits for one worm and for many.
     """
     # In one memory layout, whatever that of the lengths: the order of a sum depends on it.
     return np.subtract(stretch_m, rest_stretch_m, order="C").sum(axis=-1) / stretch_m.shape[-1]
@@ -29,9 +26,10 @@ class StretchSensor:
     """A threshold on each segment's mean length, on while it is at most the tolerance beyond rest.
 
     With hysteresis a sensor that is on stays on until the segment is that much longer still. Segment 1's
-    sensor is held off at the start: its network starts contracted, and its body does not. Riddle et al. 2023.
+    sensor is kept off at the start: its network starts contracted, and its body does not. Riddle et al. 2023.
 
     Attributes:
+        settings: Its section of the configuration.
         on: Which segments' sensors are on, shape ``(n_segments,)``; all off before the first reading.
 
     Raises:
@@ -39,11 +37,14 @@ class StretchSensor:
     """
 
     def __init__(self, settings: StretchSettings, n_segments: int) -> None:
-        """Makes a sensor for ``n_segments`` segments from its section of the configuration."""
+        """Makes a sensor.
+
+        Args:
+            settings: Its section of the configuration.
+            n_segments: Segments.
+        """
         require_at_least(1, n_segments=n_segments)
-        self._tolerance_m = settings.tolerance_m
-        self._hysteresis_m = settings.hysteresis_m
-        self._hold_until_s = settings.startup_hold_s - SLACK_S
+        self.settings = settings
         self.on: NDArray[np.bool_] = np.zeros(n_segments, dtype=bool)
 
     def reset(self) -> None:
@@ -51,17 +52,7 @@ class StretchSensor:
         self.on[:] = False
 
     def read(self, stretch_m: Array, rest_stretch_m: Array, time_s: float) -> NDArray[np.bool_]:
-        """Reads the lengths of all segments.
-
-        Args:
-            stretch_m: Lengths of every segment's springs, m, shape ``(n_segments, n_sensors)``.
-            rest_stretch_m: Their lengths at rest, m, same shape.
-            time_s: Simulated time of the reading, s.
-
-        Returns:
-            `on`: true for every segment whose mean length is at most the tolerance (with hysteresis, if it
-            was on) beyond its mean rest length, ``(n_segments,)``; a new array.
-        """
+        """Reads the lengths of all segments, as `reading`, and remembers the result in `on`."""
         self.on = self.reading(self.on, stretch_m, rest_stretch_m, time_s)
         return self.on.copy()
 
@@ -74,7 +65,7 @@ class StretchSensor:
         tolerance_m: float | Array | None = None,
         hysteresis_m: float | Array | None = None,
     ) -> NDArray[np.bool_]:
-        """Tells what `read` reads from lengths, without remembering it; any number of worms at once.
+        """Returns which sensors are on, of any number of worms at once.
 
         Args:
             before: Which sensors were on at the reading before, ``(.., n_segments)``.
@@ -82,22 +73,20 @@ class StretchSensor:
             rest_stretch_m: Their lengths at rest, m, same shape.
             time_s: Simulated time of the reading, s.
             tolerance_m: Instead of the sensor's own, m: a number, or an array that broadcasts against the result,
-                such as ``(n_worms, 1)`` for one a worm.
+                such as ``(n_worms, 1)`` for one per worm.
             hysteresis_m: Likewise.
 
         Returns:
-            Shape ``(.., n_segments)``.
+            True for every segment whose mean length is at most the tolerance (with hysteresis, if it was on) beyond its
+            mean rest length, ``(.., n_segments)``.
         """
-        tolerance = self._tolerance_m if tolerance_m is None else tolerance_m
-        hysteresis = self._hysteresis_m if hysteresis_m is None else hysteresis_m
+        tolerance = self.settings.tolerance_m if tolerance_m is None else tolerance_m
+        hysteresis = self.settings.hysteresis_m if hysteresis_m is None else hysteresis_m
         on = lengthening_m(stretch_m, rest_stretch_m) <= tolerance + hysteresis * before
         if self.held_at(time_s):
             on[..., 0] = False
         return on
 
     def held_at(self, time_s: float) -> bool:
-        """Tells whether segment 1's sensor is held off at a time, s.
-
-        While this and the lengths stay the same, a second reading gives what the first one gave.
-        """
-        return time_s < self._hold_until_s
+        """Whether segment 1's sensor is kept off at a time, s; while this and the lengths stay, so does the reading."""
+        return time_s < self.settings.startup_hold_s - SLACK_S

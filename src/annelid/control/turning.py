@@ -1,17 +1,31 @@
-"""Turning, as a modifier of any controller: the activation of the two sides is scaled on its way to the muscles."""
+"""Turning, as a modifier of any controller: the activation of the two sides is scaled before it drives the muscles.
+
+What scales it are descending neurons that follow a wanted modulation, or touch.
+"""
 
 from __future__ import annotations
 
+import math
+from abc import abstractmethod
 from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from annelid.config.kinds import TurningKind
-from annelid.control.base import SegmentController
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from annelid.clock import SLACK_S
+from annelid.config.kinds import Goals, TurningKind
+from annelid.config.sections import NonNegative, Positive
+from annelid.control.base import Level, SegmentController, TimeConstant
 from annelid.errors import ConfigError
 from annelid.protocols import (
+    SIDES,
     Array,
     Controller,
     Recordable,
     Records,
+    SavedAndRecorded,
     Sensation,
     Signal,
     State,
@@ -21,45 +35,264 @@ from annelid.protocols import (
     Watched,
 )
 
+if TYPE_CHECKING:
+    from annelid.config.run import RunConfig
+
+Modulation = Annotated[float, Field(ge=-1, le=1)]
+Waypoint = tuple[Annotated[float, Field(ge=-1e4, le=1e4)], Annotated[float, Field(ge=-1e4, le=1e4)]]
+Now = dict[str, NDArray[Any]]
+"""All that the next step of a turning depends on."""
 HALVES = ("left", "right")
-_PATTERN, _STEERING = "pattern_", "turning_"
+LEFT, RIGHT = SIDES.index("left"), SIDES.index("right")
+
+
+def heading_angle(heading: Array) -> float:
+    """Returns the direction of a heading on the floor, rad: 0 towards -x, positive to the worm's left, towards -y."""
+    return math.atan2(-float(heading[1]), -float(heading[0]))
+
+
+def wrapped(angle_rad: float) -> float:
+    """Returns an angle in [-pi, pi)."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def half_scales(modulation: ArrayLike) -> Array:
+    """Returns what modulations m in [-1, 1] leave of the left and the right activation, shape ``(.., 2)``."""
+    m = np.asarray(modulation, dtype=float)
+    return np.stack([1.0 - np.maximum(m, 0.0), 1.0 - np.maximum(-m, 0.0)], axis=-1)
+
+
+class SteeringKind(TurningKind):
+    """A turning by a rule that changes a state of its own at every control step."""
+
+    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
+        """Builds the steering, as `TurningKind.build`."""
+        return Steering(self, n_segments, control_timestep_s)
+
+    @abstractmethod
+    def _at_start(self) -> Now:
+        """The state with which both sides are whole."""
+
+    @abstractmethod
+    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+        """Takes one control step, in place; refuses a body that cannot sense what the rule needs."""
+
+    @abstractmethod
+    def _scales(self, now: Now, n_segments: int) -> Array:
+        """What is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
+
+
+class Descending(SteeringKind):
+    """What turning by descending neurons has in common: a modulation that they follow.
+
+    A modulation m in [-1, 1] scales a segment's left activation by ``1 - max(m, 0)`` and its right one by
+    ``1 - max(-m, 0)``, so that it bends to the left where m is positive. Of two leaky neurons, one per side, the wanted
+    modulation drives one; m is their activity. A step is exact for a drive that is constant during it. A segment with a
+    negative share of m bends in the opposite direction.
+    """
+
+    shares: tuple[Modulation, ...] | None = Field(
+        default=None, description="of the modulation for each segment; default 1 each"
+    )
+    descending_time_constant_s: TimeConstant = Field(default=0.2, description="of the descending neurons")
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has two sides, and that each segment has its share."""
+        super().check_with(config)
+        n_segments = config.body.n_segments
+        if self.shares is not None and len(self.shares) != n_segments:
+            raise ValueError(f"turning.shares has {len(self.shares)} entries: must have {n_segments}, one per segment")
+
+    @abstractmethod
+    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+        """The modulation that is wanted during a control step, in [-1, 1]; may change the state."""
+
+    def _at_start(self) -> Now:
+        return {"modulation": np.array(0.0)}
+
+    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+        wanted = self._wanted(now, sensation, timestep_s)
+        keeps = math.exp(-timestep_s / self.descending_time_constant_s)
+        now["modulation"][...] = wanted + (float(now["modulation"]) - wanted) * keeps
+
+    def _scales(self, now: Now, n_segments: int) -> Array:
+        return half_scales(float(now["modulation"]) * np.array(self.shares or [1.0] * n_segments))
+
+
+class ConstantTurning(Descending):
+    """A constant modulation: the worm crawls in a circle."""
+
+    kind: Literal["constant"] = "constant"
+    modulation: Modulation = Field(default=0.0, description="wanted modulation: 1 silences the left side, -1 the right")
+
+    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+        return self.modulation
+
+
+class Steered(Descending):
+    """Proportional and derivative control of the heading, whose output is the wanted modulation.
+
+    It is ``gain error - rate_gain rate``, clipped. The rate of the heading is what a filter of first order lags behind
+    it, over the filter's time constant: it averages over the swings of a cycle.
+    """
+
+    gain_per_rad: NonNegative = Field(default=3.0, description="modulation per error of the heading")
+    rate_gain_s: NonNegative = Field(default=1.0, description="modulation taken off per rate of the heading, s per rad")
+    rate_time_constant_s: Positive = Field(default=2.0, description="of the rate's filter; about one cycle")
+    largest_modulation: Level = Field(default=0.9, description="size of the modulation that is never exceeded")
+
+    @abstractmethod
+    def _target(self, now: Now, sensation: Sensation) -> float | None:
+        """The wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
+
+    def _at_start(self) -> Now:
+        # The headings at the start, at the latest step, and filtered.
+        return super()._at_start() | {"headings": np.full(3, np.nan)}
+
+    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+        heading = heading_angle(sensation.heading)
+        if math.isnan(heading):
+            raise ConfigError("steering needs a body that senses its heading, and this one does not")
+        if math.isnan(now["headings"][0]):
+            now["headings"][:] = heading
+        first, angle, smooth = now["headings"].tolist()
+        # Unwrapped, so that the filter does not jump.
+        angle += wrapped(heading - angle)
+        rate = (angle - smooth) / self.rate_time_constant_s
+        smooth += -math.expm1(-timestep_s / self.rate_time_constant_s) * (angle - smooth)
+        now["headings"][:] = first, angle, smooth
+        target = self._target(now, sensation)
+        if target is None:
+            return 0.0
+        modulation = self.gain_per_rad * wrapped(target - angle) - self.rate_gain_s * rate
+        return min(max(modulation, -self.largest_modulation), self.largest_modulation)
+
+
+class HeadingTurning(Steered):
+    """Steering to a heading: the direction from the last ring to the foremost."""
+
+    kind: Literal["heading"] = "heading"
+    heading_deg: float = Field(
+        default=0.0, ge=-180, le=180, description="relative to that at the start, positive to the left"
+    )
+
+    def _target(self, now: Now, sensation: Sensation) -> float:
+        return float(now["headings"][0]) + math.radians(self.heading_deg)
+
+
+class CourseTurning(Steered):
+    """Steering to one waypoint after another; behind the last one the worm crawls on unsteered."""
+
+    kind: Literal["course"] = "course"
+    waypoints: tuple[Waypoint, ...] = Field(
+        min_length=1,
+        description="x and y of each, m, in the coordinates of the run file: a worm with body.heading_deg = 0 starts "
+        "along 0 <= x <= its length, leads towards -x, and its left is -y",
+    )
+    reach_m: Positive = Field(default=0.3, description="a waypoint counts once the foremost ring is this near to it")
+
+    @property
+    def goals(self) -> Goals:
+        """The waypoints."""
+        return Goals(self.waypoints, self.reach_m)
+
+    def _at_start(self) -> Now:
+        return super()._at_start() | {"n_reached": np.array(0)}
+
+    def _target(self, now: Now, sensation: Sensation) -> float | None:
+        for x, y in self.waypoints[max(int(now["n_reached"]), 0) :]:
+            away = np.array([x - sensation.front_m[0], y - sensation.front_m[1], 0.0])
+            if math.hypot(*away) > self.reach_m:
+                return heading_angle(away)
+            now["n_reached"] += 1
+        return None
+
+
+class TouchTurning(SteeringKind):
+    """Turning away from contact, as the authors published it.
+
+    f is the force on the right of the foremost segment minus that on its left. ``|f| > arm_N`` starts a timer of
+    ``hold_s``. While it runs and ``|f| >= least_N``, the side away from contact is scaled by
+    ``max((full_N - |f|) / full_N, 0)``, of which the smallest so far applies. When it has run out both sides are whole
+    again, and only then can it start anew. A scale changes by at most ``rate_per_s``.
+    """
+
+    cites = (("riddle2025models", "turning away from contact"),)
+    kind: Literal["touch"] = "touch"
+    arm_N: NonNegative = Field(default=2.0, description="difference of the front's touch that starts the timer")
+    hold_s: Positive = Field(default=6.0, description="time of the timer")
+    least_N: NonNegative = Field(default=1.0, description="difference below which a running timer scales nothing")
+    full_N: Positive = Field(default=15.0, description="difference at which a side is silenced")
+    rate_per_s: Positive = Field(default=10.0, description="fastest change of a scale")
+
+    def _at_start(self) -> Now:
+        return {"timer": np.array(0.0), "latched": np.ones(2), "scales": np.ones(2)}
+
+    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+        if not len(sensation.touch_N):
+            raise ConfigError("turning.kind = 'touch' needs a body that senses touch on the sides of its segments")
+        difference_N = float(sensation.touch_N[0, RIGHT] - sensation.touch_N[0, LEFT])
+        size, latched = abs(difference_N), now["latched"]
+        if now["timer"] <= SLACK_S:
+            latched[:] = 1.0
+            now["timer"][...] = self.hold_s if size > self.arm_N else 0.0
+        if now["timer"] > SLACK_S:
+            if size >= self.least_N:
+                away = 0 if difference_N > 0 else 1
+                latched[away] = min(latched[away], max((self.full_N - size) / self.full_N, 0.0))
+            now["timer"] -= timestep_s
+        reach = self.rate_per_s * timestep_s
+        now["scales"] += np.clip(latched - now["scales"], -reach, reach)
+
+    def _scales(self, now: Now, n_segments: int) -> Array:
+        return np.tile(now["scales"], (n_segments, 1))
+
+
+class Steering(SavedAndRecorded):
+    """What is left of the activation of the two halves of every ring, at every control step."""
+
+    def __init__(self, rule: SteeringKind, n_segments: int, control_timestep_s: float) -> None:
+        """Begins with all halves whole, by the rule of its section of the configuration."""
+        self._rule, self._n_segments, self._timestep_s = rule, n_segments, control_timestep_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Returns to the initial state: all halves whole."""
+        self._now = self._rule._at_start()
+
+    def advance(self, sensation: Sensation, n_steps: int) -> Array:
+        """Takes control steps with the same sensation but for its time, and returns `scales`."""
+        for _ in range(n_steps):
+            self._rule._advance(self._now, sensation, self._timestep_s)
+        return self.scales()
+
+    def scales(self) -> Array:
+        """Returns the scales after the latest step, in [0, 1], ``(n_segments, 2)``: left and right half."""
+        return self._rule._scales(self._now, self._n_segments)
 
 
 class TurningController(SegmentController):
     """A controller whose pattern another one makes, and whose sides a steering scales.
 
-    The pattern neither knows nor feels that it is scaled, but through the body: its rhythm is its own.
+    The pattern senses that it is scaled only through the body: its rhythm is its own.
 
     Raises:
         ConfigError: Whole rings, or a pattern whose state cannot be saved.
     """
 
     def __init__(
-        self,
-        pattern: Controller,
-        section: TurningKind,
-        n_segments: int,
-        n_muscles: int,
-        control_timestep_s: float,
+        self, pattern: Controller, section: TurningKind, n_segments: int, n_muscles: int, control_timestep_s: float
     ) -> None:
-        """Wraps a pattern.
-
-        Args:
-            pattern: The controller that makes it, for ``n_muscles``.
-            section: How the worm turns.
-            n_segments: Segments.
-            n_muscles: Twice that: left, right, segment by segment.
-            control_timestep_s: Control step, s.
-        """
+        """Wraps the controller that makes the pattern for all ``n_muscles``."""
         super().__init__(n_segments, n_muscles)
         if self._muscles_per_segment != len(HALVES):
             raise ConfigError(f"turning needs half-rings: {2 * n_segments} muscles, not {n_muscles}")
         if not isinstance(pattern, Stateful):
             raise ConfigError(f"turning needs a pattern whose state can be saved, not {type(pattern).__name__}")
         self._pattern = pattern
-        self._stateful: Stateful = pattern
         self._kind = section.kind
         self._steering = section.build(n_segments, control_timestep_s)
+        self._parts: dict[str, Stateful] = {"pattern_": pattern, "turning_": self._steering}
         self._timestep_s = control_timestep_s
 
     def reset(self, seed: int) -> None:
@@ -72,15 +305,7 @@ class TurningController(SegmentController):
         return self.stride(sensation, 1)
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by control steps that feel the same but for their times; the same bits as so many of `step`.
-
-        Args:
-            sensation: What the body feels at the beginning of the first step.
-            n_steps: Control steps, at least 1.
-
-        Returns:
-            Activation of every muscle in [0, 1] after the last step, ``(n_muscles,)``.
-        """
+        """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
         scales = self._steering.advance(sensation, n_steps)
         if isinstance(self._pattern, StridingController):
             activation = self._pattern.stride(sensation, n_steps)
@@ -111,15 +336,12 @@ class TurningController(SegmentController):
 
     def get_state(self) -> State:
         """Returns the states of pattern and steering."""
-        pattern = {f"{_PATTERN}{name}": value for name, value in self._stateful.get_state().items()}
-        return pattern | {f"{_STEERING}{name}": value for name, value in self._steering.get_state().items()}
+        return {start + name: each for start, part in self._parts.items() for name, each in part.get_state().items()}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
-        for prefix, part in ((_PATTERN, self._stateful), (_STEERING, self._steering)):
-            part.set_state(
-                {name.removeprefix(prefix): value for name, value in state.items() if name.startswith(prefix)}
-            )
+        for start, part in self._parts.items():
+            part.set_state({name.removeprefix(start): each for name, each in state.items() if name.startswith(start)})
 
     def alarm(self) -> str | None:
         """Returns the pattern's alarm."""

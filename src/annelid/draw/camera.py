@@ -17,23 +17,17 @@ VIEWS_DEG = {
     "course": (90.0, -89.0),
 }
 """Azimuth and elevation of the line of sight; the first segment starts on the left, or nearest."""
-FIXED = frozenset({"course"})
-"""Views that stand still and show the whole course; the others follow the worm."""
+FIXED = frozenset({"course"})  # views that stand still and show the whole course; the others follow the worm
 
 FIELD_OF_VIEW_DEG = 30.0
-MARGIN = 0.84
-"""Share of the picture that the worm may fill: 8 % stay free on each side."""
+MARGIN = 0.84  # share of the picture that the worm may fill: 8 % stay free on each side
 
 
 def view_angles(name: str, heading_deg: float = 0.0) -> tuple[float, float]:
-    """Returns azimuth and elevation of a named view, degrees.
-
-    Args:
-        name: One of `VIEWS_DEG`.
-        heading_deg: Heading of the worm at the start, which all views but the fixed ones turn with.
+    """Returns azimuth and elevation of a named view, degrees; all but the fixed ones turn with the initial heading.
 
     Raises:
-        RunFileError: No view has that name; the sentence suggests the nearest.
+        RunFileError: No view has that name.
     """
     if name not in VIEWS_DEG:
         raise RunFileError(f"unknown camera {name!r}: {suggest(name, VIEWS_DEG)}")
@@ -63,12 +57,7 @@ def fitting_distance(offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: fl
 def picture_axes(
     azimuth_deg: float, elevation_deg: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the unit vectors of a view: to the right and up in the picture, and along the line of sight.
-
-    Args:
-        azimuth_deg: Direction of sight, about z.
-        elevation_deg: Direction of sight, negative when looking down.
-    """
+    """Returns the unit vectors of a view: to the right and up in the picture, and along the line of sight."""
     azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
     level = math.cos(elevation)
     sight = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
@@ -79,14 +68,7 @@ def picture_axes(
 def picture_points(
     offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: float, distance_m: float, aspect: float
 ) -> NDArray[np.float64]:
-    """Finds where points appear in a perspective picture.
-
-    Args:
-        offsets_m: Points relative to the one that the camera looks at, m, shape ``(..., 3)``.
-        azimuth_deg: Direction of sight, about z.
-        elevation_deg: Direction of sight, negative when looking down.
-        distance_m: From the camera to the point looked at.
-        aspect: Width over height of the picture.
+    """Finds where points, ``(..., 3)``, appear in a perspective picture; arguments are those of `fitting_distance`.
 
     Returns:
         Places as shares of the picture's width and height from its upper left corner, shape ``(..., 2)``.

@@ -7,33 +7,21 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame, render_video
 from annelid.errors import AnnelidError
+from annelid.simulation.runfile import Run
 
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
-
-FRAME_TIME_S = 1.5
-"""Time of the frame, as in the paper's Fig. 8; half of the run where it is shorter."""
+FRAME_TIME_S = 1.5  # time of the frame, as in the paper's Fig. 8; half of the run where it is shorter
 BAR_AFTER_S = 2.0
 VIDEO_TASK = "drawing the video"
 
 
 def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
-    """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``.
+    """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``, and yields the path of each once it is written.
 
-    Args:
-        run: The run.
-        folder: Where the pictures go; those of an earlier run there are replaced.
-        video: Whether to draw the video.
-        quiet: Whether to do without a progress bar.
-        complain: Called at the end with one sentence for each reason for which pictures could not be drawn.
-
-    Yields:
-        The path of each picture once it is written.
+    At the end ``complain`` is called with one sentence for each reason for which pictures could not be drawn.
     """
     times = run.data["time"].values
     frame_time = FRAME_TIME_S

@@ -13,8 +13,9 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from functools import cache
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 INSTALL_LINE = "apt install libosmesa6"
 """What installs a back-end that needs neither a graphics card nor a screen (Debian, Ubuntu)."""
-
 UNSET = "unset MUJOCO_GL"
 _OFF = {"disable", "disabled", "off", "false", "0"}
 _DEFAULT = {"", "enable", "enabled", "on", "true", "1"}
@@ -35,11 +35,7 @@ _PROBE_LIMIT_S = 60.0
 
 
 def candidates(environment: Mapping[str, str], system: str) -> list[str]:
-    """Returns the back-ends worth trying, best first.
-
-    Args:
-        environment: Environment variables, of which ``MUJOCO_GL`` decides if it names a back-end.
-        system: Operating system as `platform.system` calls it.
+    """Returns the back-ends worth trying, best first, on a system as `platform.system` calls it.
 
     Raises:
         RenderingUnavailable: ``MUJOCO_GL`` switches rendering off or names no back-end.
@@ -63,17 +59,11 @@ def candidates(environment: Mapping[str, str], system: str) -> list[str]:
 
 @cache
 def works(backend: str) -> bool:
-    """Tells whether a back-end draws a picture, tried in a process of its own."""
+    """Whether a back-end draws a picture, tried in a process of its own."""
+    command = [sys.executable, "-m", "annelid.draw.gl", backend]
     environment = {**os.environ, "MUJOCO_GL": backend}
     try:
-        probe = subprocess.run(
-            [sys.executable, "-m", "annelid.draw.gl", backend],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            timeout=_PROBE_LIMIT_S,
-            check=False,
-        )
+        probe = subprocess.run(command, env=environment, capture_output=True, timeout=_PROBE_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired):
         return False
     return probe.returncode == 0
@@ -99,98 +89,77 @@ def find_backend() -> str:
     raise RenderingUnavailable(f"no OpenGL back-end works here (tried {', '.join(tried)}): {remedy}")
 
 
-class Canvas:
-    """An off-screen picture of a MuJoCo model, used as a context manager.
+class Canvas(AbstractContextManager):
+    """An off-screen picture of a MuJoCo model, whose off-screen size and sampling are set here, from a free camera.
 
     Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
-    the back-end that `find_backend` chose.
+    the back-end that `find_backend` chose. Shadows and smooth edges (``fine``) cost ten times the time where software
+    draws. ``upright`` is the rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``.
     """
 
-    def __init__(self, model: mujoco.MjModel, width: int, height: int, backend: str, *, fine: bool = True) -> None:
-        """Keeps what `__enter__` opens.
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        width: int,
+        height: int,
+        backend: str,
+        *,
+        fine: bool = True,
+        upright: NDArray[np.float64] | None = None,
+    ) -> None:
+        import mujoco
 
-        Args:
-            model: The model; its off-screen size and sampling are set here.
-            width: Pixels.
-            height: Pixels.
-            backend: What `find_backend` returned.
-            fine: Shadows and smooth edges, which cost ten times the time where software draws.
-        """
         model.vis.global_.offwidth = width
         model.vis.global_.offheight = height
         model.vis.quality.offsamples = 4 if fine else 0
-        self._model = model
-        self._fine = fine
-        self._size = (width, height)
-        self._backend = backend
+        self._model, self._size, self._upright = model, (width, height), upright
+        self.camera = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(model, self.camera)
+        # The rings stand for the actuators.
+        self._option = mujoco.MjvOption()
+        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
         self._context: Any = None
         self._buffers: Any = None
-
-    def __enter__(self) -> Self:
-        import mujoco
-
         try:
-            module = importlib.import_module(f"mujoco.{_MODULES[self._backend]}")
-            self._context = module.GLContext(*self._size)
+            module = importlib.import_module(f"mujoco.{_MODULES[backend]}")
+            self._context = module.GLContext(width, height)
             self._context.make_current()
-            self._buffers = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+            self._buffers = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
         except (ImportError, AttributeError, RuntimeError, OSError, mujoco.FatalError) as error:
             self.close()
-            raise RenderingUnavailable(f"the OpenGL back-end {self._backend} failed: {error}") from error
+            raise RenderingUnavailable(f"the OpenGL back-end {backend} failed: {error}") from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._buffers)
-        self._scene = mujoco.MjvScene(self._model, maxgeom=50_000)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = self._fine
+        self._scene = mujoco.MjvScene(model, maxgeom=50_000)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = fine
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
         """Frees the back-end."""
-        if self._buffers is not None:
-            self._buffers.free()
-            self._buffers = None
-        if self._context is not None:
-            self._context.free()
-            self._context = None
+        for part in (self._buffers, self._context):
+            if part is not None:
+                part.free()
+        self._buffers = self._context = None
 
-    def draw(
-        self,
-        data: mujoco.MjData,
-        camera: mujoco.MjvCamera,
-        option: mujoco.MjvOption,
-        caption: str = "",
-        *,
-        upright: NDArray[np.float64] | None = None,
-    ) -> NDArray[np.uint8]:
-        """Draws the model in its present posture.
-
-        Args:
-            data: The posture; kinematics up to the tendons must be up to date.
-            camera: Where it is seen from.
-            option: What is shown.
-            caption: Words in the lower left corner.
-            upright: Rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``; by
-                default the same.
-
-        Returns:
-            Pixels, shape ``(height, width, 3)``.
-        """
+    def draw(self, data: mujoco.MjData, caption: str = "") -> NDArray[np.uint8]:
+        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``."""
         import mujoco
 
-        width, height = self._size
+        model, camera, scene = self._model, self.camera, self._scene
         # Another canvas may have been opened in between.
         self._context.make_current()
-        mujoco.mjv_updateScene(self._model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene)
-        if upright is not None:
-            for eye in self._scene.camera:
-                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ upright
-                eye.forward, eye.up = eye.forward @ upright, eye.up @ upright
+        mujoco.mjv_updateScene(model, data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
+        if self._upright is not None:
+            for eye in scene.camera:
+                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ self._upright
+                eye.forward, eye.up = eye.forward @ self._upright, eye.up @ self._upright
+        width, height = self._size
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         view = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(view, self._scene, self._buffers)
+        mujoco.mjr_render(view, scene, self._buffers)
         if caption:
             corner = mujoco.mjtGridPos.mjGRID_BOTTOMLEFT
             mujoco.mjr_overlay(mujoco.mjtFont.mjFONT_NORMAL, corner, view, caption, "", self._buffers)
@@ -199,7 +168,7 @@ class Canvas:
 
 
 def _probe(backend: str) -> bool:
-    """Draws a lit ball and tells whether anything showed up."""
+    """Draws a lit ball and sees whether anything shows up."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(
@@ -207,10 +176,8 @@ def _probe(backend: str) -> bool:
     )
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
-    mujoco.mjv_defaultFreeCamera(model, camera)
     with Canvas(model, 32, 32, backend) as canvas:
-        return bool(np.any(canvas.draw(data, camera, mujoco.MjvOption())))
+        return bool(np.any(canvas.draw(data)))
 
 
 if __name__ == "__main__":

@@ -25,10 +25,8 @@ BADGES = {
     "not testable here": "open",
 }
 """The first words of a verdict, and the class of its badge; the first that fits counts."""
-
 # A cell of so few characters, such as an order 1-2-3, stays on one line.
 _SHORT = 12
-
 _SKELETON = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -49,7 +47,6 @@ _SKELETON = """<!DOCTYPE html>
 </body>
 </html>
 """
-
 # These read what markdown-it writes of text whose own angle brackets are escaped, so a tag is always a tag.
 _PICTURE = re.compile(r"<p>(<img [^>]*>)</p>\s*<p>(.*?)</p>", re.DOTALL)
 _NUMBERED = re.compile(r"<table>\s*<thead>\s*<tr>\s*<th[^>]*>#</th>.*?</table>\s*<ol.*?</ol>", re.DOTALL)
@@ -94,7 +91,8 @@ def _html(markdown: str, folder: Path) -> str:
             opening.attrSet("class", "short")
         for child in inline.children or ():
             if child.type == "image":
-                child.attrSet("src", _data_uri(folder / unquote(str(child.attrGet("src")))))
+                picture = (folder / unquote(str(child.attrGet("src")))).read_bytes()
+                child.attrSet("src", f"data:image/png;base64,{base64.b64encode(picture).decode()}")
     html: str = reader.renderer.render(tokens, reader.options, {})
     html = _PICTURE.sub(r"<figure>\n\1\n<figcaption>\2</figcaption>\n</figure>", html)
     html = _NUMBERED.sub(_with_notes, html)
@@ -105,24 +103,18 @@ def _text(inline: Token) -> str:
     return "".join(child.content for child in inline.children or ())
 
 
-def _data_uri(picture: Path) -> str:
-    return f"data:image/png;base64,{base64.b64encode(picture.read_bytes()).decode()}"
-
-
 def _with_notes(match: re.Match[str]) -> str:
     """Returns a table of numbered rows with the items of the list after it below its rows."""
     rows, _, notes = match[0].partition("</table>")
     header, *body = [_CELL.findall(row) for row in _ROW.findall(rows)]
-    groups = [_group(header, cells, note) for cells, note in zip(body, _ITEM.findall(notes), strict=True)]
+    groups = []
+    for cells, note in zip(body, _ITEM.findall(notes), strict=True):
+        named = zip(header, cells, strict=True)
+        row = "".join(f'<td data-name="{name}">{_badge(name, text)}</td>' for name, text in named)
+        below = f'<td></td><td colspan="{len(header) - 1}">{note.strip()}</td>'
+        groups.append(f'<tbody id="claim-{cells[0]}">\n<tr>{row}</tr>\n<tr class="note">{below}</tr>\n</tbody>')
     head = "".join(f"<th>{name}</th>" for name in header)
     return "\n".join(['<table class="claims">', f"<thead><tr>{head}</tr></thead>", *groups, "</table>"])
-
-
-def _group(header: list[str], cells: list[str], note: str) -> str:
-    named = zip(header, cells, strict=True)
-    row = "".join(f'<td data-name="{name}">{_badge(name, text)}</td>' for name, text in named)
-    below = f'<td></td><td colspan="{len(header) - 1}">{note.strip()}</td>'
-    return f'<tbody id="claim-{cells[0]}">\n<tr>{row}</tr>\n<tr class="note">{below}</tr>\n</tbody>'
 
 
 def _badge(column: str, text: str) -> str:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.draw.style import STYLE, activation_color
+from annelid.draw.canvas import activation_color, canvas
 from annelid.errors import RunFileError
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
-    from matplotlib.patches import Polygon
     from matplotlib.text import Text
-
-    from annelid.simulation.runfile import Run
 
 _DPI = 100
 _CM = 100.0
@@ -23,8 +22,8 @@ _ROOM = 1.08
 _WALL = "0.75"
 
 
-class PlanarScene:
-    """Pictures of a planar worm's run, used as a context manager like `WormScene`.
+class PlanarScene(AbstractContextManager):
+    """Pictures of a planar worm's run, ``width`` and ``height`` in pixels.
 
     Each segment is a rhombus, from segment 1 on the left, coloured by its activation. A worm that has forces is drawn
     where it is, with its sides bent as they are and the walls of its pipe; a kinematic one has nothing to push
@@ -32,11 +31,8 @@ class PlanarScene:
     """
 
     def __init__(self, run: Run, width: int, height: int) -> None:
-        """Takes the run's lengths and heights; ``width`` and ``height`` in pixels.
+        from matplotlib.patches import Polygon
 
-        Raises:
-            RunFileError: The run holds no samples.
-        """
         data = run.data
         if data.sizes.get("time", 0) == 0:
             raise RunFileError(f"{run.path} holds no samples to draw")
@@ -45,30 +41,18 @@ class PlanarScene:
         self._heights = _CM * data["ring_length"].values
         self._outline = _CM * data["outline"].values if "outline" in data else None
         self._activation = data["activation"].values
-        self._size = (width, height)
-        distance_m = run.config.body.wall_distance_m
-        self._wall_height = None if distance_m is None else _CM * distance_m / 2
-
-    def __enter__(self) -> Self:
-        import matplotlib
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-        from matplotlib.patches import Polygon
-
-        width, height = self._size
-        with matplotlib.rc_context(STYLE):
-            figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, layout="constrained")
-            self._canvas = FigureCanvasAgg(figure)
-            axes = figure.add_subplot()
-            axes.set_aspect("equal")
-            axes.set_xlabel("along the body (cm)" if self._outline is None else "x (cm)")
-            axes.set_ylabel("height (cm)")
-            axes.set_xlim(*self._extent())
+        with canvas(height / _DPI, width / _DPI) as figure:
+            figure.set_dpi(_DPI)
+            self._canvas: Any = figure.canvas
+            self._axes = axes = figure.add_subplot()
+            xlabel = "along the body (cm)" if self._outline is None else "x (cm)"
+            axes.set(aspect="equal", xlabel=xlabel, ylabel="height (cm)", xlim=self._extent())
             half_height = _ROOM * self._heights.max() / 2
-            if self._wall_height is not None:
-                half_height = max(half_height, 1.25 * self._wall_height)
-                axes.axhspan(self._wall_height, 2 * half_height, color=_WALL, linewidth=0, zorder=0)
-                axes.axhspan(-2 * half_height, -self._wall_height, color=_WALL, linewidth=0, zorder=0)
+            if (distance_m := run.config.body.wall_distance_m) is not None:
+                wall_height = _CM * distance_m / 2
+                half_height = max(half_height, 1.25 * wall_height)
+                axes.axhspan(wall_height, 2 * half_height, color=_WALL, linewidth=0, zorder=0)
+                axes.axhspan(-2 * half_height, -wall_height, color=_WALL, linewidth=0, zorder=0)
             axes.set_ylim(-half_height, half_height)
             self._title = axes.set_title(" ", animated=True)
             look: dict[str, Any] = {"ha": "center", "va": "center", "color": "w", "size": 13, "weight": "bold"}
@@ -80,22 +64,16 @@ class PlanarScene:
             self._canvas.draw()
         # Axes and grid stay as they are, so each picture redraws the worm only: a tenth of the time.
         self._background = self._canvas.copy_from_bbox(figure.bbox)
-        self._axes = axes
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._canvas.figure.clear()
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
-        """Draws one recorded sample.
-
-        Args:
-            frame: Index along the run's ``time`` dimension.
-
-        Returns:
-            Pixels, shape ``(height, width, 3)``.
-        """
-        corners = self._corners(frame)
+        """Draws one recorded sample, as pixels of shape ``(height, width, 3)``."""
+        if self._outline is None:
+            corners = rhombi(self._lengths[frame], self._heights[frame])
+        else:
+            corners = bent_rhombi(self._outline[frame], len(self._rhombi))
         for i, (patch, label) in enumerate(self._rhombi):
             patch.set_xy(corners[i])
             patch.set_facecolor(activation_color(float(self._activation[frame, i])))
@@ -105,11 +83,6 @@ class PlanarScene:
         for artist in (*chain(*zip(*self._rhombi, strict=True)), self._title):
             self._axes.draw_artist(artist)
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
-
-    def _corners(self, frame: int) -> NDArray[np.float64]:
-        if self._outline is None:
-            return rhombi(self._lengths[frame], self._heights[frame])
-        return bent_rhombi(self._outline[frame], len(self._rhombi))
 
     def _extent(self) -> tuple[float, float]:
         """Left and right limit of all pictures, cm."""
@@ -122,11 +95,7 @@ class PlanarScene:
 
 
 def bent_rhombi(outline: NDArray[np.float64], n_segments: int) -> NDArray[np.float64]:
-    """Closes each segment's part of the upper outline with its mirror image.
-
-    Args:
-        outline: Upper half of the worm, front tip to rear tip, shape ``(n_segments * n + 1, 2)``.
-        n_segments: Number of segments.
+    """Closes each segment's part of the upper outline, ``(n_segments * n + 1, 2)``, with its mirror image.
 
     Returns:
         Corners round each segment, shape ``(n_segments, 2 n, 2)``.
@@ -137,11 +106,7 @@ def bent_rhombi(outline: NDArray[np.float64], n_segments: int) -> NDArray[np.flo
 
 
 def rhombi(lengths: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lays rhombi in a row, tip to tip, its middle at the origin.
-
-    Args:
-        lengths: Horizontal diagonals, shape ``(n_segments,)``.
-        heights: Vertical diagonals, same shape and unit.
+    """Puts rhombi of horizontal and vertical diagonals, ``(n_segments,)``, in a row with its middle at the origin.
 
     Returns:
         Corners (left, top, right, bottom), shape ``(n_segments, 4, 2)``.

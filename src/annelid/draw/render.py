@@ -8,18 +8,21 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.analysis.rhombi import nearest_time
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+    from annelid.draw.planar_scene import PlanarScene
+    from annelid.draw.scene import WormScene
 
 FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1280, 320), "boxerbaum2012": (1280, 320)}
 VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
@@ -27,8 +30,7 @@ VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
 DEFAULT_CAMERA = "isometric"
-MOST_PICTURES = 200_000
-"""Of a video, which are drawn some 30 a second."""
+MOST_PICTURES = 200_000  # of a video, which are drawn some 30 a second
 FPS_RANGE = (1.0, 240.0)
 _H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
 # 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
@@ -41,27 +43,11 @@ _GIF: dict[str, Any] = {
 }
 _FFMPEG_REMEDY = "unset IMAGEIO_FFMPEG_EXE where it is set, and type: pip install imageio-ffmpeg"
 
-Progress = Callable[[int, int], object]
-"""Called with the number of frames done and their total."""
-
-
-class Scene(Protocol):
-    """What draws a run: recorded times, and one picture for each."""
-
-    times_s: NDArray[np.float64]
-
-    def picture(self, frame: int) -> NDArray[np.uint8]:
-        """Draws one of the recorded times, as pixels of shape ``(height, width, 3)``."""
-        ...
+Progress = Callable[[int, int], object]  # called with the number of frames done and their total
 
 
 def render_frame(
-    run: Run,
-    time_s: float,
-    path: str | Path,
-    *,
-    camera: str | None = None,
-    size: tuple[int, int] | None = None,
+    run: Run, time_s: float, path: str | Path, *, camera: str | None = None, size: tuple[int, int] | None = None
 ) -> Path:
     """Draws the recorded posture nearest to a time.
 
@@ -85,7 +71,7 @@ def render_frame(
     path = with_suffix(path, FRAME_SUFFIXES, "a picture")
     size = size or FRAME_SIZE[run.config.body.kind]
     with _scene(run, size, camera, fine=True) as scene:
-        pixels = scene.picture(_nearest(run, scene.times_s, time_s))
+        pixels = scene.picture(nearest_time(run, scene.times_s, time_s))
     with whole_file(path) as draft:
         imageio.v3.imwrite(draft, pixels)
     return path
@@ -108,8 +94,8 @@ def render_video(
     Args:
         run: The run.
         path: Video to write (``.mp4``, ``.mov``, ``.mkv``, ``.gif``).
-        fps: Frames a second of the video, 1 to 240; the recorded posture nearest to each is shown.
-        speed: Simulated seconds a second of video: 1 is real time, 0.25 a quarter of it.
+        fps: Frames per second of the video, 1 to 240; the recorded posture nearest to each is shown.
+        speed: Simulated seconds per second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
         size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
         progress: Called after every frame.
@@ -119,8 +105,7 @@ def render_video(
 
     Raises:
         RunFileError: The run has no such camera, the path another suffix, ``fps`` or ``speed`` is out of range or makes
-            too many pictures,
-            or the file cannot be written whole, as on a full disk.
+            too many pictures, or the file cannot be written whole, as on a full disk.
         RenderingUnavailable: No OpenGL back-end works.
         MissingDependency: There is no ffmpeg to write videos with.
     """
@@ -145,14 +130,14 @@ def render_video(
         total = math.floor(pictures + 1e-6)
         with _video(draft, fps, size, path, total) as write:
             for done in range(total):
-                frame = _nearest(run, scene.times_s, first + done * speed / fps)
+                frame = nearest_time(run, scene.times_s, first + done * speed / fps)
                 write(np.ascontiguousarray(scene.picture(frame)))
                 if progress is not None:
                     progress(done + 1, total)
     return path
 
 
-def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> AbstractContextManager[Scene]:
+def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> WormScene | PlanarScene:
     if run.config.body.is_planar:
         from annelid.draw.planar_scene import PlanarScene
 
@@ -162,16 +147,6 @@ def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -
     from annelid.draw.scene import WormScene
 
     return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine)
-
-
-def _nearest(run: Run, times_s: NDArray[np.float64], time_s: float) -> int:
-    """Index of the recorded time nearest to a wanted one, which must lie within the run."""
-    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
-    if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
-        raise RunFileError(
-            f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
-        )
-    return int(np.abs(times_s - time_s).argmin())
 
 
 @contextmanager
@@ -188,13 +163,7 @@ def _video(
     if shutil.which(ffmpeg) is None:
         raise MissingDependency(f"no ffmpeg to write {name} with, there is no program {ffmpeg}: {_FFMPEG_REMEDY}")
     settings = _GIF if path.suffix.lower() == ".gif" else _H264
-    frames = imageio_ffmpeg.write_frames(
-        str(path),
-        size,
-        fps=fps,  # type: ignore[arg-type]
-        ffmpeg_log_level="quiet",
-        **settings,
-    )
+    frames = imageio_ffmpeg.write_frames(str(path), size, fps=fps, ffmpeg_log_level="quiet", **settings)  # type: ignore[arg-type]
     frames.send(None)
     broken = f"cannot write {name}: ffmpeg ({ffmpeg}) failed; is the disk full, or ffmpeg broken?"
     try:

@@ -4,54 +4,40 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
 
+import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
+from annelid.draw.canvas import CONTRACTED, activation_color
 from annelid.draw.gl import Canvas, find_backend
-from annelid.draw.style import CONTRACTED, activation_color
 from annelid.errors import RunFileError
 from annelid.protocols import Array
-
-if TYPE_CHECKING:
-    import mujoco
-
-    from annelid.simulation.runfile import Run
+from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.runfile import Run
 
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
 AMBIENT, AMBIENT_ON_WHITE = 0.5, 0.7
-HEADLIGHT = 0.25
-"""Light from all sides, and from the camera; the lamp adds 0.4."""
-CONTRACTED_WIDTH = 1.8
-"""A contracted ring muscle is drawn this much thicker than a relaxed one."""
-HAZE = (0.94, 0.955, 0.97)
-"""What the floor fades into with distance."""
-PALE = 3.0
-"""On white, what lies this many half worms behind its middle would vanish."""
-SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)
-"""Axial springs, apart from the red of a contracted ring."""
+HEADLIGHT = 0.25  # light from all sides, and from the camera; the lamp adds 0.4
+CONTRACTED_WIDTH = 1.8  # a contracted ring muscle is drawn this much thicker than a relaxed one
+HAZE = (0.94, 0.955, 0.97)  # what the floor fades into with distance
+PALE = 3.0  # on white, what lies this many half worms behind its middle would vanish
+SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)  # axial springs, apart from the red of a contracted ring
 WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
 WAYPOINT_HALF_HEIGHT_M = 1e-3
 
 
 class DrawnWorm:
-    """A 3D worm's compiled model, and the posture that it is drawn in.
+    """A 3D worm's compiled model, with a picture's lens and light, and the posture that it is drawn in.
 
-    Attributes:
-        model: The model, with a picture's lens and light.
-        posture: The engine's state of what is drawn.
-        upright: Rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``.
+    ``upright`` is the rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``.
     """
 
     def __init__(self, config: RunConfig) -> None:
-        """Compiles the model of a 3D worm's configuration."""
-        import mujoco
-
         from annelid.body import build_spec
         from annelid.body.actuation import ring_names
 
@@ -66,14 +52,7 @@ class DrawnWorm:
         self._widths = self.model.tendon_width[self._rings]
 
     def pose(self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None = None) -> None:
-        """Brings all that is drawn into a posture.
-
-        Args:
-            qpos: Generalised positions, as a run records them.
-            activation: Gives the ring muscles their colours and widths, in [0, 1], ``(n_muscles,)``.
-        """
-        import mujoco
-
+        """Brings all that is drawn into a posture ``(nq,)``; activation ``(n_muscles,)`` colours the rings."""
         self.posture.qpos[:] = qpos
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex, mujoco.mj_tendon):
             stage(self.model, self.posture)
@@ -88,8 +67,6 @@ class DrawnWorm:
 
         The strands' free ends reach beyond the crossings, so these would not do.
         """
-        import mujoco
-
         model, posture = self.model, self.posture
         parts = np.flatnonzero(model.geom_bodyid > 0)
         capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
@@ -101,8 +78,8 @@ class DrawnWorm:
         return np.concatenate([middles - reach, middles + reach])
 
 
-class _Scene:
-    """Pictures of a worm from one direction, used as a context manager."""
+class _Scene(Canvas):
+    """Pictures of a worm from one direction and distance, with or without shadows and smooth edges (``fine``)."""
 
     def __init__(
         self,
@@ -114,55 +91,23 @@ class _Scene:
         fine: bool,
         upright: Array | None,
     ) -> None:
-        import mujoco
-
-        self._worm, self._upright = worm, upright
-        self._camera = mujoco.MjvCamera()
-        self._camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-        self._camera.azimuth, self._camera.elevation = angles_deg
-        self._camera.distance = distance_m
-        # The rings stand for the actuators.
-        self._option = mujoco.MjvOption()
-        mujoco.mjv_defaultOption(self._option)
-        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
-        self._canvas = Canvas(worm.model, *size, find_backend(), fine=fine)
-
-    def __enter__(self) -> Self:
-        self._canvas.__enter__()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Frees the back-end."""
-        self._canvas.close()
+        super().__init__(worm.model, *size, find_backend(), fine=fine, upright=upright)
+        self._worm = worm
+        self.camera.azimuth, self.camera.elevation = angles_deg
+        self.camera.distance = distance_m
 
     def _draw(
         self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None, target_m: Array, caption: str = ""
     ) -> NDArray[np.uint8]:
         self._worm.pose(qpos, activation)
-        self._camera.lookat[:] = target_m
-        return self._canvas.draw(self._worm.posture, self._camera, self._option, caption, upright=self._upright)
+        self.camera.lookat[:] = target_m
+        return self.draw(self._worm.posture, caption)
 
 
 class WormScene(_Scene):
-    """Pictures of a 3D worm's run, used as a context manager."""
+    """Pictures of a 3D worm's run from a named view, see `annelid.draw.camera.VIEWS_DEG`."""
 
     def __init__(self, run: Run, width: int, height: int, camera: str, *, fine: bool) -> None:
-        """Builds the model of the run's own configuration.
-
-        Args:
-            run: The run.
-            width: Pixels.
-            height: Pixels.
-            camera: Name of a view, see `annelid.draw.camera.VIEWS_DEG`.
-            fine: Shadows and smooth edges.
-
-        Raises:
-            RunFileError: No postures recorded, they do not fit the model, or no such camera.
-            RenderingUnavailable: No OpenGL back-end works.
-        """
         assert isinstance(run.config.body, WormBody)
         angles = view_angles(camera, run.config.body.heading_deg)
         worm = DrawnWorm(run.config)
@@ -183,38 +128,19 @@ class WormScene(_Scene):
         super().__init__(worm, (width, height), angles, distance, fine=fine, upright=worm.upright)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
-        """Draws one recorded frame.
-
-        Args:
-            frame: Index along the run's ``frame`` dimension.
-
-        Returns:
-            Pixels, shape ``(height, width, 3)``.
-        """
+        """Draws one recorded frame, as pixels of shape ``(height, width, 3)``."""
         time_s = float(self.times_s[frame])
         activation = self._activation.sel(time=time_s, method="nearest").values
         return self._draw(self._qpos[frame], activation, self._target[frame], f"{time_s:.2f} s")
 
 
 class PostureScene(_Scene):
-    """Pictures of a 3D worm in postures that are given one by one.
+    """Pictures of a 3D worm in postures that are given one by one, from a named view.
 
     The camera looks at the worm's middle, from a distance that leaves it room to stretch.
     """
 
     def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
-        """Builds the model and opens a back-end, which `close` frees.
-
-        Args:
-            config: Configuration of the 3D worm.
-            width: Pixels.
-            height: Pixels.
-            camera: Name of a view, see `annelid.draw.camera.VIEWS_DEG`.
-
-        Raises:
-            RunFileError: There is no such camera.
-            RenderingUnavailable: No OpenGL back-end works.
-        """
         assert isinstance(config.body, WormBody)
         # The model's own rest has no heading.
         angles, headed = view_angles(camera), view_angles(camera, config.body.heading_deg)
@@ -224,43 +150,23 @@ class PostureScene(_Scene):
         distance = ROOM * fitting_distance(offsets, *angles, width / height)
         _dim(worm.model, angles[1])
         super().__init__(worm, (width, height), headed, distance, fine=False, upright=worm.upright)
-        self.__enter__()
 
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
-        """Draws a posture.
-
-        Args:
-            qpos: Generalised positions, as a run records them.
-            activation: Of the ring muscles, ``(n_muscles,)``.
-            caption: Words in the lower left corner.
-
-        Returns:
-            Pixels, shape ``(height, width, 3)``.
-        """
+        """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""
         return self._draw(qpos, activation, _middle(self._worm.part_ends(qpos)), caption)
 
 
 @dataclass(frozen=True)
 class Still:
-    """A rendered posture that marks can be drawn on.
+    """A rendered posture that marks can be drawn on."""
 
-    Attributes:
-        pixels: Shape ``(height, width, 3)``.
-        target_m: Point that the camera looks at, shape ``(3,)``.
-        angles_deg: Azimuth and elevation of the line of sight.
-        distance_m: From the camera to the point that it looks at.
-    """
-
-    pixels: NDArray[np.uint8]
-    target_m: Array
-    angles_deg: tuple[float, float]
-    distance_m: float
+    pixels: NDArray[np.uint8]  # (height, width, 3)
+    target_m: Array  # point that the camera looks at, (3,)
+    angles_deg: tuple[float, float]  # azimuth and elevation of the line of sight
+    distance_m: float  # from the camera to the point that it looks at
 
     def places(self, points_m: ArrayLike) -> Array:
-        """Finds the pixels (column, row) at which points appear.
-
-        Args:
-            points_m: Points, m, shape ``(..., 3)``.
+        """Finds the pixels at which points, m, ``(..., 3)``, appear.
 
         Returns:
             Columns and rows, counted from the picture's upper left corner, shape ``(..., 2)``.
@@ -309,14 +215,10 @@ def render_still(
 
 
 def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
-    """Returns the generalised positions of every frame, ``(n_frames, n_coordinates)``.
-
-    Args:
-        run: The run of a 3D worm.
-        n_coordinates: Generalised positions of the body that is built from its configuration.
+    """Returns the generalised positions of every frame of a 3D worm's run, ``(n_frames, n_coordinates)``.
 
     Raises:
-        RunFileError: No postures were recorded, or those of another body.
+        RunFileError: No postures were recorded, or those of another body than is built from the configuration.
     """
     data = run.data
     if "qpos" not in data or data.sizes.get("frame", 0) == 0:
@@ -327,6 +229,41 @@ def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
             f"from its configuration has {n_coordinates}: it was written by another version"
         )
     return data["qpos"].values
+
+
+class Skeleton:
+    """Where strands and crossings of a compiled worm are in a posture, with an engine state of its own."""
+
+    def __init__(self, anatomy: Anatomy) -> None:
+        self.anatomy = anatomy
+        self._data = mujoco.MjData(anatomy.model)
+        mujoco.mj_kinematics(anatomy.model, self._data)
+        vertices = anatomy.geometry.vertices_m
+        self._shape = vertices.shape
+        self._body = _bodies_of_vertices(anatomy.model, *vertices.shape[:2])
+        # At rest the axes of all bodies are the world's.
+        self._place = vertices.reshape(-1, 3) - self._data.xpos[self._body]
+
+    def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
+        """Returns vertices of the strands from front to rear, m, ``(n_strands, n_vertices, 3)``, and the crossings."""
+        self._data.qpos[:] = qpos
+        crossing, _, _ = self.anatomy.locate(self._data)
+        turn = self._data.xmat[self._body].reshape(-1, 3, 3)
+        vertices = self._data.xpos[self._body] + np.einsum("vij,vj->vi", turn, self._place)
+        return vertices.reshape(self._shape), crossing
+
+
+def _bodies_of_vertices(model: mujoco.MjModel, n_strands: int, n_vertices: int) -> NDArray[np.int64]:
+    """Body that carries each vertex, strand by strand: its own for rods, the element behind it for a chain."""
+    if model.nflex:
+        of_strand = []
+        for strand in range(n_strands):
+            flex = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, f"strand_{strand}")
+            first, count = model.flex_vertadr[flex], model.flex_vertnum[flex]
+            of_strand.append(model.flex_vertbodyid[first : first + count])
+        return np.concatenate(of_strand).astype(np.int64)
+    elements = np.minimum(np.arange(n_vertices), n_vertices - 2)
+    return np.array([model.body(f"strand_{strand}_{e}").id for strand in range(n_strands) for e in elements])
 
 
 def upright(config: RunConfig) -> Array:
@@ -353,27 +290,23 @@ def _set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
 
 def _light(spec: mujoco.MjSpec) -> None:
     """Gives a model a picture's lens and light."""
-    import mujoco
-
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
     visual.headlight.diffuse = [HEADLIGHT] * 3
-    visual.headlight.specular = [0.05, 0.05, 0.05]
+    visual.headlight.specular = [0.05] * 3
     visual.quality.shadowsize = 4096
     visual.rgba.fog = [*HAZE, 1.0]
     visual.map.fogstart, visual.map.fogend = 4.0, 12.0
     for light in spec.lights:
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-        light.diffuse = [0.4, 0.4, 0.4]
-        light.specular = [0.1, 0.1, 0.1]
+        light.diffuse = [0.4] * 3
+        light.specular = [0.1] * 3
     for tendon in spec.tendons:
         tendon.rgba = SPRING_RGBA
 
 
 def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:
-    """Lays a disc on the floor where each waypoint of a course counts as reached."""
-    import mujoco
-
+    """Puts a disc on the floor where each waypoint of a course counts as reached."""
     if config.turning is None or config.arena is None:
         return
     goals = config.turning.goals

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from annelid.analysis.comparison import Comparison, Number, relative_difference
+from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
 from annelid.analysis.gait import Gait
 from annelid.analysis.paper import (
     ELONGATION_WITHIN,
@@ -27,16 +27,12 @@ from annelid.errors import listed
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from annelid.analysis.gait import EnergyBalance
     from annelid.analysis.limit_cycle import LimitCycle
     from annelid.config import RunConfig
 
 UNKNOWN = "-"
-_ONSETS_SHOWN = 12
-
-COMPARED = ("reference", "deviation")
-"""Headings of what stands beside our numbers."""
-
+_ONSETS_SHOWN, _MULTIPLIERS_SHOWN = 12, 4
+COMPARED = ("reference", "deviation")  # headings of what stands beside our numbers
 NEXT = (
     f"annelid run {FORMULATION} (that formulation itself, a minute), "
     "riddle2023-rods (rigid crossings), wang (the robot)"
@@ -70,7 +66,7 @@ SUMMARY_ROWS: dict[str, Row] = {
 
 GAIT_ROWS: dict[str, Row] = {
     "slip_ratio": ("slip ratio", 100.0, 1, "%"),
-    "backward_ratio": ("centre of mass, way back", 100.0, 1, "%"),
+    "backward_ratio": ("travel backwards", 100.0, 1, "%"),
     "cost_of_transport": ("cost of transport, positive work", 1.0, 2, ""),
     "cost_of_transport_net": ("cost of transport, net work", 1.0, 2, ""),
     "lateral_drift": ("drift to the left per travel", 100.0, 1, "%"),
@@ -97,7 +93,7 @@ TIMES = {
     "stepped": "own steps",
 }
 """Headings of limit cycles, by `annelid.analysis.limit_cycle.Time`."""
-# Products of rounded matrices tell no smaller multiplier.
+# A smaller multiplier is lost in products of rounded matrices.
 _ROUNDING = 1e-12
 
 
@@ -122,15 +118,10 @@ def framed_table(*headings: str, title: str | None = None, caption: str | None =
     return table
 
 
-def summary_table(numbers: Summary, config: RunConfig) -> Table:
-    """Lays out a run's summary as a table for the terminal.
+def summary_table(numbers: Summary, config: RunConfig, locomotion: Gait | None = None) -> Table:
+    """Returns a run's numbers as a table for the terminal, those to compare with beside them, perhaps with its gait.
 
-    Args:
-        numbers: The summary.
-        config: The configuration it belongs to, which decides what it is compared with.
-
-    Returns:
-        A rich table; rows whose number cannot be told are left out, unless there is one to compare with.
+    Rows without a number are left out, unless there is one to compare with.
     """
     compared = COMPARED if references(config) else ()
     duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
@@ -141,18 +132,15 @@ def summary_table(numbers: Summary, config: RunConfig) -> Table:
         column.min_width = narrowest
     for row in summary_rows(numbers, config):
         table.add_row(*row[: 2 + len(compared)])
+    if locomotion is not None:
+        table.add_section()
+        for row in gait_rows(locomotion):
+            table.add_row(*row)
     return table
 
 
-def add_gait(table: Table, numbers: Gait) -> None:
-    """Adds the gait's rows to a run's table, as a section of their own."""
-    table.add_section()
-    for row in gait_rows(numbers):
-        table.add_row(*row)
-
-
 def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
-    """Returns label and value of every row that can be told."""
+    """Returns label and value of every number that a gait has."""
     rows: list[tuple[str, str]] = []
     if numbers.speed_m_per_s is not None and numbers.stride_m is not None:
         lengths = numbers.speed_body_lengths_per_s, numbers.stride_body_lengths
@@ -160,27 +148,28 @@ def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
         of_cycles = f"speed, {numbers.cycles} cycle{'' if numbers.cycles == 1 else 's'}"
         rows.append((of_cycles, f"{100 * numbers.speed_m_per_s:.2f} cm/s{speed.replace(')', '/s)')}"))
         rows.append(("stride", f"{100 * numbers.stride_m:.1f} cm{stride}"))
-    if numbers.contact_duty is not None:
-        rows.append(("on the ground", quantity(list(numbers.contact_duty), 100.0, 0, "%")))
-    for field, row in GAIT_ROWS.items():
-        value = getattr(numbers, field)
-        if value is not None:
-            rows.append((row[0], quantity(value, *row[1:])))
+    values: dict[str, Row] = {"contact_duty": ("on the ground", 100.0, 0, "%"), **GAIT_ROWS}
+    rows += [(row[0], quantity(getattr(numbers, field), *row[1:])) for field, row in values.items()]
     if numbers.turning_radius_m is not None:
         side = "left" if numbers.turning_radius_m > 0 else "right"
         rows.append(("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}"))
-    if numbers.energy is not None:
-        rows.append(("muscles' net work, whole run", f"{numbers.energy.muscle_work_J:.2f} J"))
-        rows.extend(_shares(numbers.energy))
-    return rows
+    if (energy := numbers.energy) is not None:
+        rows.append(("muscles' net work, whole run", f"{energy.muscle_work_J:.2f} J"))
+        parts = {
+            "stored": energy.kinetic_J + energy.elastic_J + (energy.potential_J or 0.0),
+            "slip": energy.slip_J,
+            "other constraints": energy.constraints_J,
+            "damping": energy.damping_J,
+            "integrator": energy.numerical_J,
+        }
+        if energy.muscle_work_J > 0:
+            shares = (f"{n} {100 * part / energy.muscle_work_J:.0f} %" for n, part in parts.items() if part is not None)
+            rows.append(("of which", ", ".join(shares)))
+    return [row for row in rows if row[1] != UNKNOWN]
 
 
 def comparison_table(comparison: Comparison) -> Table:
-    """Lays the numbers of runs side by side; below each but the first run's, the difference to it.
-
-    Returns:
-        A rich table; rows that no run can tell are left out.
-    """
+    """Returns the numbers of runs side by side; below each but the first run's, the difference to it."""
     caption = f"in brackets: difference to {comparison.labels[0]}; pp: peak to peak"
     table = _side_by_side("quantity", comparison.labels, caption)
     table.add_row("status", *(status.replace("_", " ") for status in comparison.statuses))
@@ -188,35 +177,25 @@ def comparison_table(comparison: Comparison) -> Table:
     for field, row in COMPARISON_ROWS.items():
         values = comparison.numbers.get(field, ())
         if any(value is not None for value in values):
-            shares = comparison.differences(field)
-            cells = (_compared(quantity(v, *row[1:]), share) for v, share in zip(values, shares, strict=True))
-            table.add_row(row[0], *cells)
+            shares = (_percents(share, lambda percent: f"{percent:+.1f}") for share in comparison.differences(field))
+            below = (f"\n({share})" if share else "" for share in shares)
+            table.add_row(row[0], *(quantity(v, *row[1:]) + more for v, more in zip(values, below, strict=True)))
     return table
 
 
 def fields_table(comparison: Comparison) -> Table:
-    """Lists the fields in which the configurations differ.
-
-    Where the kinds of worm differ, so do most fields of body and arena; these are left out.
-    """
+    """Returns the fields in which the configurations differ; of worms of different kinds only those that all have."""
     other_kinds = "body.kind" in comparison.fields
     caption = "worms of different kinds: of body and arena only fields that all have; --json lists all"
     table = _side_by_side("field of the configuration", comparison.labels, caption if other_kinds else None)
     for field, values in comparison.fields.items():
-        lacks = comparison.lacking[field]
-        if not (other_kinds and field.startswith(("body.", "arena.")) and any(lacks)):
-            table.add_row(field, *(_setting(value, lack) for value, lack in zip(values, lacks, strict=True)))
+        if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values):
+            table.add_row(field, *(UNKNOWN if value is LACKING else _setting(value) for value in values))
     return table
 
 
-def cycle_table(name: str, cycles: Mapping[str, LimitCycle], n_shown: int = 4) -> Table:
-    """Lays out the limit cycles of one worm, one column for each way of taking time.
-
-    Args:
-        name: The worm.
-        cycles: The cycles, by `annelid.analysis.limit_cycle.Time`.
-        n_shown: Multipliers to show, the largest ones.
-    """
+def cycle_table(name: str, cycles: Mapping[str, LimitCycle]) -> Table:
+    """Returns the limit cycles of one worm by `annelid.analysis.limit_cycle.Time`, with their largest multipliers."""
     main = next(iter(cycles.values()))
     caption = "A multiplier is what one cycle leaves of a small deviation; the one at 1 is a shift along the cycle."
     if set(cycles) != {"continuous"}:
@@ -225,7 +204,7 @@ def cycle_table(name: str, cycles: Mapping[str, LimitCycle], n_shown: int = 4) -
     # Title and caption would fold where there is only one column.
     table = framed_table("quantity", *(TIMES[time] for time in cycles), title=title, caption=caption, min_width=72)
     table.add_row("period (ms)", *(f"{1e3 * cycle.period_s:.2f}" for cycle in cycles.values()))
-    for i in range(min(n_shown, len(main.labels))):
+    for i in range(min(_MULTIPLIERS_SHOWN, len(main.labels))):
         table.add_row(f"multiplier {i + 1}", *(_multiplier(cycle.multipliers[i]) for cycle in cycles.values()))
     table.add_row("orbit closes within", *(f"{cycle.closing_error:.0e} of a range" for cycle in cycles.values()))
     return table
@@ -251,27 +230,35 @@ def cycle_numbers(cycles: Mapping[str, LimitCycle]) -> dict[str, Any]:
 def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, str, str]]:
     """Returns label, our number, the one to compare with and the deviation of every row in which there is a number."""
     beside = references(config)
-    first_sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
+    pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
+    onsets = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
+    more = f", and {len(pairs) - _ONSETS_SHOWN} more" if len(pairs) > _ONSETS_SHOWN else ""
+    cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
+    wave = f"yes, {cycles}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({cycles})"
+    cells = [("segment at onset (s)", onsets + more or "none", "order"), ("wave 1-2-..-N", wave, "wave")]
+    # A planar worm has one sensor per segment, and no name for it.
+    sensor = f", {config.body.springs.first_sensor}" if isinstance(config.body, WormBody) else ""
+    for field, row in SUMMARY_ROWS.items():
+        if sensor or ", mean" not in row[0]:
+            text = quantity(getattr(numbers, field), *row[1:])
+            if field == "period_s" and numbers.period_std_s is not None:
+                text += f" (std {numbers.period_std_s:.3f} s)"
+            cells.append((row[0].replace(", first helix", sensor), text, field))
     rows = [
-        (label, ours, _theirs(field, beside.get(field)), deviation(field, numbers, beside.get(field)))
-        for label, ours, field in _cells(numbers, first_sensor)
+        (label, ours, _theirs(field, beside.get(field)), _deviation(field, numbers, beside.get(field)))
+        for label, ours, field in cells
     ]
     return [row for row in rows if row[1] != UNKNOWN or row[2]]
 
 
-def deviation(field: str, numbers: Summary, entry: Published | None) -> str:
-    """Returns by how many percent our number, or that of each segment, is above the one to compare with.
+def _deviation(field: str, numbers: Summary, entry: Published | None) -> str:
+    """By how many percent our number, or that of each segment, is above the one to compare with.
 
-    Returns:
-        Empty for shares, speeds of computing and words, for the range over sensors, and where either number is lacking.
+    Empty for shares, speeds of computing and words, for the range over sensors, and where either number is lacking.
     """
     if entry is None or field in SPREAD or isinstance(entry.value, str) or SUMMARY_ROWS[field][-1] in ("%", ""):
         return ""
-    shares = relative_difference(entry.value, getattr(numbers, field))
-    if shares is None:
-        return ""
-    of_each = shares if isinstance(shares, Sequence) else [shares]
-    return f"{' / '.join(UNKNOWN if share is None else _signed(100 * share) for share in of_each)} %"
+    return _percents(relative_difference(entry.value, getattr(numbers, field)), _signed)
 
 
 def legend(numbers: Summary, config: RunConfig) -> str:
@@ -289,22 +276,12 @@ def legend(numbers: Summary, config: RunConfig) -> str:
 
 
 def closing_sentence(numbers: Summary, config: RunConfig) -> str:
-    """Says whether a run reproduces the paper's own formulation, or by how much it does not.
-
-    Args:
-        numbers: The run's numbers.
-        config: Its configuration.
-
-    Returns:
-        One sentence, where a preset is changed on what is changed; empty where there is nothing to compare with.
-    """
+    """Says what is changed of a preset, or whether a run reproduces the paper's own formulation; else nothing."""
     if not references(config) or not isinstance(config.body, WormBody):
         return ""
-    changed = changed_fields(config)
+    preset, changed = changed_fields(config)
     if changed:
-        return (
-            f"this run differs from {config.name} in {listed(changed)}: the references are those of the unchanged worm"
-        )
+        return f"this run differs from {preset} in {listed(changed)}: the references are those of the unchanged worm"
     if not stands_for_the_papers(config) or has_rigid_crossings(config) or numbers.status != "complete":
         return ""
     found = agreement(numbers)
@@ -314,10 +291,11 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
             f"{config.name} reproduces order, period and elongation of the paper's formulation within {within}; "
             f"next: {NEXT}"
         )
-    apart = [] if found.order else [f"order {_order(numbers)} in place of {_order(formulation())}"]
-    apart += [] if found.period_agrees else [f"period {_share(found.period)}"]
+    order, theirs = ("-".join(map(str, one.order)) or "none" for one in (numbers, formulation()))
+    apart = [] if found.order else [f"order {order} in place of {theirs}"]
+    apart += [] if found.period_agrees else [f"period {_percents(found.period, _signed) or 'unknown'}"]
     apart += [
-        f"elongation of segment {segment} {_share(share)}"
+        f"elongation of segment {segment} {_percents(share, _signed) or 'unknown'}"
         for segment, (share, agrees) in enumerate(zip(found.elongation, found.elongation_agrees, strict=True), start=1)
         if not agrees
     ]
@@ -340,7 +318,7 @@ def field_lines(config: RunConfig) -> list[str]:
     lines = []
     for path, meaning in fields_of(config).items():
         value = field_value(config, path)
-        setting = f"{path} = {toml_value(value)}" if value is not None else f"{path} (not set)"
+        setting = f"{path} (not set)" if value is None else f"{path} = {toml_value(value)}"
         lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
     return lines
 
@@ -359,37 +337,6 @@ def _side_by_side(first: str, labels: Sequence[str], caption: str | None) -> Tab
     for column in table.columns[1:]:
         column.min_width = 10
     return table
-
-
-def _cells(numbers: Summary, first_sensor: str | None) -> list[tuple[str, str, str]]:
-    """Label, our value and field of every row. A planar worm has one sensor a segment, and no name for it."""
-    cells = [
-        ("segment at onset (s)", _onsets(numbers), "order"),
-        ("wave 1-2-..-N", _wave(numbers), "wave"),
-    ]
-    for field, (label, factor, digits, unit) in SUMMARY_ROWS.items():
-        if first_sensor is None and ", mean" in label:
-            continue
-        label = label.replace(", first helix", f", {first_sensor}" if first_sensor else "")
-        text = quantity(getattr(numbers, field), factor, digits, unit)
-        if field == "period_s" and numbers.period_std_s is not None:
-            text += f" (std {numbers.period_std_s:.3f} s)"
-        cells.append((label, text, field))
-    return cells
-
-
-def _onsets(numbers: Summary) -> str:
-    pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
-    shown = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
-    more = f", and {len(pairs) - _ONSETS_SHOWN} more" if len(pairs) > _ONSETS_SHOWN else ""
-    return shown + more if pairs else "none"
-
-
-def _wave(numbers: Summary) -> str:
-    if numbers.wave is None:
-        return "too short to tell"
-    cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
-    return f"yes, {cycles}" if numbers.wave else f"no ({cycles})"
 
 
 def _theirs(field: str, entry: Published | None) -> str:
@@ -422,15 +369,7 @@ def _first_of_order(order: Sequence[int]) -> str:
     return "-".join(map(str, order[:_ONSETS_SHOWN])) + more
 
 
-def _compared(text: str, share: Number) -> str:
-    shares = share if isinstance(share, Sequence) else [share]
-    percents = [UNKNOWN if one is None else f"{100 * one:+.1f}" for one in shares]
-    return f"{text}\n({' / '.join(percents)} %)" if any(word != UNKNOWN for word in percents) else text
-
-
-def _setting(value: Any, lacks: bool) -> str:
-    if lacks:
-        return UNKNOWN
+def _setting(value: Any) -> str:
     return "not set" if value is None else toml_value(value)
 
 
@@ -442,27 +381,12 @@ def _multiplier(value: complex) -> str:
     return f"{value.real:.3g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.3g}i"
 
 
-def _shares(balance: EnergyBalance) -> list[tuple[str, str]]:
-    """Where the work went, in shares of it; nothing if there was next to none."""
-    if not balance.muscle_work_J > 0:
-        return []
-    parts = (
-        ("held", balance.kinetic_J + balance.elastic_J + (balance.potential_J or 0.0)),
-        ("slip", balance.slip_J),
-        ("other constraints", balance.constraints_J),
-        ("damping", balance.damping_J),
-        ("integrator", balance.numerical_J),
-    )
-    shares = [f"{name} {100 * part / balance.muscle_work_J:.0f} %" for name, part in parts if part is not None]
-    return [("of which", ", ".join(shares))]
-
-
-def _order(numbers: Summary) -> str:
-    return "-".join(map(str, numbers.order)) or "none"
-
-
-def _share(share: float | None) -> str:
-    return "unknown" if share is None else f"{_signed(100 * share)} %"
+def _percents(shares: Number, form: Callable[[float], str]) -> str:
+    """Writes a share, or one per segment, in percent; nothing where none is known."""
+    each = shares if isinstance(shares, Sequence) else [shares]
+    if all(share is None for share in each):
+        return ""
+    return f"{' / '.join(UNKNOWN if share is None else form(100 * share) for share in each)} %"
 
 
 def _signed(percent: float) -> str:
@@ -470,7 +394,7 @@ def _signed(percent: float) -> str:
 
 
 def quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
-    """Returns a number, or one a segment, as a row says: multiplied, rounded, with its unit; a dash for None."""
+    """Writes a number, or one per segment: multiplied, rounded, with its unit; a dash for None."""
     if value is None:
         return UNKNOWN
     if isinstance(value, list | tuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,11 +11,11 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.environments.episode import Episode
-from annelid.environments.observation import Layout, Observation
-from annelid.environments.pictures import Pictures
-from annelid.environments.task import COARSE, Task, task_of
-from annelid.errors import ConfigError, SimulationStopped, suggest
+from annelid.draw.camera import view_angles
+from annelid.draw.scene import PostureScene
+from annelid.environments.episode import Episode, Layout, Observation
+from annelid.environments.task import COARSE, task_of
+from annelid.errors import ConfigError, SimulationStopped, require_at_least, suggest
 from annelid.protocols import Sensation
 from annelid.simulation.worm import Worm, WormPlant
 
@@ -78,19 +79,10 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ConfigError: A name, a field or a value that cannot be.
         """
-        self.task: Task = task_of(
-            preset,
-            changes,
-            arena=arena,
-            fidelity=fidelity,
-            interval_s=interval_s,
-            episode_s=episode_s,
-            weights=weights,
-            start_activation=start_activation,
-        )
-        self.render_mode = checked_render_mode(render_mode)
+        self.task = task_of(preset, changes, arena, fidelity, interval_s, episode_s, weights, start_activation)
+        self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": round(1 / interval_s) or 1}
-        self._pictures = Pictures(camera, width, height)
+        self._pictures = Pictures(render_mode, camera, width, height)
         self.worm: Worm = WormPlant(self.task.config)
         self._episode = Episode(self.task, self.worm)
         self.layout: Layout = self._episode.layout
@@ -99,7 +91,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def sensation(self) -> Sensation:
-        """What the worm feels, in full and without noise."""
+        """What the worm senses, in full and without noise."""
         return self._episode.sensation
 
     def reset(
@@ -168,8 +160,35 @@ def refuse_options(options: Mapping[str, Any] | None) -> None:
         raise ConfigError(f"reset() has no option {name!r}: fields are changed where the environment is made")
 
 
-def checked_render_mode(mode: str | None) -> str | None:
-    """Returns a render mode, or raises `ConfigError` where there is none of that name."""
-    if mode is not None and mode not in RENDER_MODES:
-        raise ConfigError(f"unknown render_mode {mode!r}: {suggest(mode, RENDER_MODES)}")
-    return mode
+class Pictures:
+    """Draws worms as they are now, with one scene for each different model."""
+
+    def __init__(self, mode: str | None, camera: str, width: int, height: int) -> None:
+        """Keeps how they are to be drawn; `AnnelidError` for what cannot be."""
+        if mode is not None and mode not in RENDER_MODES:
+            raise ConfigError(f"unknown render_mode {mode!r}: {suggest(mode, RENDER_MODES)}")
+        view_angles(camera)
+        require_at_least(1, width=width, height=height)
+        self._camera, self._width, self._height = camera, width, height
+        self._scenes: dict[str, PostureScene] = {}
+        # OpenGL cannot be freed any more once Python is shutting down, and environments are often left open.
+        weakref.finalize(self, _close, self._scenes)
+
+    def draw(self, episode: Episode) -> NDArray[np.uint8]:
+        """Draws a worm: pixels, ``(height, width, 3)``."""
+        config = episode.task.config
+        drawn = config.model_dump_json(include={"body", "arena"})
+        if drawn not in self._scenes:
+            self._scenes[drawn] = PostureScene(config, self._width, self._height, self._camera)
+        caption = f"{episode.sensation.time_s:.2f} s"
+        return self._scenes[drawn].picture(episode.worm.qpos, episode.activation, caption)
+
+    def close(self) -> None:
+        """Frees what was opened."""
+        _close(self._scenes)
+
+
+def _close(scenes: dict[str, PostureScene]) -> None:
+    for scene in scenes.values():
+        scene.close()
+    scenes.clear()

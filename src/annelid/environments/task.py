@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Weights:
     """What the terms of the reward are multiplied by.
 
     Attributes:
-        progress: Of the speed of the worm's middle along its way, body lengths a second.
+        progress: Of the speed of the worm's middle along its route, body lengths a second.
         effort: Of the mean square of the action, subtracted.
         slip: Of the mean speed at which segments slide on the ground, body lengths a second, subtracted.
         success: Given once, when a worm has passed its pipe.
@@ -45,23 +45,14 @@ class Weights:
 
 @dataclass(frozen=True)
 class Task:
-    """One worm's task.
+    """One worm's task."""
 
-    Attributes:
-        config: Body, arena, sensors and guard; both clocks are those of the physics.
-        moves_per_step: Physics steps in a step of the environment.
-        steps_per_episode: Steps of the environment until the time is up.
-        weights: Of the reward.
-        start_activation: Largest activation that a ring may have at the start.
-        goal_m: Arc length of the pipe at which the worm's middle has passed; None on open ground.
-    """
-
-    config: RunConfig
-    moves_per_step: int
-    steps_per_episode: int
-    weights: Weights
-    start_activation: float
-    goal_m: float | None
+    config: RunConfig  # body, arena, sensors and guard; both clocks are those of the physics
+    moves_per_step: int  # physics steps in a step of the environment
+    steps_per_episode: int  # steps of the environment until the time is up
+    weights: Weights  # of the reward
+    start_activation: float  # largest activation that a ring may have at the start
+    goal_m: float | None  # arc length of the pipe at which the worm's middle has passed; None on open ground
 
     @property
     def interval_s(self) -> float:
@@ -71,8 +62,7 @@ class Task:
 
 def task_of(
     preset: str,
-    changes: Mapping[str, Any] | None = None,
-    *,
+    changes: Mapping[str, Any] | None,
     arena: str | None,
     fidelity: str | None,
     interval_s: float,
@@ -93,51 +83,31 @@ def task_of(
     moves = _whole("interval_s", interval_s, "clock.physics_timestep_s", physics_s)
     steps = _whole("episode_s", episode_s, "interval_s", interval_s)
     config = config.model_copy(update={"clock": Clock(control_timestep_s=physics_s, physics_timestep_s=physics_s)})
-    return Task(config, moves, steps, weights_of(weights or {}), float(start_activation), _goal_m(config))
-
-
-def weights_of(given: Mapping[str, float]) -> Weights:
-    """Returns the usual weights with some of them changed.
-
-    Raises:
-        ConfigError: There is no such weight, or it is negative.
-    """
     names = [field.name for field in fields(Weights)]
-    for name, value in given.items():
+    for name, value in (weights or {}).items():
         if name not in names:
             raise ConfigError(f"unknown weight {name!r}: {suggest(name, names)}")
         require_at_least(0.0, **{f"weights[{name!r}]": value})
-    return Weights(**{name: float(value) for name, value in given.items()})
+    checked = Weights(**{name: float(value) for name, value in (weights or {}).items()})
+    # The middle of a worm has passed a pipe behind all that bends or narrows, else a body length on.
+    reach_m = config.arena.reach_m() if config.arena is not None else None
+    assert isinstance(config.body, WormBody)
+    goal_m = None if reach_m is None else reach_m[1] or mesh_of(config.body.mesh).length_m
+    return Task(config, moves, steps, checked, float(start_activation), goal_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Deed:
-    """What a worm has done in one step of the environment.
+class Deed(NamedTuple):
+    """What a worm has done in one step of the environment."""
 
-    Attributes:
-        advance_m: How far its middle has come along its way, m.
-        slid_m: Mean way that its segments have slid on the ground, m.
-        action: The activations that it was given, ``(n_muscles,)``.
-        passed: Whether it has come through its pipe in this step.
-        broke_down: Whether its simulation broke down; then nothing else counts.
-    """
-
-    advance_m: float
-    slid_m: float
-    action: Array
-    passed: bool
-    broke_down: bool
+    advance_m: float  # how far its middle has come along its route
+    slid_m: float  # mean path that its segments have slid on the ground
+    action: Array  # the activations that it was given, (n_muscles,)
+    passed: bool  # whether it has come through its pipe in this step
+    broke_down: bool  # whether its simulation broke down; then nothing else counts
 
 
 def reward_terms(deed: Deed, weights: Weights, length_m: float, interval_s: float) -> dict[str, float]:
-    """Returns the terms of the reward by name; the reward is their sum.
-
-    Args:
-        deed: What the worm has done.
-        weights: Of the terms.
-        length_m: Length of its body, m.
-        interval_s: Time of the step, s.
-    """
+    """Returns the terms of a step's reward by name, whose sum it is; for a body of a length and a step of a time."""
     lengths_per_s = 0.0 if deed.broke_down else 1.0 / (length_m * interval_s)
     effort = 0.0 if deed.broke_down else float(np.mean(deed.action * deed.action))
     return {
@@ -177,12 +147,3 @@ def _whole(name: str, value: float, unit_name: str, unit: float) -> int:
             f"{name} = {value:g}: must be an integer multiple of {unit_name} = {unit:g}, for example {near:g}"
         )
     return round(ratio)
-
-
-def _goal_m(config: RunConfig) -> float | None:
-    """Returns where the middle of a worm has passed a pipe: behind all that bends or narrows, else a body length on."""
-    reach_m = config.arena.reach_m() if config.arena is not None else None
-    if reach_m is None:
-        return None
-    assert isinstance(config.body, WormBody)
-    return reach_m[1] or mesh_of(config.body.mesh).length_m

@@ -12,39 +12,38 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.environments.episode import Episode
-from annelid.environments.observation import Layout, Observation
-from annelid.environments.pictures import Pictures
-from annelid.environments.single import (
-    EPISODE_S,
-    INTERVAL_S,
-    PRESET,
-    SIZE,
-    START_ACTIVATION,
-    WormEnv,
-    action_space,
-    checked_render_mode,
-    refuse_options,
-)
+from annelid.environments import single
+from annelid.environments.episode import Episode, Layout, Observation
+from annelid.environments.single import Pictures, WormEnv, action_space, refuse_options
 from annelid.environments.task import COARSE, Task, task_of
 from annelid.errors import ConfigError, require_at_least, suggest
 from annelid.morphology import Array
 from annelid.protocols import Sensation
 from annelid.simulation.anatomy import Anatomy
-from annelid.simulation.batch.body import BodyBatch, compile_worms
-from annelid.simulation.batch.loop import threads_for
-from annelid.simulation.batch.structure import checked_configs
+from annelid.simulation.batch import checked_configs, threads_for
+from annelid.simulation.batch_body import BodyBatch, compile_worms
 
 Flags = NDArray[np.bool_]
-Stepped = tuple[Observation, Array, Flags, Flags, dict[str, Any]]
 
 
 class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
     """Worms that are each, bit for bit, a `WormEnv`; one that breaks down ends alone.
 
+    Args:
+        num_envs: Number of worms.
+        changes: As for `WormEnv`, or one mapping for each worm; they may differ in all that `annelid.simulate_batch`
+            lets differ, friction and stiffness among them.
+        autoreset_mode: When a worm that has ended begins anew: ``"NextStep"``, ``"SameStep"`` or ``"Disabled"``, as
+            `gymnasium.vector.AutoresetMode` says.
+        threads: Threads that step the worms; by default as many as there are processors.
+        **others: As for `WormEnv`; with a render mode, `render` gives a picture of every worm.
+
     Attributes:
         tasks: What is asked of every worm.
         layout: How an observation is laid out; ``layout.named(observations)`` takes those of all worms apart.
+
+    Raises:
+        ConfigError: A name, a field or a value that cannot be, or worms that do not fit into one batch.
     """
 
     closed = True
@@ -53,72 +52,38 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
     def __init__(
         self,
         num_envs: int = 1,
-        preset: str = PRESET,
+        preset: str = single.PRESET,
         changes: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
         *,
         arena: str | None = None,
         fidelity: str | None = COARSE,
-        interval_s: float = INTERVAL_S,
-        episode_s: float = EPISODE_S,
+        interval_s: float = single.INTERVAL_S,
+        episode_s: float = single.EPISODE_S,
         weights: Mapping[str, float] | None = None,
-        start_activation: float = START_ACTIVATION,
+        start_activation: float = single.START_ACTIVATION,
         render_mode: str | None = None,
         camera: str = "isometric",
-        width: int = SIZE[0],
-        height: int = SIZE[1],
+        width: int = single.SIZE[0],
+        height: int = single.SIZE[1],
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
     ) -> None:
-        """Builds the worms.
-
-        Args:
-            num_envs: Number of worms.
-            preset: As for `WormEnv`.
-            changes: As for `WormEnv`, or one mapping for each worm; they may differ in all that
-                `annelid.simulate_batch` lets differ, friction and stiffness among them.
-            arena: As for `WormEnv`, and so are all up to ``height``.
-            fidelity: See there.
-            interval_s: See there.
-            episode_s: See there.
-            weights: See there.
-            start_activation: See there.
-            render_mode: See there; `render` then gives a picture of every worm.
-            camera: See there.
-            width: See there.
-            height: See there.
-            autoreset_mode: When a worm that has ended begins anew: ``"NextStep"``, ``"SameStep"`` or ``"Disabled"``, as
-                `gymnasium.vector.AutoresetMode` says.
-            threads: Threads that step the worms; by default as many as there are processors.
-
-        Raises:
-            ConfigError: A name, a field or a value that cannot be, or worms that do not fit into one batch.
-        """
         require_at_least(1, num_envs=num_envs)
         given = [changes] * num_envs if changes is None or isinstance(changes, Mapping) else list(changes)
         if len(given) != num_envs:
             raise ConfigError(f"changes has {len(given)} mappings for num_envs = {num_envs}: give one for each, or one")
         self.tasks: list[Task] = [
-            task_of(
-                preset,
-                own,
-                arena=arena,
-                fidelity=fidelity,
-                interval_s=interval_s,
-                episode_s=episode_s,
-                weights=weights,
-                start_activation=start_activation,
-            )
-            for own in given
+            task_of(preset, own, arena, fidelity, interval_s, episode_s, weights, start_activation) for own in given
         ]
         self.num_envs = num_envs
         names = [mode.value for mode in AutoresetMode]
         if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in names:
             raise ConfigError(f"unknown autoreset_mode {autoreset_mode!r}: {suggest(autoreset_mode, names)}")
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.render_mode = checked_render_mode(render_mode)
+        self.render_mode = render_mode
         fps = round(1 / interval_s) or 1
         self.metadata = {**WormEnv.metadata, "render_fps": fps, "autoreset_mode": self.autoreset_mode}
-        self._pictures = Pictures(camera, width, height)
+        self._pictures = Pictures(render_mode, camera, width, height)
         anatomies = compile_worms(checked_configs([task.config for task in self.tasks], None, None))
         shares = np.array_split(np.arange(num_envs), threads_for(num_envs, threads))
         self._teams = [_Team(list(map(int, share)), self.tasks, anatomies) for share in shares]
@@ -137,7 +102,7 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
 
     @property
     def sensations(self) -> list[Sensation]:
-        """What every worm feels, in full and without noise."""
+        """What every worm senses, in full and without noise."""
         return [episode.sensation for episode in self._episodes]
 
     def reset(
@@ -163,14 +128,20 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (n,) and mask.any()):
             raise ConfigError(f"reset_mask must be an array of truth values of shape ({n},) with at least one true")
         refuse_options(options)
-        self._seed(seed, mask)
+        if seed is not None:
+            seeds = [seed + row for row in range(n)] if isinstance(seed, int | np.integer) else list(seed)
+            if len(seeds) != n:
+                raise ConfigError(f"seed has {len(seeds)} numbers for num_envs = {n}: give one for each")
+            for row, own in enumerate(seeds):
+                if mask[row] and own is not None:
+                    self._random[row] = seeding.np_random(own)[0]
         infos: dict[str, Any] = {}
         for row in map(int, np.flatnonzero(mask)):
             infos = self._add_info(infos, self._restart(row), row)
         self._ended[mask] = False
         return self._observations.copy(), infos
 
-    def step(self, actions: ArrayLike) -> Stepped:
+    def step(self, actions: ArrayLike) -> tuple[Observation, Array, Flags, Flags, dict[str, Any]]:
         """Lets all worms move for one interval.
 
         Args:
@@ -227,23 +198,9 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._observations[row], info = self._episodes[row].reset(self._random[row])
         return info
 
-    def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
-        if seed is None:
-            return
-        seeds = [seed + row for row in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
-        if len(seeds) != self.num_envs:
-            raise ConfigError(f"seed has {len(seeds)} numbers for num_envs = {self.num_envs}: give one for each")
-        for row, own in enumerate(seeds):
-            if mask[row] and own is not None:
-                self._random[row] = seeding.np_random(own)[0]
-
 
 class _Team:
-    """Worms that one thread steps; the engine does so without Python's lock.
-
-    Attributes:
-        episodes: Of each of its worms.
-    """
+    """Worms that one thread steps; the engine does so without Python's lock."""
 
     def __init__(self, numbers: Sequence[int], tasks: Sequence[Task], anatomies: Sequence[Anatomy]) -> None:
         """Builds the bodies of the worms with these numbers."""
@@ -255,9 +212,8 @@ class _Team:
     def move(self, ramps: Mapping[int, Array]) -> None:
         """Takes the physics steps of one step of the environment.
 
-        Args:
-            ramps: Activations of every physics step by number of the worm, ``(n_steps, n_muscles)`` each; worms of
-                other teams among them.
+        Given are the activations of every physics step by number of the worm, ``(n_steps, n_muscles)`` each; worms of
+        other teams are among them.
         """
         own = {row: ramps[self._first + row] for row in range(len(self.episodes)) if self._first + row in ramps}
         for k in range(len(next(iter(own.values()), ()))):
@@ -268,5 +224,5 @@ class _Team:
             for row, reason in reasons.items():
                 self.episodes[row].stop(reason)
             going = [row for row in rows if row not in reasons]
-            for row, moved in zip(going, self._bodies.moved(going) if going else (), strict=True):
+            for row, moved in zip(going, self._bodies.moved(going), strict=True):
                 self.episodes[row].observe(self._bodies.worms[row].strode(1, moved))

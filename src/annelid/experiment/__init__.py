@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress, in_stage
     from annelid.experiment.store import Store, case_key
-    from annelid.experiment.tune.judge import Judged
-    from annelid.experiment.tune.search import judged_run
+    from annelid.experiment.tune import Judged, judge
     from annelid.experiment.workers import Workers
 
 __all__ = [
@@ -40,7 +39,7 @@ __all__ = [
     "code_fingerprint",
     "end_after",
     "in_stage",
-    "judged_run",
+    "judge",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

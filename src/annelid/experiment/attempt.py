@@ -39,21 +39,14 @@ SENT: Mapping[Keep, str] = {"runs": FILE_NAME, "outcomes": OUTCOME_NAME}
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a worker must know of a run, in plain words.
-
-    Attributes:
-        name: Of the run's folder in the store.
-        config: The configuration as JSON.
-        code: Digests of the code that computes runs and that reads them.
-        home: The store's folder, absolute.
-        mark: The store's mark.
-        keep: What is kept.
-    """
+    """What a worker must know of a run, in plain words: the name of its folder, its configuration as JSON, and more."""
 
     name: str
     config: str
     code: tuple[str, str]
+    """Digests of the code that computes runs and that reads them."""
     home: str
+    """The store's folder, absolute."""
     mark: str
     keep: Keep
 
@@ -64,50 +57,36 @@ def own_code() -> tuple[str, str]:
 
 
 def attempt(task: Task) -> bytes | None:
-    """Computes a run and publishes it in its store.
+    """Computes a run and publishes it in its store; returns the file to send where its folder is not on this machine.
 
-    Returns:
-        None; or the content of the file to send, where the store's folder is not that of this machine.
-
-    Raises:
-        ClusterError: This worker has other code.
-        AnnelidError: The run cannot be built or written. A run that a guard stops is no error.
-        KeyboardInterrupt: It was interrupted.
+    A run that a guard stops is no error; an interrupted one is a KeyboardInterrupt.
     """
     if task.code != own_code():
         raise ClusterError(
             f"the worker on {platform.node()} has other code: install the same versions of annelid, mujoco-core and "
             "numpy as on this machine"
         )
-    home = Path(task.home)
-    folder = home / task.name
-    if not _is_shared(home, task.mark):
+    home, config = Path(task.home), RunConfig.model_validate_json(task.config)
+    try:
+        shared = (home / MARK_NAME).read_text(encoding="utf-8") == task.mark
+    except OSError:
+        shared = False
+    if not shared:
         with tempfile.TemporaryDirectory(prefix="annelid-") as away:
-            compute_run(RunConfig.model_validate_json(task.config), Path(away), task.keep)
+            compute_run(config, Path(away), task.keep)
             return (Path(away) / SENT[task.keep]).read_bytes()
     try:
-        with _draft_of(folder, task.keep) as draft:
-            compute_run(RunConfig.model_validate_json(task.config), draft, task.keep)
+        with _draft_of(home / task.name, task.keep) as draft:
+            compute_run(config, draft, task.keep)
     except OSError:
         # Where another attempt has won, this one's folder may have been cleared away under it.
-        if stored_outcome(folder, task.keep) is None:
+        if stored_outcome(home / task.name, task.keep) is None:
             raise
     return None
 
 
 def fetch_results(content: bytes, folder: Path, config: RunConfig, keep: Keep) -> None:
-    """Publishes a run that was computed on another machine, once its file is seen to be of this run.
-
-    Args:
-        content: What the worker sent.
-        folder: Of the run in the store.
-        config: Of the run.
-        keep: What is kept.
-
-    Raises:
-        ClusterError: It is no file, too large, damaged, or of another run.
-        OSError: It cannot be written.
-    """
+    """Publishes a run that a worker on another machine sent, once its file is seen to be whole and of this run."""
     name = SENT[keep]
     if not isinstance(content, bytes) or len(content) > MOST_BYTES[name]:
         raise ClusterError(f"a worker sent a {name} that is no file of at most {MOST_BYTES[name]:,} bytes")
@@ -148,19 +127,17 @@ def compute_run(config: RunConfig, folder: Path, keep: Keep = "runs") -> None:
 
 def keep_outcome(run: Run) -> Outcome:
     """Reads the outcome of a run, and writes it beside the run."""
-    read = outcome(run)
-    folder = run.path.parent
-    draft = folder / f".{OUTCOME_NAME}.{uuid.uuid4().hex[:8]}.part"
+    read, folder = outcome(run), run.path.parent
+    draft = new_draft(folder / OUTCOME_NAME)
     write_outcome(read, draft, code_fingerprint(*READERS))
     draft.replace(folder / OUTCOME_NAME)
     return read
 
 
 def stored_outcome(folder: Path, keep: Keep = "runs") -> Outcome | None:
-    """Returns the outcome of the run in a folder, read again where its file is damaged or other code has read the run.
+    """Returns the outcome of a folder's run; None where there is no whole run, or not all of it that is to be kept.
 
-    Returns:
-        The outcome; None where there is no whole run, or not all of it that is to be kept.
+    It is read again where its file is damaged or other code has read the run.
     """
     if keep == "runs" and not (folder / FILE_NAME).exists():
         return None
@@ -201,18 +178,11 @@ def publish(draft: Path, folder: Path, keep: Keep) -> None:
         shutil.rmtree(aside, ignore_errors=True)
 
 
-def new_draft(folder: Path) -> Path:
-    """Returns a name for an attempt's own folder beside that of the run."""
-    return folder.with_name(f".{folder.name}.{uuid.uuid4().hex[:8]}.part")
+def new_draft(path: Path) -> Path:
+    """Returns a name for an attempt's own file or folder beside that which it is of."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")
 
 
 def run_of_draft(draft: Path) -> Path:
     """Returns the folder of the run that a draft is of."""
     return draft.with_name(draft.name.removeprefix(".").rsplit(".", 2)[0])
-
-
-def _is_shared(home: Path, mark: str) -> bool:
-    try:
-        return (home / MARK_NAME).read_text(encoding="utf-8") == mark
-    except OSError:
-        return False

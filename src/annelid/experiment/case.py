@@ -1,4 +1,4 @@
-"""A case: one run of a study, told by its preset and what is changed in it."""
+"""A case: one run of a study, described by its preset and what is changed in it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from typing import Any
 
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, toml_value
-from annelid.errors import ConfigError
-from annelid.output import whole_file
-from annelid.plausibility import refuse_nonsense
+from annelid.output import write_text
 from annelid.textfiles import nested, toml_text
 
 SHEAR_OVER_YOUNG = 1.0 / 1.5
@@ -21,7 +19,6 @@ SHEAR_OVER_YOUNG = 1.0 / 1.5
 
 # Samples and postures of a study's runs: enough for its numbers and for a picture at 1.5 s, a tenth of the disk.
 _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
-
 # Milliseconds of one core for each evaluation of the dynamics, only to start the longest runs first.
 _PLANAR_STEP_MS = 0.05
 
@@ -52,13 +49,15 @@ class Case:
 
     @property
     def stem(self) -> str:
-        """What the name of its folder begins with: the preset's name, or the file's."""
+        """Beginning of its folder's name: the preset's name, or the file's."""
         return "run" if self.base is not None else Path(self.preset).name.removesuffix(".toml")
 
     @property
     def command(self) -> str:
-        """The command line that makes the same run, as far as the name of a whole configuration tells."""
-        return run_command(self.preset, self.changes)
+        """The command line that makes the same run, but for what is recorded of it."""
+        changes = ((path, value) for path, value in self.changes.items() if not path.startswith("record."))
+        words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in changes]
+        return " ".join(["annelid run", self.preset, *words])
 
     @property
     def cost_s(self) -> float:
@@ -75,39 +74,14 @@ class Case:
         return replace(self, changes={**self.changes, **changes})
 
 
-def refusal(case: Case) -> ConfigError | None:
-    """Returns why a case's configuration is refused; None if it is not."""
-    try:
-        refuse_nonsense(case.config)
-    except ConfigError as error:
-        return error
-    return None
-
-
-def run_command(preset: str, changes: Mapping[str, Any]) -> str:
-    """Returns the command line that runs a preset or file with changes, but for those of the record."""
-    told = {path: value for path, value in changes.items() if not path.startswith("record.")}
-    words = [f"--set {shlex.quote(f'{path}={toml_value(value)}')}" for path, value in told.items()]
-    return " ".join(["annelid run", preset, *words])
-
-
 def absolute(source: str) -> str:
     """Returns the name of a preset as it is, and the path of a TOML file from the root."""
     return Path(source).resolve().as_posix() if source.endswith(".toml") else source
 
 
-def extend(path: Path, source: str, fields: Mapping[str, Any], heading: Sequence[str]) -> None:
-    """Writes a worm as a file that ``annelid run`` takes: what it extends, and what differs.
+def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequence[str]) -> None:
+    """Writes a worm as a file that ``annelid run`` takes: the preset or file that it extends, and what differs.
 
-    Args:
-        path: The file to write.
-        source: Preset or TOML file that it extends.
-        fields: Values by dotted path.
-        heading: Lines of the comment that it begins with.
-
-    Raises:
-        RunFileError: The file cannot be written.
+    Fields are given by their dotted paths; the heading are lines of a comment.
     """
-    text = toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading))
-    with whole_file(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+    write_text(path, toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading)))

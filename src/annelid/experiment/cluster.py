@@ -11,8 +11,10 @@ import logging
 import shutil
 import time
 import warnings
-from abc import abstractmethod
+from collections.abc import Callable
 from concurrent.futures import CancelledError, ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from annelid.config import cluster as settings
@@ -22,7 +24,6 @@ from annelid.experiment.workers import Processes, Result, Workers
 
 if TYPE_CHECKING:
     from distributed import Client
-    from distributed.deploy.cluster import Cluster
 
 MISSING = "runs on a cluster need Dask: install it with  pip install 'annelid[sweep]'"
 MISSING_SLURM = "jobs of Slurm need dask-jobqueue and cryptography: install them with  pip install 'annelid[slurm]'"
@@ -31,73 +32,58 @@ FRESH_S = 0.3
 """For how long the number of workers is not asked again, s."""
 HANDSHAKE_S = 5.0
 """For how long a scheduler may take that has been reached, s."""
-_NO_DASHBOARD = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
-"""Of the page that tells whether a scheduler is well there is no getting rid: it is for this machine only."""
-START_WORKERS = "dask worker ADDRESS --nworkers auto --nthreads 1"
 
 
 def workers_of(cluster: settings.Cluster, jobs: int | None = None) -> Workers:
     """Returns the workers of a cluster, which start with the first run.
 
-    Args:
-        cluster: Where they are.
-        jobs: How many, instead of what the cluster says; has no effect on a scheduler elsewhere.
-
-    Raises:
-        ClusterError: Jobs of Slurm are asked for where there is none.
+    ``jobs`` is how many, instead of what the cluster says; it has no effect on a scheduler elsewhere.
     """
     if isinstance(cluster, settings.Pool):
         return Processes(jobs or cluster.workers, cluster.retries)
-    if isinstance(cluster, settings.Slurm):
-        return SlurmWorkers(cluster.model_copy(update={"jobs": jobs or cluster.jobs}))
-    return SchedulerWorkers(cluster)
+    if isinstance(cluster, settings.Scheduler):
+        return DaskWorkers(cluster.retries, cluster.address, partial(_joined, cluster))
+    if shutil.which(SBATCH) is None:
+        raise ClusterError(
+            f"cluster 'slurm': there is no program {SBATCH} here: call this where jobs of Slurm are submitted, or "
+            "take --cluster processes"
+        )
+    return DaskWorkers(cluster.retries, "in this process", partial(_submitted, cluster, jobs or cluster.jobs))
 
 
 class DaskWorkers(Workers):
-    """The workers of one scheduler."""
+    """The workers of one scheduler, which is joined with the first run."""
 
-    def __init__(self, retries: int) -> None:
-        """Prepares; nothing starts before the first run."""
-        self.retries = retries
+    def __init__(self, retries: int, where: str, join: Callable[[], Client]) -> None:
+        self.retries, self._where, self._join = retries, where, join
         self._client: Client | None = None
         self._counted: tuple[float, int] = (-float("inf"), 0)
 
-    @abstractmethod
-    def _join(self) -> Client:
-        """Starts or finds the scheduler and returns a client of it."""
-
-    @property
-    @abstractmethod
-    def _where(self) -> str:
-        """Says in words where the scheduler is."""
-
     def slots(self) -> int:
-        """Returns how many workers there are now; 0 while the scheduler is gone.
-
-        Raises:
-            ClusterError: It cannot be found, or has been gone for too long.
-            MissingDependency: Dask is not installed.
-        """
+        """Returns how many workers there are now; 0 while the scheduler is gone."""
         if self._client is None:
             try:
                 import distributed  # noqa: F401
             except ImportError:
                 raise MissingDependency(MISSING) from None
             self._client = self._join()
-            self._greet(threads_of(self._client))
         if self._client.status == "closed":
             raise ClusterError(
                 f"the scheduler {self._where} is gone: finished runs are kept, so call again once it is back"
             )
         now = time.monotonic()
         if now - self._counted[0] > FRESH_S:
-            self._counted = now, self._count(self._client)
+            n_workers = 0
+            if self._client.status == "running":
+                # The scheduler may be going away right now: the connection breaks, or the client's own loop has ended.
+                with suppress(OSError, RuntimeError, CancelledError):
+                    n_workers = len(_threads_of(self._client))
+            self._counted = now, n_workers
         return self._counted[1]
 
     def submit(self, task: Task) -> Result:
         """Has a run computed by one of the workers."""
-        if self._client is None:
-            raise ClusterError("no scheduler has been joined yet")
+        assert self._client is not None
         return self._client.get_executor(pure=False).submit(attempt, task)
 
     def explained(self, error: Exception) -> Exception:
@@ -111,112 +97,67 @@ class DaskWorkers(Workers):
         return error
 
     def close(self, *, drop: bool) -> None:
-        """Leaves the scheduler, and ends what has been started for it."""
+        """Leaves the scheduler, and ends it where it was started for this."""
         if self._client is not None:
             if drop and self._client.status == "running":
                 self._client.cancel(list(self._client.futures), force=True)
+            cluster: Any = self._client.cluster
             self._client.close(timeout=2)
             self._client = None
-
-    @staticmethod
-    def _count(client: Client) -> int:
-        if client.status != "running":
-            return 0
-        try:
-            return len(threads_of(client))
-        # The scheduler is going away right now: the connection breaks, or the client's own loop has ended.
-        except (OSError, RuntimeError, CancelledError):
-            return 0
-
-    def _greet(self, threads: dict[str, int]) -> None:
-        if any(count > 1 for count in threads.values()):
-            warnings.warn(
-                f"workers of {self._where} have several threads, of which runs use one: start them with "
-                f"{START_WORKERS.replace('ADDRESS', self._where)}",
-                stacklevel=2,
-            )
+            if cluster is not None:
+                cluster.close()
 
 
-class SchedulerWorkers(DaskWorkers):
-    """The workers of a scheduler that is running somewhere."""
+def _joined(cluster: settings.Scheduler) -> Client:
+    """Returns a client of a scheduler that is running somewhere."""
+    from distributed import Client
 
-    def __init__(self, cluster: settings.Scheduler) -> None:
-        """Prepares to join it."""
-        super().__init__(cluster.retries)
-        self._cluster = cluster
-
-    @property
-    def _where(self) -> str:
-        return self._cluster.address
-
-    def _join(self) -> Client:
-        from distributed import Client
-
-        address, seconds = self._cluster.found(), self._cluster.reconnect_s
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        try:
-            # In a thread, since this one may have a loop that runs, as in a notebook.
-            with ThreadPoolExecutor(1) as thread:
-                thread.submit(asyncio.run, _greet_scheduler(address, seconds)).result()
-            return Client(address, timeout=seconds)
-        except (OSError, ValueError, TypeError) as error:
-            raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
-
-    def _greet(self, threads: dict[str, int]) -> None:
-        if not threads:
-            warnings.warn(
-                f"{self._where} has no workers yet: waiting for  {START_WORKERS.replace('ADDRESS', self._where)}",
-                stacklevel=2,
-            )
-        super()._greet(threads)
+    address, seconds = cluster.found(), cluster.reconnect_s
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        # In a thread, since this one may have a loop that runs, as in a notebook.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, _greet_scheduler(address, seconds)).result()
+        client = Client(address, timeout=seconds)
+    except (OSError, ValueError, TypeError) as error:
+        raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
+    threads, start = _threads_of(client).values(), f"dask worker {cluster.address} --nworkers auto --nthreads 1"
+    if not threads:
+        warnings.warn(f"{cluster.address} has no workers yet: waiting for  {start}", stacklevel=2)
+    if any(count > 1 for count in threads):
+        warnings.warn(
+            f"workers of {cluster.address} have several threads, of which runs use one: start them with {start}",
+            stacklevel=2,
+        )
+    return client
 
 
-class SlurmWorkers(DaskWorkers):
-    """Workers in jobs of Slurm, under a scheduler in this process; a job that ends is followed by another."""
+def _submitted(of: settings.Slurm, jobs: int) -> Client:
+    """Starts a scheduler in this process whose workers are jobs of Slurm; a job that ends is followed by another."""
+    from dask import config
+    from distributed import Client
 
-    def __init__(self, cluster: settings.Slurm) -> None:
-        """Prepares to submit the jobs.
-
-        Raises:
-            ClusterError: There is no Slurm here.
-        """
-        if shutil.which(SBATCH) is None:
-            raise ClusterError(
-                f"cluster 'slurm': there is no program {SBATCH} here: call this where jobs of Slurm are submitted, or "
-                "take --cluster processes"
-            )
-        super().__init__(cluster.retries)
-        self._settings = cluster
-        self._cluster: Cluster | None = None
-
-    @property
-    def _where(self) -> str:
-        return "in this process"
-
-    def _join(self) -> Client:
-        from distributed import Client
-
-        with _quiet(self.retries):
-            cluster = self._cluster = slurm_cluster(self._settings)
-        cluster.adapt(minimum_jobs=self._settings.jobs, maximum_jobs=self._settings.jobs)
+    taken_over = {
+        "distributed.scheduler.allowed-failures": of.retries,
+        # One run a worker: one that dies is counted against its own run only.
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.worker.daemon": True,
+    }
+    with config.set(taken_over):
+        cluster = slurm_cluster(of)
+    try:
+        cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
         return Client(cluster)
-
-    def close(self, *, drop: bool) -> None:
-        """Ends workers and scheduler."""
-        super().close(drop=drop)
-        if self._cluster is not None:
-            self._cluster.close()
-            self._cluster = None
+    except BaseException:
+        cluster.close()
+        raise
 
 
 def slurm_cluster(of: settings.Slurm) -> Any:
     """Starts a scheduler in this process that can submit jobs to Slurm; none is submitted yet.
 
-    It must be reached over the network. It speaks TLS with a key made for this one process, which the jobs read from
+    It must be reached over the network, so it speaks TLS with a key made for this one process, which the jobs read from
     files in the user's home folder that nobody else may read.
-
-    Raises:
-        MissingDependency: dask-jobqueue or cryptography is not installed.
     """
     try:
         from dask_jobqueue.slurm import SLURMCluster
@@ -237,17 +178,14 @@ def slurm_cluster(of: settings.Slurm) -> Any:
         job_script_prologue=list(of.prologue),
         security=security,
         shared_temp_directory="~",
-        scheduler_options=_NO_DASHBOARD,
+        # The page that says whether a scheduler is well cannot be left out: it is for this machine only.
+        scheduler_options={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
         **{name: value for name, value in optional.items() if value is not None},
     )
 
 
 async def _greet_scheduler(address: str, seconds: float) -> None:
-    """Shakes hands with a scheduler: Dask's client would wait for ever for one that accepts and is silent.
-
-    Raises:
-        OSError: There is none that answers.
-    """
+    """Shakes hands with a scheduler: Dask's client would wait for ever for one that accepts and is silent."""
     from distributed import Security
     from distributed.comm.core import connect
 
@@ -256,21 +194,7 @@ async def _greet_scheduler(address: str, seconds: float) -> None:
     comm.abort()
 
 
-def threads_of(client: Client) -> dict[str, int]:
-    """Returns the number of threads of every worker by its address."""
+def _threads_of(client: Client) -> dict[str, int]:
+    """Number of threads of every worker by its address."""
     threads: Any = client.nthreads()
     return threads
-
-
-def _quiet(retries: int) -> Any:
-    """Sets what a scheduler in this process takes over when it starts."""
-    from dask import config
-
-    return config.set(
-        {
-            "distributed.scheduler.allowed-failures": retries,
-            # One run a worker: one that dies is counted against its own run only.
-            "distributed.scheduler.worker-saturation": 1.0,
-            "distributed.worker.daemon": True,
-        }
-    )

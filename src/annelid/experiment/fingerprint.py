@@ -49,7 +49,7 @@ def code_fingerprint(*roots: str) -> str:
     """
     digest = hashlib.sha256()
     for name in sorted(modules_behind(*roots)):
-        digest.update(f"{name}\0{_written(name)}\0".encode())
+        digest.update(f"{name}\0{_code_of_module(name)}\0".encode())
     return digest.hexdigest()[:16]
 
 
@@ -81,10 +81,9 @@ def code_of(node: ast.AST) -> str:
         if isinstance(value, ast.expr_context):
             continue
         if isinstance(value, list):
-            told = [code_of(one) if isinstance(one, ast.AST) else repr(one) for one in _said(value, node)]
             # Newer versions of Python have further lists, which are empty here.
-            if told:
-                parts.append(f"{field}=[{','.join(told)}]")
+            if items := [code_of(one) if isinstance(one, ast.AST) else repr(one) for one in _counted(value, node)]:
+                parts.append(f"{field}=[{','.join(items)}]")
         elif isinstance(value, ast.AST):
             parts.append(f"{field}={code_of(value)}")
         elif value is not None:
@@ -92,7 +91,7 @@ def code_of(node: ast.AST) -> str:
     return f"({' '.join(parts)})"
 
 
-def _said(parts: Iterable[Any], of: ast.AST) -> Iterator[Any]:
+def _counted(parts: Iterable[Any], of: ast.AST) -> Iterator[Any]:
     """Those parts of some code that something depends on."""
     for part in parts:
         match part, of:
@@ -103,13 +102,13 @@ def _said(parts: Iterable[Any], of: ast.AST) -> Iterator[Any]:
             ):
                 pass
             case ast.If(ast.Name("TYPE_CHECKING")), _:
-                yield from _said(part.orelse, part)
+                yield from _counted(part.orelse, part)
             case _:
                 yield part
 
 
 @cache
-def _written(name: str) -> str:
+def _code_of_module(name: str) -> str:
     return code_of(_parsed(name))
 
 
@@ -134,13 +133,11 @@ def _imported(name: str) -> frozenset[str]:
     """Names of annelid's modules that a module imports, and of the packages that they lie in."""
     found = set[str]()
     for statement in _statements(_parsed(name)):
-        named = []
-        if isinstance(statement, ast.ImportFrom):
-            named = [_home(str(statement.module), alias.name) for alias in statement.names]
-        elif isinstance(statement, ast.Import):
-            named = [alias.name for alias in statement.names]
-        for whole in named:
-            parts = whole.split(".")
+        if not isinstance(statement, ast.Import | ast.ImportFrom):
+            continue
+        for alias in statement.names:
+            named = isinstance(statement, ast.Import)
+            parts = (alias.name if named else _home(statement.module or "", alias.name)).split(".")
             for end in range(1, len(parts) + 1) if parts[0] in PACKAGES else ():
                 if _path(inner := ".".join(parts[:end])).exists():
                     found.add(inner)
@@ -149,8 +146,7 @@ def _imported(name: str) -> frozenset[str]:
 
 def _home(module: str, name: str) -> str:
     """Full name of what a statement imports, also where a package loads it from another module on first use."""
-    package = SOURCE.joinpath(*module.split("."))
-    if module.split(".")[0] in PACKAGES and package.is_dir():
+    if module.split(".")[0] in PACKAGES and SOURCE.joinpath(*module.split(".")).is_dir():
         home = offered(_parsed(module)).get(name)
         if home not in (None, module):
             return _home(home, name)
@@ -159,6 +155,6 @@ def _home(module: str, name: str) -> str:
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:
     for field in ("body", "orelse", "handlers", "finalbody", "cases"):
-        for statement in _said(getattr(node, field, ()), node):
+        for statement in _counted(getattr(node, field, ()), node):
             yield statement
             yield from _statements(statement)

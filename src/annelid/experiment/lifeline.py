@@ -1,4 +1,4 @@
-"""A worker process ends with its parent, however that ends: it waits for a pipe that only the parent holds open."""
+"""A worker process ends with its parent, however that ends; a process may import this before it has loaded the rest."""
 
 from __future__ import annotations
 
@@ -8,24 +8,16 @@ import signal
 import threading
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Connection
 
 GRACE_S = 2.0
 """How long a run has to end in good order and to clear away its files, s."""
 
 
-def end_with_parent(reader: Connection) -> None:
-    """Has this process end once the other end of a pipe is closed; initializer of a pool's processes."""
-    end_after(lambda: reader.poll(None))
-
-
 def end_after(wait: Callable[[], object]) -> None:
-    """Has this process end once a call returns or fails, also in the middle of a run.
+    """Has this process end once a call returns or fails, also in the middle of a run; initializer of a pool's process.
 
-    Ctrl-C and a terminal that closes reach every process of the terminal; here only the parent decides on them.
-
-    Args:
-        wait: Returns or fails when the parent has ended, or wants this process to end.
+    Such a call waits for a pipe that only the parent keeps open. Ctrl-C and a terminal that closes reach every process
+    of the terminal; here only the parent decides on them.
     """
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
@@ -37,7 +29,7 @@ def _end(wait: Callable[[], object]) -> None:
     try:
         wait()
     finally:
-        # Ends a run in good order (`simulation.interruption`), and does nothing outside of one.
+        # Ends a run in good order (`simulation.progress`), and does nothing outside of one.
         _thread.interrupt_main(signal.SIGTERM)
         time.sleep(GRACE_S)
         os._exit(1)

@@ -15,50 +15,40 @@ from annelid.simulation.runfile import Run
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Readings at the end of one open-loop contraction, the worm about at rest.
-
-    Attributes:
-        segment: The contracted segment, from 1.
-        elongation_mean_m: Mean elongation of every segment's springs, m, the contracted one's among them.
-        elongation_first_helix_m: The same of the spring on the first helix, m.
-        ring_length_m: Length of the contracted segment's ring, m.
-        pin_gap_m: Largest gap between two pinned strands, m; None where pins cannot part.
-        force_N: Force of the contracted segment's muscle, N; None for a worm without forces.
-    """
+    """Readings at the end of one open-loop contraction, the worm about at rest."""
 
     segment: int
+    """The contracted segment, from 1."""
     elongation_mean_m: tuple[float, ...]
+    """Mean elongation of every segment's springs, the contracted one's among them."""
     elongation_first_helix_m: tuple[float, ...]
+    """The same of the spring on the first helix."""
     ring_length_m: float
+    """Length of the contracted segment's ring."""
     pin_gap_m: float | None
+    """Largest gap between two pinned strands; None where pins cannot part."""
     force_N: float | None
+    """Force of the contracted segment's muscle; None for a worm without forces."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a study keeps of a run.
-
-    Attributes:
-        path: Folder of the run.
-        summary: Its numbers.
-        rhythm: The score of its rhythm.
-        holds: Readings of its open-loop contractions, in the order of the program; empty in closed loop.
-        message: Why it ended before its time; empty if it did not.
-        gait: How the worm gets along.
-        cpu_time_s: Processor time that the run took, s, whatever else the machine did; 0 where it is not known.
-    """
+    """What a study keeps of a run, which lies in the folder ``path``."""
 
     path: Path
     summary: Summary
     rhythm: RhythmScore
     holds: tuple[Hold, ...]
+    """Of its open-loop contractions, in the order of the program; empty in closed loop."""
     message: str
+    """Why it ended before its time; empty if it did not."""
     gait: Gait = field(default_factory=Gait)
     cpu_time_s: float = 0.0
+    """Processor time that the run took, whatever else the machine did; 0 where it is not known."""
 
 
 class _Written(BaseModel):
-    """An outcome as its file holds it, with the mark of the code that read it."""
+    """An outcome as it stands in its file, with the mark of the code that read it."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -86,21 +76,15 @@ def write_outcome(read: Outcome, path: Path, reader: str) -> None:
 
 
 def read_outcome(path: Path, reader: str) -> Outcome:
-    """Reads an outcome that `write_outcome` wrote.
-
-    Raises:
-        ValueError: The file is damaged, or other code read the run than ``reader``.
-        OSError: There is no such file.
-    """
+    """Reads an outcome; a ValueError where its file is damaged, or other code read the run than ``reader``."""
     try:
-        held = _Written.model_validate_json(path.read_bytes())
+        content = _Written.model_validate_json(path.read_bytes())
     except ValidationError as error:
         wrong = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        part = ".".join(map(str, wrong["loc"]))
-        raise ValueError(f"{path} is no outcome: {part}: {wrong['msg']}") from None
-    if held.reader != reader:
+        raise ValueError(f"{path} is no outcome: {'.'.join(map(str, wrong['loc']))}: {wrong['msg']}") from None
+    if content.reader != reader:
         raise ValueError(f"{path} was read by other code")
-    return Outcome(path.parent, **{name: value for name, value in held if name != "reader"})
+    return Outcome(path.parent, **{name: value for name, value in content if name != "reader"})
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:
@@ -108,30 +92,24 @@ def _holds(run: Run) -> tuple[Hold, ...]:
     if not contractions or not data.sizes.get("time"):
         return ()
     times = data["time"].values
-    n_segments = run.config.body.n_segments
+    shape = len(times), run.config.body.n_segments, -1
     above_rest = data["stretch_length"].values - data["stretch_rest_length"].values
-    ring = data["ring_length"].values.reshape(len(times), n_segments, -1).sum(axis=2)
-    force = _segment_means(data["muscle_force"].values, n_segments) if "muscle_force" in data else None
+    ring = data["ring_length"].values.reshape(shape).sum(axis=2)
+    force = data["muscle_force"].values.reshape(shape).mean(axis=2) if "muscle_force" in data else None
     holds = []
     for contraction in contractions:
-        within = np.flatnonzero(times <= contraction.stop_s + 1e-9)
         if times[-1] < contraction.stop_s - 2 * float(np.diff(times).max(initial=0.0)):
             continue
-        last, segment = within[-1], contraction.segment - 1
-        gap = float(data["pin_gap"].values[last]) if "pin_gap" in data else None
+        last, segment = np.flatnonzero(times <= contraction.stop_s + 1e-9)[-1], contraction.segment - 1
         holds.append(
             Hold(
                 contraction.segment,
                 tuple(above_rest[last].mean(axis=1).tolist()),
                 tuple(above_rest[last, :, 0].tolist()),
                 float(ring[last, segment]),
-                gap,
+                float(data["pin_gap"].values[last]) if "pin_gap" in data else None,
                 # The activation ends with the step that leads to the last sample; the force is of the one before.
                 None if force is None else float(force[max(last - 1, 0), segment]),
             )
         )
     return tuple(holds)
-
-
-def _segment_means(values: np.ndarray, n_segments: int) -> np.ndarray:
-    return values.reshape(len(values), n_segments, -1).mean(axis=2)

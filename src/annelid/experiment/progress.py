@@ -1,4 +1,4 @@
-"""How far the report has come: a bar on a terminal, now and then a line elsewhere."""
+"""How far a study has come: a bar on a terminal, now and then a line elsewhere."""
 
 from __future__ import annotations
 
@@ -18,12 +18,7 @@ LINE_EVERY_S = 30.0
 
 
 def in_stage(progress: StudyProgress | None, stage: str) -> Callable[[int, int, float], object] | None:
-    """Returns what `Store.compute` calls as the runs of one stage go on.
-
-    Args:
-        progress: What the progress of the whole study is reported to; None for nothing, and then the result is None.
-        stage: The stage, in a few words.
-    """
+    """Returns what a store of runs calls as one stage goes on, or None where nobody wants to know."""
     return None if progress is None else partial(progress, stage)
 
 
@@ -43,17 +38,15 @@ def study_progress(*, quiet: bool = False) -> Iterator[StudyProgress | None]:
 
 
 class TimeLeft:
-    """Foretells the end of a stage from the share of its work that was done since it began."""
+    """Estimates the end of a stage from the share of its work that was done since it began."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Begins; ``clock`` tells the time in s."""
-        self._clock = clock
+    def __init__(self) -> None:
         self._stage: str | None = None
         self._start = (0.0, 0.0)
 
     def __call__(self, stage: str, share: float) -> float | None:
-        """Returns the time left in s, or None as long as there is nothing to tell it from."""
-        now = self._clock()
+        """Returns the time left in s, or None as long as it cannot be known."""
+        now = time.monotonic()
         if stage != self._stage or share < self._start[1]:
             self._stage, self._start = stage, (now, share)
         began, before = self._start
@@ -63,24 +56,19 @@ class TimeLeft:
 class Lines:
     """Writes a plain line at most every half minute."""
 
-    def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
-        """Writes to a stream; ``clock`` tells the time in s."""
-        self._stream = stream
-        self._clock = clock
-        self._left = TimeLeft(clock)
-        self._last = -float("inf")
+    def __init__(self, stream: TextIO) -> None:
+        self._stream, self._left, self._last = stream, TimeLeft(), -float("inf")
 
     def __call__(self, stage: str, done: int, total: int, share: float) -> None:
         """Takes note of how far a stage has come."""
-        left, now = self._left(stage, share), self._clock()
+        left, now = self._left(stage, share), time.monotonic()
         if now - self._last >= LINE_EVERY_S:
             self._last = now
-            text = _text(done, total, left)
-            self._stream.write(f"{stage}: {text}\n" if text else f"{stage}\n")
+            self._stream.write(": ".join(filter(None, (stage, _text(done, total, left)))) + "\n")
             self._stream.flush()
 
 
 def _text(done: int, total: int, left_s: float | None) -> str:
     runs = f"{done} of {total} runs" if total else ""
     left = f"about {clock_text(left_s)} left" if left_s else ""
-    return ", ".join(part for part in (runs, left) if part)
+    return ", ".join(filter(None, (runs, left)))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, floor, log
 from typing import Any
 
 import numpy as np
 
-from annelid.config import toml_value
+from annelid.config import RunConfig, Vary, field_paths, field_value, fields_of, toml_value, whole_path
 from annelid.config.study import Design
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, suggest
 from annelid.morphology import Array
 
 DIGITS = 4
@@ -20,24 +21,16 @@ DIGITS = 4
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A number in a range.
-
-    Attributes:
-        field: Dotted path of the field.
-        low: Least value.
-        high: Largest value.
-        logarithmic: Whether equal ratios count alike, rather than equal differences.
-        whole: Whether it is a whole number.
-    """
+    """A number in a range, the field by its dotted path."""
 
     field: str
     low: float
     high: float
     logarithmic: bool = False
+    """Whether equal ratios count alike, rather than equal differences."""
     whole: bool = False
 
     def __contains__(self, value: Any) -> bool:
-        """Whether a value lies in the range."""
         return isinstance(value, int | float) and self.low <= value <= self.high
 
     def rounded(self, value: float) -> float | int:
@@ -49,36 +42,47 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of several values.
-
-    Attributes:
-        field: Dotted path of the field.
-        values: The values: numbers, words, or lists of these.
-    """
+    """One of several values: numbers, words, or lists of these."""
 
     field: str
     values: tuple[Any, ...]
 
     def __contains__(self, value: Any) -> bool:
-        """Whether a value is one of them."""
         return value in self.values
 
 
 Variable = Interval | Choice
 
 
-def interval(field: str, low: float, high: float, present: Any, *, logarithmic: bool = False) -> Interval:
-    """Returns the range of a field, one of whole numbers where its present value is whole.
+def variables_of(varied: Sequence[Vary], base: RunConfig) -> list[Variable]:
+    """Returns what is varied of a configuration: ranges of whole numbers where its own value is whole."""
+    variables = [_variable(vary, base) for vary in varied]
+    fields = [variable.field for variable in variables]
+    for field in fields:
+        if fields.count(field) > 1:
+            raise ConfigError(f"vary {field!r} stands twice: give all of its values once")
+    return variables
 
-    Raises:
-        ConfigError: The field holds no number, or is whole and an end of the range is not.
-    """
+
+def _variable(vary: Vary, base: RunConfig) -> Variable:
+    field = whole_path(vary.field, base.model_dump())
+    # A field of another kind than the configuration's counts: the kind may be varied, too.
+    if field not in field_paths():
+        raise ConfigError(f"vary: unknown field {vary.field!r}: {suggest(field, fields_of(base))}")
+    present = field_value(base, field) if field in fields_of(base) else None
+    whole = isinstance(present, int) and not isinstance(present, bool)
+    if vary.choices is not None:
+        return Choice(field, vary.choices)
+    if vary.values is not None:
+        return Choice(field, tuple(int(value) if whole and value.is_integer() else value for value in vary.values))
+    low, high = vary.from_, vary.to
+    assert low is not None
+    assert high is not None
     if isinstance(present, bool | str | tuple):
         raise ConfigError(f"{field} is {toml_value(present)}, which is no number with a range")
-    whole = isinstance(present, int)
     if whole and not (low.is_integer() and high.is_integer()):
         raise ConfigError(f"{field} from {low:g} to {high:g}: both ends must be whole numbers, as the field is")
-    return Interval(field, low, high, logarithmic, whole)
+    return Interval(field, low, high, vary.log, whole)
 
 
 def to_unit(variable: Interval, value: float) -> float:
@@ -105,19 +109,10 @@ def sampled(variable: Variable, share: float) -> Any:
 
 
 def unit_samples(design: Design, n: int, n_variables: int, seed: int) -> Array:
-    """Draws samples of the unit cube.
+    """Draws samples of the unit cube, ``(n, n_variables)``, that depend on the seed alone.
 
-    They depend on the seed alone. Those of a random or a Sobol design begin alike however many are drawn, so that more
-    of them leave the earlier runs as they are; those of a Latin hypercube do not.
-
-    Args:
-        design: ``"random"``, ``"lhs"`` or ``"sobol"``.
-        n: How many.
-        n_variables: Dimensions of the cube.
-        seed: Of the samples.
-
-    Returns:
-        Places in [0, 1), ``(n, n_variables)``.
+    Those of a random or a Sobol design begin alike however many are drawn, so that more of them leave the earlier runs
+    as they are; those of a Latin hypercube do not.
     """
     rng = np.random.default_rng(seed)
     if design == "random":

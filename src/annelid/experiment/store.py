@@ -7,7 +7,6 @@ computes nothing, a killed one loses the runs in progress and no other, and chan
 from __future__ import annotations
 
 import hashlib
-import os
 import shutil
 import time
 import uuid
@@ -31,11 +30,12 @@ from annelid.experiment.attempt import (
     run_of_draft,
     stored_outcome,
 )
-from annelid.experiment.case import Case, refusal
+from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.workers import Processes, Result, Workers
+from annelid.plausibility import refuse_nonsense
 from annelid.simulation.runfile import Run, open_run
 
 Progress = Callable[[int, int, float], object]
@@ -47,17 +47,12 @@ POLL_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What became of a case.
-
-    Attributes:
-        outcome: What is kept of its run; None where there is none.
-        error: Why there is none.
-        refused: Whether that was known before anything ran.
-    """
+    """What became of a case: what is kept of its run, or why there is nothing."""
 
     outcome: Outcome | None
     error: Exception | None = None
     refused: bool = False
+    """Whether the error was known before anything ran."""
 
     @property
     def status(self) -> Literal["complete", "stopped", "failed"]:
@@ -81,12 +76,12 @@ class Done:
 
 
 class Store:
-    """A folder of runs."""
+    """A folder of runs, which is made when the first run is computed."""
 
     def __init__(
         self, folder: Path, workers: Workers | None = None, keep: Keep = "runs", progress: StudyProgress | None = None
     ) -> None:
-        """Opens a store; the folder is made when the first run is computed.
+        """Opens a store.
 
         Args:
             folder: The folder.
@@ -94,9 +89,7 @@ class Store:
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
             progress: Called as runs go on, with what `compute` names their stage; None for nothing.
         """
-        self.folder = folder
-        self.progress = progress
-        self._workers = workers
+        self.folder, self.progress, self._workers = folder, progress, workers
         self._keep: Keep = keep
 
     def path(self, case: Case) -> Path:
@@ -114,11 +107,7 @@ class Store:
         return found
 
     def run(self, case: Case) -> Run:
-        """Opens the run of a case that has been computed.
-
-        Raises:
-            RunFileError: It has not, or its file is damaged.
-        """
+        """Opens the run of a case that has been computed; a RunFileError if it has not."""
         return open_run(self.path(case))
 
     def _stored(self, case: Case) -> Outcome | None:
@@ -144,7 +133,7 @@ class Store:
                 end the call.
 
         Returns:
-            The outcome by its `case_key` of every case but those that failed.
+            The outcome by its `case_key` of every case but those that failed, in the order of the cases.
 
         Raises:
             AnnelidError: A case cannot be built, or its file cannot be written, and ``failed`` is None. A run that a
@@ -166,11 +155,9 @@ class Store:
         report()
         if not missing:
             return found
-        mark = self._mark()
         given = self._workers
-        cores = min(jobs or os.cpu_count() or 1, len(missing))
-        with Processes(cores) if given is None else nullcontext(given) as workers:
-            for case, error in self._computed(workers, missing, mark):
+        with Processes(jobs) if given is None else nullcontext(given) as workers:
+            for case, error in self._computed(workers, missing):
                 left_s, done = left_s - case.cost_s, done + 1
                 if error is None:
                     found[case_key(case)] = self[case]
@@ -179,57 +166,57 @@ class Store:
                 else:
                     failed[case_key(case)] = error
                 report()
-        self._clear_drafts()
-        return found
+        # What killed attempts have left of runs that are there now.
+        for draft in self.folder.glob(DRAFTS):
+            if stored_outcome(run_of_draft(draft), self._keep) is not None:
+                shutil.rmtree(draft, ignore_errors=True)
+        return {key: found[key] for key in wanted if key in found}
 
     def finish(
         self, cases: Sequence[Case], stage: str, *, jobs: int | None = None, progress: StudyProgress | None = None
     ) -> list[Done]:
         """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
 
-        Args:
-            cases: The cases.
-            stage: What is told as they are run.
-            jobs: As of `compute`.
-            progress: Called as cases are checked and run, in place of the store's own.
-
-        Returns:
-            What became of every case, in their order.
+        ``stage`` is what ``progress``, by default the store's, is called with as they are run. Returns what became of
+        each case, in their order.
         """
-        progress = progress or self.progress
-
-        def told(text: str, done: int, total: int, share: float) -> None:
-            if progress is not None:
-                progress(text, done, total, share)
-
-        failed: dict[str, Exception] = {}
-        refused: list[ConfigError | None] = []
+        report: StudyProgress = progress or self.progress or (lambda *_: None)
+        refused: dict[int, ConfigError] = {}
         for i, case in enumerate(cases):
-            told("checking the runs", i, len(cases), i / len(cases))
-            refused.append(refusal(case))
-        built = [case for case, error in zip(cases, refused, strict=True) if error is None]
+            report("checking the runs", i, len(cases), i / len(cases))
+            try:
+                refuse_nonsense(case.config)
+            except ConfigError as error:
+                refused[i] = error
+        failed: dict[str, Exception] = {}
         outcomes = self.compute(
-            built,
+            [case for i, case in enumerate(cases) if i not in refused],
             jobs=jobs,
-            progress=lambda *state: told(f"{stage}, {len(failed)} failed" if failed else stage, *state),
+            progress=lambda *state: report(f"{stage}, {len(failed)} failed" if failed else stage, *state),
             failed=failed,
         )
         return [
-            Done(outcomes.get(case_key(case)), failed.get(case_key(case))) if error is None else Done(None, error, True)
-            for case, error in zip(cases, refused, strict=True)
+            Done(None, refused[i], True)
+            if i in refused
+            else Done(outcomes.get(case_key(case)), failed.get(case_key(case)))
+            for i, case in enumerate(cases)
         ]
 
-    def _computed(
-        self, workers: Workers, missing: Sequence[Case], mark: str
-    ) -> Iterator[tuple[Case, Exception | None]]:
-        """Has runs computed, and hands each over as it is there or has failed."""
+    def _computed(self, workers: Workers, missing: Sequence[Case]) -> Iterator[tuple[Case, Exception | None]]:
+        """Has runs computed, and yields each as it is there or has failed."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        marked = self.folder / MARK_NAME
+        if not marked.exists():
+            marked.write_text(uuid.uuid4().hex, encoding="utf-8")
+        home, mark, code = str(self.folder.resolve()), marked.read_text(encoding="utf-8"), own_code()
         # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
         # dies would be counted against the runs behind the one that killed it.
         waiting, running, tries = deque(missing), dict[Result, Case](), Counter[str]()
         while waiting or running:
             while waiting and len(running) < workers.slots():
                 case = waiting.popleft()
-                running[workers.submit(self._task(case, mark))] = case
+                task = Task(self.path(case).name, case.config.model_dump_json(), code, home, mark, self._keep)
+                running[workers.submit(task)] = case
             if not running:
                 time.sleep(POLL_S)
             done, _ = wait(running, POLL_S, FIRST_COMPLETED)
@@ -255,27 +242,9 @@ class Store:
                 else:
                     yield case, None
 
-    def _task(self, case: Case, mark: str) -> Task:
-        config = case.config.model_dump_json()
-        return Task(self.path(case).name, config, own_code(), str(self.folder.resolve()), mark, self._keep)
-
-    def _mark(self) -> str:
-        """Returns the store's mark, by which a worker can tell that it sees the same folder."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        path = self.folder / MARK_NAME
-        if not path.exists():
-            path.write_text(uuid.uuid4().hex, encoding="utf-8")
-        return path.read_text(encoding="utf-8")
-
-    def _clear_drafts(self) -> None:
-        """Removes what killed attempts have left of runs that are there now."""
-        for draft in self.folder.glob(DRAFTS):
-            if stored_outcome(run_of_draft(draft), self._keep) is not None:
-                shutil.rmtree(draft, ignore_errors=True)
-
 
 def case_key(case: Case) -> str:
     """Digest of all that a run depends on: its configuration, the code that computes it, and the engine."""
     foreign = "".join(sorted(foreign_code(kind) for kind in kinds_in(case.config)))
-    text = case.config.model_dump_json(exclude={"summary"}) + physics_fingerprint() + foreign
+    text = case.config.model_dump_json(exclude={"summary", "published"}) + physics_fingerprint() + foreign
     return hashlib.sha256(text.encode()).hexdigest()[:16]

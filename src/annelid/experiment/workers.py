@@ -11,13 +11,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from annelid.errors import ClusterError, RunKilled
 from annelid.experiment.attempt import Task, attempt
-from annelid.experiment.lifeline import end_with_parent
-from annelid.simulation.interruption import Interruption
+from annelid.experiment.lifeline import end_after
+from annelid.simulation.progress import Interruption
 
 Result = Future[bytes | None]
 
@@ -27,25 +26,18 @@ _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NU
 
 
 class Workers(ABC):
-    """Workers that each compute one run at a time; used as a context, at whose end they are let go.
-
-    Attributes:
-        retries: How often a run is tried again whose files could not be written.
-    """
+    """Workers that each compute one run at a time; used as a context, at whose end they are let go."""
 
     retries: int = 0
+    """How often a run is tried again whose files could not be written."""
 
     @abstractmethod
     def slots(self) -> int:
-        """Returns how many runs can be under way now.
-
-        Raises:
-            ClusterError: The workers are lost for good.
-        """
+        """Returns how many runs can be under way now; a `ClusterError` where the workers are lost for good."""
 
     @abstractmethod
     def submit(self, task: Task) -> Result:
-        """Has a run computed; a future that ends cancelled was lost on the way and may be submitted again."""
+        """Has a run computed; a future that ends cancelled was lost and may be submitted again."""
 
     def explained(self, error: Exception) -> Exception:
         """Returns an error of a run as one that a user can read."""
@@ -56,29 +48,21 @@ class Workers(ABC):
         """Lets the workers go, ``drop`` with what they are at."""
 
     def __enter__(self) -> Self:
-        """Begins to use them."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Lets them go."""
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self.close(drop=error is not None)
 
 
 @dataclass
 class _Process:
-    """A process with a queue of its own: should it die, only its own run is lost.
-
-    Attributes:
-        pool: The process.
-        ready: Done once it has started.
-        result: Of its last run.
-    """
+    """A process with a queue of its own: should it die, only its own run is lost."""
 
     pool: ProcessPoolExecutor
     ready: Future[int]
+    """Done once it has started."""
     result: Result | None = None
+    """Of its last run."""
 
 
 class Processes(Workers):
@@ -88,12 +72,7 @@ class Processes(Workers):
     """
 
     def __init__(self, jobs: int | None = None, retries: int = 2) -> None:
-        """Prepares.
-
-        Args:
-            jobs: How many; default: one a core.
-            retries: How often a run is tried again whose process died or whose files could not be written.
-        """
+        """Takes how many processes, by default one a core; a run is also tried again whose process died."""
         self.retries = retries
         self._jobs = jobs or os.cpu_count() or 1
         self._processes: list[_Process] = []
@@ -104,11 +83,7 @@ class Processes(Workers):
         return self._jobs
 
     def submit(self, task: Task) -> Result:
-        """Has a run computed by a process that is free.
-
-        Raises:
-            ClusterError: Processes end as they start.
-        """
+        """Has a run computed by a process that is free."""
         # The pool starts its process as it takes work.
         with _single_threaded():
             for _ in range(STARTS):
@@ -116,7 +91,7 @@ class Processes(Workers):
                 try:
                     result = free.result = free.pool.submit(attempt, task)
                     # One that dies at this very moment may lose the run without a word, so that it would never end
-                    # (CPython 3.11); a pool that still takes a call tells of what it has taken before.
+                    # (CPython 3.11); a pool that still takes a call reports what it has taken before.
                     free.pool.submit(os.getpid)
                 except BrokenExecutor:
                     # It was killed while it had nothing to do.
@@ -155,7 +130,7 @@ class Processes(Workers):
         context = get_context("spawn")
         if self._lifeline is None:
             self._lifeline = context.Pipe(duplex=False)
-        pool = ProcessPoolExecutor(1, context, end_with_parent, (self._lifeline[0],))
+        pool = ProcessPoolExecutor(1, context, end_after, (self._lifeline[0].recv_bytes,))
         # Interrupted halfway, it would leave a process that complains of it.
         with Interruption() as interruption:
             self._processes.append(_Process(pool, pool.submit(os.getpid)))
@@ -176,11 +151,10 @@ class Processes(Workers):
 @contextmanager
 def _single_threaded() -> Iterator[None]:
     """Has the workers' linear algebra keep to one thread each: the runs are what is parallel."""
-    before = {name: os.environ.get(name) for name in _SINGLE_THREADED}
-    os.environ.update({name: value for name, value in _SINGLE_THREADED.items() if before[name] is None})
+    added = _SINGLE_THREADED.keys() - os.environ.keys()
+    os.environ.update({name: _SINGLE_THREADED[name] for name in added})
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
+        for name in added:
+            os.environ.pop(name, None)

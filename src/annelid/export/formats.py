@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from annelid.body.assemble import mjcf_text
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError
-from annelid.export.matlab import write_matlab
-from annelid.export.mjcf import write_mjcf
 from annelid.export.page import write_page
-from annelid.export.tables import Table, about, tables_of, write_parquet, write_table
-from annelid.output import with_suffix, write_json
+from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_tables
+from annelid.output import with_suffix, write_text
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 WINDOW = frozenset({"--from-time", "--to-time"})
 SELECTION = WINDOW | {"--signals", "--every"}
 GIF_FPS = 12.5
-ABOUT = "about.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Format:
 
     Attributes:
         name: What it is called on the command line.
-        default: What it writes in the run's folder unless told otherwise; without a suffix, a folder of files.
+        default: What it writes in the run's folder unless a path is given; without a suffix, a folder of files.
         suffix: How the name of its files ends.
         options: Options of the selection that it takes.
         write: Writes a run to a path, calling back with steps done and in all; returns the files.
@@ -86,65 +87,46 @@ def find_format(name: str) -> Format:
     return FORMATS.find(name)
 
 
-def _csv(run: Run, path: Path, progress: Progress) -> list[Path]:
-    written = _tables(run, path, ".csv", write_table, progress)
-    return written if path in written else [*written, write_json(path / ABOUT, about(run))]
+def write_mjcf(run: Run, path: Path) -> Path:
+    """Writes a run's 3D worm and arena for plain MuJoCo, with the last state as a keyframe.
 
-
-def _parquet(run: Run, path: Path, progress: Progress) -> list[Path]:
-    facts = about(run)
-
-    def write(table: Table, file: Path, wrote: Callable[[int], None]) -> Path:
-        write_parquet(table, file, facts)
-        wrote(len(table[0].values))
-        return file
-
-    return _tables(run, path, ".parquet", write, progress)
-
-
-def _tables(
-    run: Run,
-    path: Path,
-    suffix: str,
-    write: Callable[[Table, Path, Callable[[int], None]], Path],
-    progress: Progress,
-) -> list[Path]:
-    """Writes every table of a run into a folder, or its only one to a file.
+    The keyframe ``final`` is the last checkpoint, whole but for the frames of rods, which the engine keeps outside its
+    keyframes. A run that cannot be continued has the keyframe ``last_posture`` instead: its last frame, at rest.
 
     Raises:
-        RunFileError: The path is one file, but there are several tables; or a file cannot be written.
+        ConfigError: The worm is planar or started with a heading, or its friction depends on the direction.
+        RunFileError: The file cannot be written.
     """
-    tables = tables_of(run)
-    alone = path.suffix.lower() == suffix
-    if alone and len(tables) != 1:
-        raise RunFileError(
-            f"{path} is one file, but these signals make {len(tables)} tables ({', '.join(tables)}): name a folder, "
-            "or choose signals of the same dimensions with --signals"
-        )
-    total, done = sum(len(table[0].values) for table in tables.values()), 0
+    from annelid.simulation.runfile import read_checkpoint
+    from annelid.simulation.worm import WormPlant
 
-    def wrote(rows: int) -> None:
-        nonlocal done
-        done += rows
-        progress(done, total)
+    keyframes: list[dict[str, Any]] = []
+    if not run.config.body.is_planar:
+        plant = WormPlant(run.config)
+        try:
+            plant.set_state(read_checkpoint(run.path).plant)
+            parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
+            keyframes.append({"name": "final", "time": float(plant.data.time), **parts})
+        except RunFileError:
+            if run.data.sizes.get("frame"):
+                posture, time_s = run.data["qpos"].values[-1], float(run.data["frame_time"].values[-1])
+                keyframes.append(
+                    {"name": "last_posture", "time": time_s, "qpos": posture, "act": plant.anatomy.first_act}
+                )
+    return write_text(path, mjcf_text(run.config, keyframes))
 
-    (path.parent if alone else path).mkdir(parents=True, exist_ok=True)
-    return [write(table, path if alone else path / f"{name}{suffix}", wrote) for name, table in tables.items()]
+
+def _video(run: Run, path: Path, progress: Progress, fps: float = 25.0) -> list[Path]:
+    return [render_video(run, path, fps=fps, progress=progress)]
 
 
 for _format in (
-    Format("csv", "csv", ".csv", SELECTION, _csv),
+    Format("csv", "csv", ".csv", SELECTION, write_csv_tables),
     Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)]),
-    Format("parquet", "parquet", ".parquet", SELECTION, _parquet, "pyarrow"),
-    Format("mp4", "video.mp4", ".mp4", WINDOW, lambda run, path, told: [render_video(run, path, progress=told)]),
-    Format(
-        "gif",
-        "video.gif",
-        ".gif",
-        WINDOW,
-        lambda run, path, told: [render_video(run, path, fps=GIF_FPS, progress=told)],
-    ),
-    Format("html", "report.html", ".html", WINDOW, lambda run, path, told: [write_page(run, path, told)]),
+    Format("parquet", "parquet", ".parquet", SELECTION, write_parquet_tables, "pyarrow"),
+    Format("mp4", "video.mp4", ".mp4", WINDOW, _video),
+    Format("gif", "video.gif", ".gif", WINDOW, partial(_video, fps=GIF_FPS)),
+    Format("html", "report.html", ".html", WINDOW, lambda run, path, progress: [write_page(run, path, progress)]),
     Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)]),
 ):
     FORMATS.add(_format.name, _format)

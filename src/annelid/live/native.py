@@ -22,7 +22,7 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
 
     Args:
         source: A configuration to run, or a run to play.
-        speed: Simulated seconds a second.
+        speed: Simulated seconds per second.
 
     Raises:
         RenderingUnavailable: There is no display, no OpenGL on it, or on macOS it is not run by mjpython.

@@ -4,29 +4,21 @@ from __future__ import annotations
 
 import html
 import math
-from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
 
 from annelid.config import RunConfig
 from annelid.draw.render import Progress
-from annelid.draw.skeleton import Skeleton
 from annelid.errors import RunFileError
-from annelid.live.guard import content_policy
 from annelid.live.panel import legend_html
-from annelid.live.picture import Painter, Picture
-from annelid.live.player import Player, config_of, player_of
-from annelid.live.server import Server
+from annelid.live.picture import Painter
+from annelid.live.player import config_of, player_of
+from annelid.live.server import Server, content_policy
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
-from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
 
-FRAMES_A_SECOND = 25.0
-"""Of a page, in simulated time; a run has as many as it has recorded, if those are fewer."""
-GRAIN_M = 2.0**-13
-"""Places are rounded to an eighth of a millimetre, which halves the page."""
+FRAMES_A_SECOND = 25.0  # of a page, in simulated time; a run has as many as it has recorded, if those are fewer
+GRAIN_M = 2.0**-13  # places are rounded to an eighth of a millimetre, which halves the page
 PAGE_SUFFIXES = (".html", ".htm")
 
 
@@ -40,7 +32,7 @@ def export_page(
     Args:
         source: A run, or a configuration, which is run for its duration.
         path: The page to write (``.html``).
-        speed: Simulated seconds a second: 1 is real time.
+        speed: Simulated seconds per second: 1 is real time.
         progress: Called after every frame.
 
     Returns:
@@ -56,63 +48,39 @@ def export_page(
         raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
     config = config_of(source)
     player, anatomy = player_of(source)
-    span = (0.0, config.duration_s) if player.worm is not None else player.reel.span_s
-    page = _page(config, anatomy, player, _times(*span), speed, progress)
+    reel, worm = player.reel, player.worm
+    first_s, last_s = reel.span_s if worm is None else (0.0, config.duration_s)
+    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
+    painter = Painter(anatomy, config, GRAIN_M)
+    shown = reel.at(first_s)
+    # A server that nobody visits records what it would send.
+    server = Server()
+    try:
+        stage = Stage(server, config, painter, shown)
+        recording = server.get_scene_serializer()
+        for frame in range(n_frames):
+            time_s = first_s + frame / FRAMES_A_SECOND
+            if worm is not None:
+                worm.advance(time_s, math.inf)
+            moment = reel.at(time_s + 0.5 / FRAMES_A_SECOND)
+            if moment is not shown:
+                stage.show(moment, follow=True)
+                shown = moment
+            recording.insert_sleep(1.0 / FRAMES_A_SECOND / speed)
+            if progress is not None:
+                progress(frame + 1, n_frames)
+        page = recording.as_html()
+    finally:
+        server.stop()
+    page = _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
     with whole_file(path) as draft:
         draft.write_text(page, encoding="utf-8")
     return path
 
 
 def page_path(path: str | Path) -> Path:
-    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``.
-
-    Raises:
-        RunFileError: Another suffix, or a folder.
-    """
+    """Returns the file that `export_page` writes for a name: one without a suffix becomes an ``.html``."""
     return with_suffix(path, PAGE_SUFFIXES, "a page", default=".html")
-
-
-def _times(first_s: float, last_s: float) -> list[float]:
-    n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
-    return [first_s + frame / FRAMES_A_SECOND for frame in range(n_frames)]
-
-
-def _page(
-    config: RunConfig,
-    anatomy: Anatomy,
-    player: Player,
-    times_s: list[float],
-    speed: float,
-    progress: Progress | None,
-) -> str:
-    """Lets a server that nobody visits record what it would send."""
-    painter = Painter(Skeleton(anatomy), config)
-    reel, worm = player.reel, player.worm
-    server = Server()
-    try:
-        stage = Stage(server, config, painter.strand_colors(), _rounded(painter.paint(reel.at(times_s[0]))))
-        recording = server.get_scene_serializer()
-        shown = reel.at(times_s[0])
-        for frame, time_s in enumerate(times_s):
-            if worm is not None:
-                worm.advance(time_s, math.inf)
-            moment = reel.at(time_s + 0.5 / FRAMES_A_SECOND)
-            if moment is not shown:
-                stage.show(_rounded(painter.paint(moment)), follow=True)
-                shown = moment
-            recording.insert_sleep(1.0 / FRAMES_A_SECOND / speed)
-            if progress is not None:
-                progress(frame + 1, len(times_s))
-        page = recording.as_html()
-    finally:
-        server.stop()
-    return _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
-
-
-def _rounded(picture: Picture) -> Picture:
-    """Places with fewer digits, which compress."""
-    lines = {name: getattr(picture, name) for name in ("strands", "rings", "springs", "contacts")}
-    return replace(picture, **{n: (np.round(v / GRAIN_M) * GRAIN_M).astype(np.float32) for n, v in lines.items()})
 
 
 def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> str:

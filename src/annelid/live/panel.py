@@ -1,20 +1,21 @@
-"""The panel beside the scene: what is played, what can be turned, the neurons, and what the colours mean."""
+"""The panel beside the scene: what is played, what can be turned, plots of signals, and what the colours mean."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from annelid.config import Knob
-from annelid.draw.style import CONTRACTED, RELAXED, segment_colors
+from annelid.config import Knob, RunConfig
+from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
+from annelid.live.living import knobs_of
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
-from annelid.live.traces import Curve, Plot
+from annelid.nervous.drawing import by_segment, role_of
 
 if TYPE_CHECKING:
     import viser
@@ -22,55 +23,87 @@ if TYPE_CHECKING:
     from annelid.live.show import Show
 
 PLAY, NOW, AGAIN = "play / pause", "now", "restart"
-STRONGEST_POKE = 3.0
-"""In weights of the worm; more would tear the thinnest."""
-PLOT_HEIGHT = 190
-"""Of the plots, pixels."""
+STRONGEST_POKE = 3.0  # in weights of the worm; more would tear the thinnest
+PLOT_HEIGHT = 190  # of the plots, pixels
+MOST_SEGMENTS = 4  # with more than these the expansion neurons are left out of the first plot
+SECONDS = 5.0  # how far back the plots go, in simulated time
+MOST_SAMPLES = 250  # of one curve of a plot
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One signal of a plot."""
+
+    signal: str  # its name in the reel
+    label: str
+    number: int  # its place among the plot's colours
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Curves that are drawn together."""
+
+    title: str  # what they are, with the unit
+    curves: tuple[Curve, ...]
+    n_colors: int
+    limits: tuple[float, float] | None = None  # ends of the axis, or None for those of the curves
+
+
+def plots_of(names: Sequence[str]) -> dict[str, Plot]:
+    """Returns the plots that the signals of a `Reel` make, by the names to choose from; first the default."""
+    muscles = [name for name in names if name.startswith("activation_")]
+    segments, others = by_segment(name for name in names if name not in muscles)
+    plots: dict[str, Plot] = {}
+    if segments:
+        plots["half-centres"] = _half_centres(segments)
+        for segment, neurons in segments.items():
+            labels = [role_of(neuron) for neuron in neurons]
+            plots[f"neurons of segment {segment}"] = _plot(f"segment {segment}: potentials (mV)", neurons, labels)
+    if others:
+        plots["other neurons"] = _plot("potentials (mV)", others, others)
+    numbers = [name.removeprefix("activation_") for name in muscles]
+    plots["activation"] = _plot("activation of the muscles", muscles, numbers, (-0.05, 1.05))
+    return plots
+
+
+def _plot(title: str, signals: Sequence[str], labels: Sequence[str], limits: tuple[float, float] | None = None) -> Plot:
+    curves = tuple(Curve(*names, i) for i, names in enumerate(zip(signals, labels, strict=True)))
+    return Plot(title, curves, len(curves), limits)
+
+
+def _half_centres(segments: dict[int, list[str]]) -> Plot:
+    curves: list[Curve] = []
+    for number, (segment, neurons) in enumerate(segments.items()):
+        if f"contraction_{segment}" in neurons:
+            curves.append(Curve(f"contraction_{segment}", str(segment), number))
+        if f"expansion_{segment}" in neurons and len(segments) <= MOST_SEGMENTS:
+            curves.append(Curve(f"expansion_{segment}", f"{segment} exp.", number, dashed=True))
+    words = ", expansion dashed" if any(curve.dashed for curve in curves) else ""
+    return Plot(f"contraction{words} (mV)", tuple(curves), len(segments))
 
 
 class Panel:
-    """The panel's elements.
+    """The panel's elements; what they change is asked of the loop of a view."""
 
-    Attributes:
-        poke_N: Force of a poke as set, N; 0 where nothing can be poked.
-    """
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        show: Show,
-        *,
-        speed: float,
-        weight_N: float,
-        knobs: Mapping[Knob, float],
-        plots: Mapping[str, Plot],
-        legend: str,
-    ) -> None:
-        """Makes all elements.
-
-        Args:
-            server: Where they are seen.
-            show: Whom they ask.
-            speed: Simulated seconds a second at the start.
-            weight_N: Of the worm on Earth, which pokes are measured by.
-            knobs: What can be turned, with the values that are shown first; none of a recorded run.
-            plots: What can be plotted, by name; the first is.
-            legend: What colours mean, as HTML.
-        """
+    def __init__(self, server: viser.ViserServer, show: Show, speed: float, weight_N: float, legend: str) -> None:
+        """Makes all elements; the worm's weight on Earth is what pokes are measured by."""
         gui = self._gui = server.gui
+        self._player = player = show.player
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self._status = gui.add_html("")
         self._transport(show, speed)
         self._knobs: dict[Knob, Any] = {}
         self._poke: Any = None
-        if show.player.worm is not None:
-            self._physics(show, weight_N, knobs)
+        if player.worm is not None:
+            self._physics(show, player.worm.config, weight_N)
+        self._plots = plots_of(player.reel.names)
         self._plot_folder = gui.add_folder("Nervous system, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
-            choice = gui.add_dropdown("plot", list(plots), initial_value=next(iter(plots)))
-            choice.on_update(lambda event: show.ask(show.choose_plot, str(event.target.value)))
+            choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))
+            choice.on_update(lambda event: show.ask(self.choose_plot, str(event.target.value)))
         with gui.add_folder("Colours"):
             gui.add_html(legend)
         with gui.add_folder("Shown", expand_by_default=False):
@@ -79,68 +112,48 @@ class Panel:
             for layer in LAYERS:
                 box = gui.add_checkbox(layer, initial_value=True)
                 box.on_update(_asking(show, show.stage.set_visible, layer))
+        self.choose_plot(next(iter(self._plots)))
 
     @property
     def poke_N(self) -> float:
-        """Force of a poke, N."""
+        """Force of a poke as set, N; 0 where nothing can be poked."""
         return float(self._poke.value) if self._poke is not None else 0.0
 
     def _transport(self, show: Show, speed: float) -> None:
         gui, player = self._gui, show.player
         living = player.worm is not None
         buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: show.restart}
-        row = gui.add_button_group(
-            "",
-            list(buttons),
-            hint="now: the present, and on from there. restart: time zero, with the sliders as they are."
-            if living
-            else "restart: from the beginning.",
-        )
+        live_hint = "now: the present, and on from there. restart: time zero, with the sliders as they are."
+        row = gui.add_button_group("", list(buttons), hint=live_hint if living else "restart: from the beginning.")
         row.on_click(lambda event: show.ask(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
         self._time.on_update(_asking(show, player.seek))
-        pace = gui.add_slider(
-            "speed", SLOWEST, FASTEST, 0.05, speed, hint="Simulated seconds a second; the worm may not keep up."
-        )
+        hint = "Simulated seconds per second; the worm may not keep up."
+        pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, speed, hint=hint)
         pace.on_update(_asking(show, setattr, player, "speed"))
 
-    def _physics(self, show: Show, weight_N: float, knobs: Mapping[Knob, float]) -> None:
-        with self._gui.add_folder("Physics"):
-            for knob, shown in knobs.items():
-                slider = self._gui.add_slider(knob.label, knob.low, knob.high, knob.step, shown, hint=knob.hint)
-                slider.on_update(_asking(show, show.turn, knob))
-                self._knobs[knob] = slider
-            self._poke = self._gui.add_slider(
-                "poke (N)",
-                0.0,
-                STRONGEST_POKE * weight_N,
-                0.1,
-                weight_N,
-                hint="Force of a poke, the worm's weight at first: click on the worm, which is pushed away from "
-                "you for 0.15 s.",
-            )
-            self._gui.add_button("as at first", hint="Gives every slider above its first value.").on_click(
-                lambda _: show.ask(show.reset_knobs)
-            )
+    def _physics(self, show: Show, config: RunConfig, weight_N: float) -> None:
+        gui = self._gui
+        with gui.add_folder("Physics"):
+            for knob in knobs_of(config):
+                self._knobs[knob] = gui.add_slider(
+                    knob.label, knob.low, knob.high, knob.step, knob.shown(config), hint=knob.hint
+                )
+                self._knobs[knob].on_update(_asking(show, show.turn, knob))
+            hint = "Force of a poke, the worm's weight at first: click on the worm to push it away from you for 0.15 s."
+            self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
+            again = gui.add_button("as at first", hint="Gives every slider above its first value.")
+            again.on_click(lambda _: show.ask(show.reset_knobs))
 
-    def tell(self, status: str) -> None:
-        """Shows the state of things first, as HTML."""
-        self._status.content = status
+    def show_knobs(self, config: RunConfig) -> None:
+        """Moves the sliders to what a configuration says."""
+        for knob, slider in self._knobs.items():
+            slider.value = knob.shown(config)
 
-    def show_time(self, time_s: float, span_s: tuple[float, float]) -> None:
-        """Moves the slider of time."""
-        first, last = span_s
-        self._time.min = first
-        self._time.max = max(last, first + 0.01)
-        self._time.value = time_s
-
-    def show_knobs(self, shown: Mapping[Knob, float]) -> None:
-        """Moves the sliders."""
-        for knob, value in shown.items():
-            self._knobs[knob].value = value
-
-    def show_plot(self, plot: Plot) -> None:
-        """Puts another plot in place of the present one; it is empty until `show_curves`."""
+    def choose_plot(self, name: str) -> None:
+        """Puts another plot in place of the present one; it is empty until `update`."""
+        plot = self._plots[name]
+        self._columns = [self._player.reel.names.index(curve.signal) for curve in plot.curves]
         if self._chart is not None:
             self._chart.remove()
         colors = [_css(color) for color in segment_colors(max(plot.n_colors, 1))]
@@ -156,15 +169,21 @@ class Panel:
                 height=PLOT_HEIGHT,
             )
 
-    def show_curves(self, time_s: NDArray[np.float64], values: Sequence[NDArray[np.float64]]) -> None:
-        """Draws the signals of the present plot, one array a curve."""
-        self._chart.data = (time_s, *values)
+    def update(self, status: str) -> None:
+        """Shows the state of things, as HTML, the present time, and the signals of the last seconds before it."""
+        self._status.content = status
+        reel, time_s = self._player.reel, self._player.moment.time_s
+        first, last = reel.span_s
+        self._time.min, self._time.max = first, max(last, first + 0.01)
+        self._time.value = time_s
+        times, values = reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
+        if len(times):
+            self._chart.data = (times, *values[:, self._columns].T)
 
 
 def _series(curve: Curve, colors: Sequence[str]) -> Any:
-    series: dict[str, Any] = {"label": curve.label, "stroke": colors[curve.number], "width": 1.6}
-    series["points"] = {"show": False}
-    return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {})
+    series: dict[str, Any] = {"label": curve.label, "stroke": colors[curve.number], "points": {"show": False}}
+    return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {"width": 1.6})
 
 
 def _asking(show: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
@@ -178,12 +197,7 @@ def _asking(show: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any]
 
 
 def legend_html(arrow_N: float, radius_m: float) -> str:
-    """Returns the legend.
-
-    Args:
-        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, N.
-        radius_m: That radius, m.
-    """
+    """Returns the legend; the arrow of this contact force is as long as the worm's radius at rest."""
     percent = f"{100 * SPRING_RANGE:.0f}&thinsp;%"
     rows = (
         (_bar(STRAND_COLORS, smooth=False), "strands, one colour for either handedness"),
@@ -202,13 +216,7 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
 
 
 def status_html(name: str, parts: Sequence[str], below: str) -> str:
-    """Returns the state of things, every word as it was written.
-
-    Args:
-        name: Of the worm.
-        parts: What stands beside it.
-        below: A sentence under it, or none.
-    """
+    """Returns the worm's name, what stands beside it and a sentence below, or none, every word as it was written."""
     line = "&emsp;".join([f"<b>{html.escape(name)}</b>", *map(html.escape, parts)])
     rest = f'<div style="margin-top:0.5em">{html.escape(below)}</div>' if below else ""
     return f'<div style="font-size:0.9em;margin:0 0.6em;overflow-wrap:anywhere">{line}{rest}</div>'

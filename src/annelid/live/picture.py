@@ -8,69 +8,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.config import RunConfig
-from annelid.draw.skeleton import Skeleton
-from annelid.draw.style import CONTRACTED, RELAXED
-from annelid.live.moments import Moment
+from annelid.draw.canvas import CONTRACTED, RELAXED
+from annelid.draw.scene import Skeleton
+from annelid.live.living import Moment
 from annelid.morphology import Array
+from annelid.simulation.anatomy import Anatomy
 
-Lines = NDArray[np.float32]
-"""Ends of line segments, m, ``(n, 2, 3)``."""
-Colors = NDArray[np.uint8]
-"""Red, green and blue at these ends, ``(n, 2, 3)``."""
+Lines = NDArray[np.float32]  # ends of line segments, m, ``(n, 2, 3)``
+Colors = NDArray[np.uint8]  # red, green and blue at these ends, ``(n, 2, 3)``
 
-STRAND_COLORS = ((0.16, 0.38, 0.72), (0.42, 0.62, 0.86))
-"""Of the two handednesses."""
+STRAND_COLORS = ((0.16, 0.38, 0.72), (0.42, 0.62, 0.86))  # of the two handednesses
 SPRING_COLORS = ((0.45, 0.20, 0.70), (0.80, 0.74, 0.60), (0.95, 0.50, 0.05))
 """Of an axial spring at most shortened, at rest, and at most stretched."""
-SPRING_RANGE = 0.3
-"""Strain at which these colours are full."""
+SPRING_RANGE = 0.3  # strain at which these colours are full
 CONTACT_COLOR = (0.04, 0.45, 0.14)
 SCREEN_GAMMA = 2.2
 REACH_M = 0.04
 """Distance from the line of sight within which a point of the mesh is hit; its meshes are wider than a mouse."""
-LONGEST_ARROW = 4.0
-"""Of the arrows of contact forces, in radii of the worm at rest."""
+LONGEST_ARROW = 4.0  # of the arrows of contact forces, in radii of the worm at rest
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """One instant, ready to draw, in the model's axes.
+    """One instant, ready to draw, in the model's axes."""
 
-    Attributes:
-        strands: Elements of all strands; their colours never change.
-        rings: Ring muscles from crossing to crossing.
-        ring_colors: Grey at rest, red where activated.
-        springs: Axial springs.
-        spring_colors: By their strain.
-        contacts: Arrows of the ground's force on every segment, from where it pushes most.
-        middle: The middle of the worm, m, ``(3,)``.
-    """
-
-    strands: Lines
-    rings: Lines
-    ring_colors: Colors
+    strands: Lines  # elements of all strands; their colours never change
+    rings: Lines  # ring muscles from crossing to crossing
+    ring_colors: Colors  # grey at rest, red where activated
     springs: Lines
-    spring_colors: Colors
-    contacts: Lines
-    middle: Array
+    spring_colors: Colors  # by their strain
+    contacts: Lines  # arrows of the ground's force on every segment, from where it pushes most
+    middle: Array  # of the worm, (3,)
 
 
 class Painter:
     """Turns the moments of one worm into pictures.
 
     Attributes:
-        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, N.
+        arrow_N: Contact force whose arrow is as long as the worm's radius at rest, about two segments' weight, N.
     """
 
-    def __init__(self, skeleton: Skeleton, config: RunConfig) -> None:
-        """Takes what stays the same: which points belong together, and the scale of forces.
-
-        Args:
-            skeleton: The worm.
-            config: Its configuration; gravity sets the scale of forces, about two segments' weight.
-        """
-        self._skeleton = skeleton
-        anatomy = skeleton.anatomy
+    def __init__(self, anatomy: Anatomy, config: RunConfig, grain_m: float = 0.0) -> None:
+        """Takes the worm, and what places are rounded to, so that they compress."""
+        self._skeleton, self._grain_m = Skeleton(anatomy), grain_m
         self._geometry = anatomy.geometry
         path = anatomy.ring_path
         self._ring_pairs = np.stack([path[:, :-1], path[:, 1:]], axis=-1).reshape(-1, 2)
@@ -92,10 +72,10 @@ class Painter:
         springs = crossing[self._geometry.springs]
         length = np.linalg.norm(springs[:, 1] - springs[:, 0], axis=-1)
         return Picture(
-            strands=_segments(vertices),
-            rings=crossing[self._ring_pairs].astype(np.float32),
+            strands=self._lines(np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)),
+            rings=self._lines(crossing[self._ring_pairs]),
             ring_colors=ring_colors(moment.activation, self._corners),
-            springs=springs.astype(np.float32),
+            springs=self._lines(springs),
             spring_colors=spring_colors(length / self._geometry.spring_length_m - 1.0),
             contacts=self._arrows(moment.contact_force_N, crossing),
             middle=crossing.mean(axis=0),
@@ -111,16 +91,15 @@ class Painter:
         length = np.linalg.norm(reach, axis=-1, keepdims=True)
         longest = LONGEST_ARROW * self._geometry.radius_m
         reach = reach * np.minimum(1.0, longest / np.maximum(length, longest * 1e-9))
-        return np.stack([foot, foot + reach], axis=1).astype(np.float32)
+        return self._lines(np.stack([foot, foot + reach], axis=1))
+
+    def _lines(self, points_m: Array) -> Lines:
+        lines = points_m.astype(np.float32)
+        return (np.round(lines / self._grain_m) * self._grain_m).astype(np.float32) if self._grain_m else lines
 
 
 def ring_colors(activation: NDArray[np.floating], n_corners: int) -> Colors:
-    """Colours of every line of the rings, grey at activation 0 and red at 1.
-
-    Args:
-        activation: Of every ring muscle, ``(n_muscles,)``.
-        n_corners: Lines of each.
-    """
+    """Colours of every line of the rings, ``n_corners`` each, grey at activation 0 and red at 1, ``(n_muscles,)``."""
     share = np.clip(activation, 0.0, 1.0)[:, np.newaxis]
     relaxed, contracted = np.asarray(RELAXED), np.asarray(CONTRACTED)
     return _bytes(np.repeat(relaxed + share * (contracted - relaxed), 2 * n_corners, axis=0)).reshape(-1, 2, 3)
@@ -134,25 +113,12 @@ def spring_colors(strain: NDArray[np.floating]) -> Colors:
 
 
 def struck(points_m: Array, origin_m: Array, direction: Array) -> Array | None:
-    """Returns the point that a ray hits first.
-
-    Args:
-        points_m: Points of the worm, m, ``(n, 3)``.
-        origin_m: Where the ray begins, m, ``(3,)``.
-        direction: Its unit direction, ``(3,)``.
-
-    Returns:
-        The nearest to the origin of all points within `REACH_M` of the ray, ``(3,)``, or None.
-    """
+    """Returns the point ``(3,)`` that a ray hits first, or None: the nearest, of ``(n, 3)``, within `REACH_M`."""
     offsets = points_m - origin_m
     depth = offsets @ direction
     beside = np.linalg.norm(offsets - depth[:, np.newaxis] * direction, axis=-1)
     hit = np.flatnonzero((beside < REACH_M) & (depth > 0))
     return points_m[hit[depth[hit].argmin()]] if hit.size else None
-
-
-def _segments(vertices: Array) -> Lines:
-    return np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3).astype(np.float32)
 
 
 def _bytes(colors: NDArray[np.floating]) -> Colors:

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import math
 
+from annelid.body.worm import WormBody
 from annelid.config import RunConfig
-from annelid.errors import SimulationStopped
-from annelid.live.living import LivingWorm, require_worm
-from annelid.live.moments import Moment, Reel, reel_of
+from annelid.errors import ConfigError, SimulationStopped
+from annelid.live.living import LivingWorm, Moment, Reel, reel_of
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 
-SLOWEST, FASTEST = 0.05, 10.0
-"""Simulated seconds a second."""
+SLOWEST, FASTEST = 0.05, 10.0  # simulated seconds per second
 
 
 class Player:
-    """Shows a reel; at the end of a living worm's the worm goes on, at the end of a run's it stops.
+    """Shows a reel, playing from its first moment; at the end of a living worm's the worm goes on, a run's stops.
 
     Attributes:
         worm: The living worm, or None for a recorded run.
         playing: Whether time goes on.
-        speed: Simulated seconds a second, as wanted.
+        speed: Simulated seconds per second, as wanted.
         at_end: Whether the last moment is shown: of a living worm the present.
         stopped: The sentence of the guard that stopped the worm, or an empty one.
     """
 
     def __init__(self, source: LivingWorm | Reel, speed: float = 1.0) -> None:
-        """Begins with the first moment, playing."""
         self.worm = source if isinstance(source, LivingWorm) else None
         self._reel = None if isinstance(source, LivingWorm) else source
         self.speed = speed
@@ -66,7 +64,7 @@ class Player:
         self.playing = True
 
     def pause(self) -> None:
-        """Holds time."""
+        """Stops time."""
         self.playing = False
 
     def seek(self, time_s: float) -> None:
@@ -82,13 +80,9 @@ class Player:
         self.playing = self.worm is not None and not self.stopped
 
     def tick(self, elapsed_s: float, deadline: float = math.inf) -> None:
-        """Lets wall-clock time pass.
+        """Lets so much wall-clock time pass, with no step of the worm after a deadline of `time.perf_counter`.
 
         A worm that is too slow for the wanted speed is as late as it is: nothing is caught up.
-
-        Args:
-            elapsed_s: Since the last call, s.
-            deadline: Of `time.perf_counter`, after which the worm takes no further step.
         """
         if not self.playing:
             return
@@ -112,13 +106,13 @@ class Player:
 
 
 def config_of(source: RunConfig | Run) -> RunConfig:
-    """Returns the configuration that a worm is run under, or was.
-
-    Raises:
-        ConfigError: It is a planar worm.
-    """
+    """Returns the configuration that a worm is run under, or was; refuses a planar worm."""
     config = source.config if isinstance(source, Run) else source
-    require_worm(config)
+    if not isinstance(config.body, WormBody):
+        raise ConfigError(
+            f"body.kind = {config.body.kind!r} has nothing to view in 3D; only the 3D worm (body.kind = 'worm') has: "
+            "use annelid run and annelid render"
+        )
     return config
 
 

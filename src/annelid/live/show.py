@@ -11,32 +11,23 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from annelid.config import Knob, RunConfig
-from annelid.draw.skeleton import Skeleton
 from annelid.errors import AnnelidError
-from annelid.live.living import knobs_of
-from annelid.live.moments import Moment
+from annelid.live.living import Moment
 from annelid.live.panel import Panel, legend_html, status_html
 from annelid.live.picture import Painter, struck
 from annelid.live.player import config_of, player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
-from annelid.live.traces import SECONDS, plots_of
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     import viser
 
-FRAMES_A_SECOND = 30.0
-"""At most; fewer where a step of the body takes longer."""
-LONGEST_TICK_S = 0.25
-"""A computer that was asleep does not make the view leap."""
-PANEL_INTERVAL_S = 0.33
-"""Between two updates of plots, time and status."""
-PACE_OVER_S = 2.0
-"""Over which the speed that is reached is measured."""
+FRAMES_A_SECOND = 30.0  # at most; fewer where a step of the body takes longer
+LONGEST_TICK_S = 0.25  # a computer that was asleep does not make the view leap
+PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
+PACE_OVER_S = 2.0  # over which the speed that is reached is measured
 EARTH_M_PER_S2 = 9.81
-MOST_SAMPLES = 250
-"""Of one curve of a plot."""
 
 
 class Show:
@@ -46,8 +37,8 @@ class Show:
 
     Attributes:
         player: What is shown when.
-        picture: What is seen, in the model's axes.
         stage: Where it is seen.
+        panel: What is beside it.
         follow: Whether the worm is kept in the middle, or may crawl away.
         address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
@@ -60,7 +51,7 @@ class Show:
             source: A configuration to run, or a run to play.
             host: Address to listen on.
             port: Port, 0 for any that is free.
-            speed: Simulated seconds a second.
+            speed: Simulated seconds per second.
 
         Raises:
             ConfigError: The body is planar, or cannot be built.
@@ -68,8 +59,7 @@ class Show:
         """
         self._config = config_of(source)
         self.player, anatomy = player_of(source, speed)
-        self._painter = Painter(Skeleton(anatomy), self._config)
-        self.picture = self._painter.paint(self.player.moment)
+        painter = Painter(anatomy, self._config)
         self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
         self._wishing = threading.Lock()
         self._ending = threading.Event()
@@ -78,21 +68,12 @@ class Show:
         self._pace: deque[tuple[float, float]] = deque()
         self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
-        self._knobs = knobs_of(self._config) if self.player.worm is not None else ()
-        self._plots = plots_of(self.player.reel.names)
         self._server = Server(host, port)
         self.address = self._server.address
-        self.stage = Stage(self._server, self._config, self._painter.strand_colors(), self.picture)
-        self._panel = Panel(
-            self._server,
-            self,
-            speed=speed,
-            weight_N=round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1),
-            knobs={knob: knob.shown(self._config) for knob in self._knobs},
-            plots=self._plots,
-            legend=legend_html(self._painter.arrow_N, anatomy.geometry.radius_m),
-        )
-        self.choose_plot(next(iter(self._plots)))
+        self.stage = Stage(self._server, self._config, painter, self.player.moment)
+        weight_N = round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1)
+        legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
+        self.panel = Panel(self._server, self, speed, weight_N, legend)
         if self.player.worm is not None:
             self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
 
@@ -112,7 +93,7 @@ class Show:
             last = begun
             self._draw()
             if begun >= panel_due:
-                self._update_panel(begun)
+                self.panel.update(self._status(begun))
                 panel_due = begun + PANEL_INTERVAL_S
             self._ending.wait(max(0.0, begun + 1.0 / FRAMES_A_SECOND - perf_counter()))
 
@@ -133,7 +114,7 @@ class Show:
             self._wishes[call.__name__, *arguments[:-1]] = call, arguments
 
     def restart(self) -> None:
-        """Begins anew, under what the knobs say."""
+        """Begins anew, with the sliders as they are."""
         self._notice = ""
         self.player.restart()
 
@@ -144,11 +125,11 @@ class Show:
         self.player.worm.adjust({knob.field: knob.value(shown)})
 
     def reset_knobs(self) -> None:
-        """Gives all knobs their first values."""
+        """Gives all sliders their first values."""
         assert self.player.worm is not None
         self._notice = ""
         self.player.worm.as_at_first()
-        self._panel.show_knobs({knob: knob.shown(self.player.worm.config) for knob in self._knobs})
+        self.panel.show_knobs(self.player.worm.config)
 
     def poke(self, origin_m: tuple[float, ...], direction: tuple[float, ...]) -> None:
         """Pokes what a line of sight hits, in the page's axes, m."""
@@ -159,15 +140,9 @@ class Show:
             self._notice = "This is the past: press now and poke the worm again."
             return
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
-        place = struck(self.picture.strands.reshape(-1, 3).astype(float), origin, sight)
+        place = struck(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
-            worm.poke(place, self._panel.poke_N * sight)
-
-    def choose_plot(self, name: str) -> None:
-        """Plots other signals."""
-        self._plot = self._plots[name]
-        self._columns = [self.player.reel.names.index(curve.signal) for curve in self._plot.curves]
-        self._panel.show_plot(self._plot)
+            worm.poke(place, self.panel.poke_N * sight)
 
     def _meet_wishes(self) -> None:
         with self._wishing:
@@ -183,23 +158,13 @@ class Show:
         if wanted == self._drawn:
             return
         self._drawn = wanted
-        self.picture = self._painter.paint(self.player.moment)
         with self._server.atomic():
-            self.stage.show(self.picture, follow=self.follow)
+            self.stage.show(self.player.moment, follow=self.follow)
         self._server.flush()
         self.frames_drawn += 1
 
-    def _update_panel(self, now: float) -> None:
-        player = self.player
-        time_s = player.moment.time_s
-        self._panel.show_time(time_s, player.reel.span_s)
-        times, values = player.reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
-        if len(times):
-            self._panel.show_curves(times, list(values[:, self._columns].T))
-        self._panel.tell(self._status(now, time_s))
-
-    def _status(self, now: float, time_s: float) -> str:
-        player = self.player
+    def _status(self, now: float) -> str:
+        player, time_s = self.player, self.player.moment.time_s
         self._pace.append((now, time_s))
         while now - self._pace[0][0] > PACE_OVER_S:
             self._pace.popleft()

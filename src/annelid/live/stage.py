@@ -1,4 +1,4 @@
-"""The 3D scene of a view: a few nodes that are made once and then only told where their points are."""
+"""The 3D scene of a view: a few nodes that are made once and whose points are then moved."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.kinds.floor import Floor
-from annelid.arena.scenery import (
+from annelid.arena.geoms import (
     FLOOR_HALF_SIZE_M,
     PIPE_RGBA,
     POST_HALF_HEIGHT_M,
@@ -17,23 +16,23 @@ from annelid.arena.scenery import (
     RAIL_HALF_HEIGHT_M,
     RAIL_RGBA,
 )
+from annelid.arena.kinds.floor import Floor
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.config.arena import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.draw.scene import ROOM, upright
-from annelid.live.picture import CONTACT_COLOR, Colors, Picture
+from annelid.live.living import Moment
+from annelid.live.picture import CONTACT_COLOR, Painter
 from annelid.morphology import Array, heading_turn
 
 if TYPE_CHECKING:
     import viser
 
-ASPECT = 1.0
-"""Of the canvas beside the panel, for which the camera is placed."""
+ASPECT = 1.0  # of the canvas beside the panel, for which the camera is placed
 STRAND_PIXELS, RING_PIXELS, SPRING_PIXELS = 3.0, 6.0, 3.5
 """Widths of lines; lines that grow thinner with distance take twice as long to draw without a graphics card."""
-LAYERS = ("strands", "rings", "springs", "contacts", "ground")
-"""What can be shown or hidden, by the names of the nodes."""
+LAYERS = ("strands", "rings", "springs", "contacts", "ground")  # what can be shown or hidden, by the names of the nodes
 FLOOR_X_M, FLOOR_HALF_WIDTH_M = (-8.0, 2.0), 3.0
 """What is drawn of the floor, for a worm that leads towards -x; it turns with the heading at the start."""
 SQUARE_M = 0.2
@@ -49,21 +48,17 @@ class Stage:
     """Worm and arena in a viewer.
 
     Attributes:
+        picture: What is seen, in the model's axes.
         turn: Rotation from the model's axes to the page's, ``(3, 3)``.
         shift_m: Where the model's origin is in the page, m, ``(3,)``.
     """
 
-    def __init__(self, server: viser.ViserServer, config: RunConfig, strand_colors: Colors, first: Picture) -> None:
-        """Makes all nodes and places the camera so that the whole worm is seen.
-
-        Args:
-            server: Where they are seen.
-            config: The worm's arena.
-            strand_colors: Of all elements of the strands.
-            first: What is shown first.
-        """
+    def __init__(self, server: viser.ViserServer, config: RunConfig, painter: Painter, moment: Moment) -> None:
+        """Makes all nodes and places the camera so that the whole worm is seen."""
         from viser.transforms import SO3
 
+        self._painter = painter
+        self.picture = first = painter.paint(moment)
         self._scene = scene = server.scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(hdri=None)
@@ -75,7 +70,7 @@ class Stage:
         self._strands, self._rings, self._springs = (
             scene.add_line_segments(f"{_ROOT}/{name}", points, colors, thickness=width, thickness_units="screen")
             for name, points, colors, width in (
-                ("strands", first.strands, strand_colors, STRAND_PIXELS),
+                ("strands", first.strands, painter.strand_colors(), STRAND_PIXELS),
                 ("rings", first.rings, first.ring_colors, RING_PIXELS),
                 ("springs", first.springs, first.spring_colors, SPRING_PIXELS),
             )
@@ -88,21 +83,25 @@ class Stage:
             head_radius=0.009,
             head_length=0.022,
         )
-        length = float(np.ptp(first.strands[..., 0]))
         assert isinstance(config.body, WormBody)
         heading = config.body.heading_deg
-        _add_ground(server, config, length, heading)
+        assert config.arena is not None
+        _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
         self._first_middle = first.middle
         self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
-        self._place_camera(server, first, heading)
+        points = first.strands.reshape(-1, 3) @ self.turn.T
+        target = (points.min(axis=0) + points.max(axis=0)) / 2
+        angles = view_angles("isometric", heading)
+        _, _, sight = picture_axes(*angles)
+        distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
+        camera = server.initial_camera
+        camera.fov = math.radians(FIELD_OF_VIEW_DEG)
+        camera.look_at = target
+        camera.position = target - distance * sight
 
-    def show(self, picture: Picture, *, follow: bool) -> None:
-        """Shows another instant.
-
-        Args:
-            picture: What is to be seen.
-            follow: Moves worm and ground so that the worm's middle stays where it is on the screen.
-        """
+    def show(self, moment: Moment, *, follow: bool) -> None:
+        """Shows another moment; ``follow`` moves worm and ground so that the worm's middle stays on the screen."""
+        self.picture = picture = self._painter.paint(moment)
         self._strands.points = picture.strands
         self._rings.points = picture.rings
         self._rings.colors = picture.ring_colors
@@ -127,22 +126,9 @@ class Stage:
         """Turns a ray of the page into the model's axes."""
         return (origin - self.shift_m) @ self.turn, direction @ self.turn
 
-    def _place_camera(self, server: viser.ViserServer, first: Picture, heading_deg: float) -> None:
-        points = first.strands.reshape(-1, 3) @ self.turn.T
-        target = (points.min(axis=0) + points.max(axis=0)) / 2
-        angles = view_angles("isometric", heading_deg)
-        _, _, sight = picture_axes(*angles)
-        distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
-        camera = server.initial_camera
-        camera.fov = math.radians(FIELD_OF_VIEW_DEG)
-        camera.look_at = target
-        camera.position = target - distance * sight
 
-
-def _add_ground(server: viser.ViserServer, config: RunConfig, length_m: float, heading_deg: float) -> None:
+def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float, heading_deg: float) -> None:
     """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
-    scene, arena = server.scene, config.arena
-    assert arena is not None
     scene.add_frame(f"{_ROOT}/ground", show_axes=False)
     shape, pipe = arena.shape(length_m), arena.is_closed
     if shape is not None and pipe:
@@ -172,26 +158,18 @@ def _shaded(normals: Array) -> NDArray[np.uint8]:
 
 
 def _squares(height_m: float) -> tuple[Array, NDArray[np.int32]]:
-    """Strips that make squares to see the worm move against: vertices and faces of a mesh.
-
-    An endless grid, or lines, would take longer to draw than the worm.
-    """
+    """Vertices and faces of strips that make squares to see the worm move against; a grid takes longer to draw."""
     (ahead, behind), side = FLOOR_X_M, FLOOR_HALF_WIDTH_M
-    strips = [(x - _half_width(x), x + _half_width(x), -side, side) for x in _marks(ahead, behind)]
-    strips += [(ahead, behind, y - _half_width(y), y + _half_width(y)) for y in _marks(-side, side)]
-    corners = [[(a, c, height_m), (b, c, height_m), (b, d, height_m), (a, d, height_m)] for a, b, c, d in strips]
-    first = 4 * np.arange(len(strips))[:, np.newaxis, np.newaxis]
-    faces = first + np.array([[0, 1, 2], [0, 2, 3]])
-    return np.array(corners).reshape(-1, 3), faces.reshape(-1, 3).astype(np.int32)
-
-
-def _marks(first: float, last: float) -> Array:
-    return np.linspace(first, last, round((last - first) / SQUARE_M) + 1)
-
-
-def _half_width(place_m: float) -> float:
-    """Of a strip, which is wider at every whole metre."""
-    return STRIP_M / 2 * (2.5 if abs(place_m - round(place_m)) < 1e-6 else 1.0)
+    corners = []
+    for first, last in (FLOOR_X_M, (-side, side)):
+        for place in np.linspace(first, last, round((last - first) / SQUARE_M) + 1):
+            # Wider at every whole metre.
+            half_width = STRIP_M / 2 * (2.5 if abs(place - round(place)) < 1e-6 else 1.0)
+            strip = (place - half_width, place + half_width)
+            (a, b), (c, d) = (strip, (-side, side)) if first == ahead else ((ahead, behind), strip)
+            corners += [(a, c, height_m), (b, c, height_m), (b, d, height_m), (a, d, height_m)]
+    faces = np.arange(0, len(corners), 4)[:, np.newaxis, np.newaxis] + np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array(corners), faces.reshape(-1, 3).astype(np.int32)
 
 
 def _add_walls(scene: viser.SceneApi, arena: ArenaKind) -> None:

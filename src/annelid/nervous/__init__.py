@@ -1,10 +1,5 @@
 """Neurons, synapses, networks and the paper's peristalsis network; knows no engine and no body."""
 
-from annelid.nervous.adaptive import (
-    adaptive_half_centre,
-    adaptive_peristalsis_network,
-    drive_conductance_uS,
-)
 from annelid.nervous.arrays import NetworkArrays
 from annelid.nervous.diagram import Diagram
 from annelid.nervous.functional_subnetworks import (
@@ -27,21 +22,28 @@ from annelid.nervous.half_centre import (
     oscillation_periods,
 )
 from annelid.nervous.network import Connection, Network
-from annelid.nervous.neurons import Channel, Firing, Gate, Neuron, persistent_sodium
+from annelid.nervous.neurons import (
+    Channel,
+    ConnectionKind,
+    Firing,
+    GapJunction,
+    Gate,
+    ModulatorySynapse,
+    Neuron,
+    SpikingSynapse,
+    Synapse,
+    persistent_sodium,
+)
 from annelid.nervous.peristalsis import (
     Conductances,
     PeristalsisParameters,
+    adaptive_half_centre,
+    adaptive_peristalsis_network,
+    drive_conductance_uS,
     neuron_names,
     peristalsis_network,
 )
-from annelid.nervous.phase_chain import (
-    DriveResponse,
-    PhaseNetwork,
-    PhaseState,
-    PhaseStepper,
-    phase_chain,
-    steady_lags,
-)
+from annelid.nervous.phase_chain import DriveResponse, PhaseNetwork, PhaseState, PhaseStepper, phase_chain, steady_lags
 from annelid.nervous.shc import (
     HeteroclinicRing,
     HeteroclinicStepper,
@@ -51,7 +53,6 @@ from annelid.nervous.shc import (
     noise_dwell_s,
 )
 from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
-from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.nervous.toolbox import export_network, import_network
 
 __all__ = [

@@ -1,29 +1,31 @@
-"""The compiled form of a network: frozen arrays, laid out so that one matrix product sums every current.
+"""The compiled form of a network: frozen arrays, such that one matrix product sums every current.
 
-The right-hand side of every neuron is ``C dU/dt = I - G U``, where both the total conductance ``G`` and the
-current ``I`` at potential zero are linear in a *drive* vector: the open fractions of the presynaptic
-terminals, the releases of spiking synapses, the open fractions of the channels, the rectified and plain
-potentials of gap junctions, the constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant
-matrix.
+The right-hand side of every neuron is ``C dU/dt = I - G U``, where both the total conductance G and the current I at
+potential zero are linear in a *drive* vector: the open fractions of the presynaptic terminals, the releases of spiking
+synapses, the open fractions of the channels, the rectified differences and the plain potentials of gap junctions, the
+constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant matrix.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from itertools import accumulate, pairwise, zip_longest
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.nervous.neurons import Array, Channel, Gate
-from annelid.nervous.synapses import GapJunction, Modulated, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.errors import ConfigError
+from annelid.nervous import neurons as parts
+from annelid.nervous.neurons import Array
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
 
+Key = TypeVar("Key", bound=tuple)
 # Fills the slots of channels that have fewer gates than others: never moves, and counts as 1.
-_NO_GATE = Gate(slope_per_mV=0.0, power=0.0)
+_NO_GATE = parts.Gate(slope_per_mV=0.0, power=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,7 @@ class NetworkArrays:
         log_modulation: Logarithm of each factor when a terminal is open, ``(n_terminals, n_modulated)``.
         rectified_source: Higher side of each rectified gap junction, ``(n_rectified,)``.
         rectified_target: Its other side, same shape.
-        has_gap_junctions: Whether the drive holds the plain potentials.
+        drive: Where in the drive vector the entries of each kind lie.
         weights: Shape ``(n_drive, 2 n_neurons)``, conductances (uS) beside currents (nA).
     """
 
@@ -71,7 +73,7 @@ class NetworkArrays:
     terminal_threshold_mV: Array
     terminal_slope_per_mV: Array
     channel_neuron: NDArray[np.intp]
-    gates: tuple[tuple[Gate, ...], ...]
+    gates: tuple[tuple[parts.Gate, ...], ...]
     n_slow: int
     firing_neuron: NDArray[np.intp]
     threshold_mV: Array
@@ -83,142 +85,122 @@ class NetworkArrays:
     release_source: NDArray[np.intp]
     release_time_constant_ms: Array
     release_increment: Array
-    modulated: tuple[tuple[Modulated, int], ...]
+    modulated: tuple[tuple[parts.Modulated, int], ...]
     log_modulation: Array
     rectified_source: NDArray[np.intp]
     rectified_target: NDArray[np.intp]
-    has_gap_junctions: bool
+    drive: Mapping[str, slice]
     weights: Array
-
-    def drive_slices(self) -> dict[str, slice]:
-        """Returns where in the drive vector each kind of entry lies."""
-        lengths = {
-            "terminals": self.terminal_neuron.size,
-            "releases": self.release_source.size,
-            "channels": self.channel_neuron.size,
-            "rectified": self.rectified_source.size,
-            "potentials": len(self.neurons) if self.has_gap_junctions else 0,
-            "one": 1,
-            "inputs": len(self.inputs),
-        }
-        slices, start = {}, 0
-        for kind, length in lengths.items():
-            slices[kind] = slice(start, start + length)
-            start += length
-        return slices
 
 
 def build_arrays(network: Network) -> NetworkArrays:
-    """Lays a network out as arrays.
-
-    Args:
-        network: A network of at least one neuron.
-
-    Returns:
-        Its frozen arrays.
-    """
-    names = tuple(network.neurons)
-    index = {name: i for i, name in enumerate(names)}
-    n = len(names)
+    """Writes a network as arrays."""
+    if not network.neurons:
+        raise ConfigError(f"network {network.name!r} has no neurons: add_neuron comes first")
+    index = {name: i for i, name in enumerate(network.neurons)}
+    neurons = list(network.neurons.values())
+    n = len(neurons)
 
     ends = [(index[c.source], index[c.target], c.kind) for c in network.connections]
-    synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, Synapse)]
-    spiking = [(pre, post, s) for pre, post, s in ends if isinstance(s, SpikingSynapse)]
-    modulatory = [(pre, post, s) for pre, post, s in ends if isinstance(s, ModulatorySynapse)]
-    rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, GapJunction) and s.rectified]
-    plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, GapJunction) and not s.rectified]
-    terminals = sorted({(pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory]})
-    releases = sorted({(pre, s.time_constant_ms, s.increment) for pre, _, s in spiking})
-    firing = {index[name]: neuron.firing for name, neuron in network.neurons.items() if neuron.firing is not None}
-    modulated: tuple[tuple[Modulated, int], ...] = tuple(sorted({(m.quantity, post) for _, post, m in modulatory}))
+    synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.Synapse)]
+    spiking = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.SpikingSynapse)]
+    modulatory = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.ModulatorySynapse)]
+    rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and s.rectified]
+    plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and not s.rectified]
+    terminals = _numbered((pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory])
+    releases = _numbered((pre, s.time_constant_ms, s.increment) for pre, _, s in spiking)
+    modulated: dict[tuple[parts.Modulated, int], int] = _numbered((m.quantity, post) for _, post, m in modulatory)
     log_modulation = np.zeros((len(terminals), len(modulated)))
     for pre, post, m in modulatory:
-        row = terminals.index((pre, m.threshold_mV, m.saturation_mV))
-        log_modulation[row, modulated.index((m.quantity, post))] += np.log(m.factor)
-    channels = [(index[name], channel) for name, neuron in network.neurons.items() for channel in neuron.channels]
+        row = terminals[pre, m.threshold_mV, m.saturation_mV]
+        log_modulation[row, modulated[m.quantity, post]] += np.log(m.factor)
+    firing = {i: neuron.firing for i, neuron in enumerate(neurons) if neuron.firing is not None}
+    channels = [(i, channel) for i, neuron in enumerate(neurons) for channel in neuron.channels]
     gates, n_slow = _slots([channel for _, channel in channels])
 
-    sizes = (len(terminals), len(releases), len(channels), len(rectified), n if plain else 0, 1, len(network.inputs))
-    starts = np.cumsum((0, *sizes))
-    conductance = np.zeros((starts[-1], n))
-    current = np.zeros((starts[-1], n))
+    kinds = ("terminals", "releases", "channels", "rectified", "potentials", "one", "inputs")
+    lengths = (len(terminals), len(releases), len(channels), len(rectified), n * bool(plain), 1, len(network.inputs))
+    ends = accumulate(lengths, initial=0)
+    drive = {kind: slice(start, end) for kind, (start, end) in zip(kinds, pairwise(ends), strict=True)}
+    weights = np.zeros((sum(lengths), 2 * n))
 
-    opened = [(terminals.index((pre, s.threshold_mV, s.saturation_mV)), post, s) for pre, post, s in synapses]
-    opened += [
-        (starts[1] + releases.index((pre, s.time_constant_ms, s.increment)), post, s) for pre, post, s in spiking
-    ]
-    for row, post, synapse in opened:
-        conductance[row, post] += synapse.conductance_uS
-        current[row, post] += synapse.conductance_uS * synapse.reversal_mV
-    for row, (neuron, channel) in enumerate(channels, start=starts[2]):
-        conductance[row, neuron] = channel.conductance_uS
-        current[row, neuron] = channel.conductance_uS * channel.reversal_mV
-    for row, (source, target, junction) in enumerate(rectified, start=starts[3]):
+    def rows(kind: str) -> tuple[Array, Array]:
+        return weights[drive[kind], :n], weights[drive[kind], n:]
+
+    opened: dict[str, list[tuple[int, int, parts.Synapse | parts.SpikingSynapse | parts.Channel]]] = {
+        "terminals": [(terminals[pre, s.threshold_mV, s.saturation_mV], post, s) for pre, post, s in synapses],
+        "releases": [(releases[pre, s.time_constant_ms, s.increment], post, s) for pre, post, s in spiking],
+        "channels": [(row, neuron, channel) for row, (neuron, channel) in enumerate(channels)],
+    }
+    for kind, entries in opened.items():
+        conductance, current = rows(kind)
+        for row, neuron, part in entries:
+            conductance[row, neuron] += part.conductance_uS
+            current[row, neuron] += part.conductance_uS * part.reversal_mV
+    _, current = rows("rectified")
+    for row, (source, target, junction) in enumerate(rectified):
         current[row, target] += junction.conductance_uS
         current[row, source] -= junction.conductance_uS
-    one = starts[5]
+    [leak], [offset] = rows("one")
+    _, current = rows("potentials")
     for source, target, junction in plain:
         for here, there in ((source, target), (target, source)):
-            current[starts[4] + there, here] += junction.conductance_uS
-            conductance[one, here] += junction.conductance_uS
-    for i, neuron in enumerate(network.neurons.values()):
-        conductance[one, i] += neuron.leak_conductance_uS
-        current[one, i] += neuron.leak_conductance_uS * neuron.rest_mV + neuron.bias_nA
-    for row, targets in enumerate(network.inputs.values(), start=starts[6]):
+            current[there, here] += junction.conductance_uS
+            leak[here] += junction.conductance_uS
+    for i, neuron in enumerate(neurons):
+        leak[i] += neuron.leak_conductance_uS
+        offset[i] += neuron.leak_conductance_uS * neuron.rest_mV + neuron.bias_nA
+    _, current = rows("inputs")
+    for row, targets in enumerate(network.inputs.values()):
         for target in targets:
             current[row, index[target]] += 1.0
 
-    neurons = list(network.neurons.values())
     return NetworkArrays(
-        neurons=names,
+        neurons=tuple(network.neurons),
         inputs=tuple(network.inputs),
         outputs=tuple(network.outputs),
-        output_neuron=_indices([index[source] for source in network.outputs.values()]),
+        output_neuron=_frozen([index[source] for source in network.outputs.values()], np.intp),
         capacitance_nF=_frozen([neuron.capacitance_nF for neuron in neurons]),
         initial_mV=_frozen(list(network.initial_mV.values())),
-        terminal_neuron=_indices([pre for pre, _, _ in terminals]),
+        terminal_neuron=_frozen([pre for pre, _, _ in terminals], np.intp),
         terminal_threshold_mV=_frozen([low for _, low, _ in terminals]),
         terminal_slope_per_mV=_frozen([1.0 / (high - low) for _, low, high in terminals]),
-        channel_neuron=_indices([neuron for neuron, _ in channels]),
+        channel_neuron=_frozen([neuron for neuron, _ in channels], np.intp),
         gates=gates,
         n_slow=n_slow,
-        firing_neuron=_indices(list(firing)),
+        firing_neuron=_frozen(list(firing), np.intp),
         threshold_mV=_frozen([f.threshold_mV for f in firing.values()]),
         reset_mV=_frozen([f.reset_mV for f in firing.values()]),
         adaptation=_frozen([f.adaptation for f in firing.values()]),
         adaptation_time_constant_ms=_frozen([f.adaptation_time_constant_ms for f in firing.values()]),
         rest_mV=_frozen([neuron.rest_mV for neuron in neurons]),
         leak_conductance_uS=_frozen([neuron.leak_conductance_uS for neuron in neurons]),
-        release_source=_indices([list(firing).index(pre) for pre, _, _ in releases]),
+        release_source=_frozen([list(firing).index(pre) for pre, _, _ in releases], np.intp),
         release_time_constant_ms=_frozen([tau for _, tau, _ in releases]),
         release_increment=_frozen([increment for _, _, increment in releases]),
-        modulated=modulated,
+        modulated=tuple(modulated),
         log_modulation=_frozen(log_modulation),
-        rectified_source=_indices([source for source, _, _ in rectified]),
-        rectified_target=_indices([target for _, target, _ in rectified]),
-        has_gap_junctions=bool(plain),
-        weights=_frozen(np.hstack([conductance, current])),
+        rectified_source=_frozen([source for source, _, _ in rectified], np.intp),
+        rectified_target=_frozen([target for _, target, _ in rectified], np.intp),
+        drive=drive,
+        weights=_frozen(weights),
     )
 
 
-def _slots(channels: Sequence[Channel]) -> tuple[tuple[tuple[Gate, ...], ...], int]:
+def _numbered(keys: Iterable[Key]) -> dict[Key, int]:
+    """The place of every distinct key in ascending order."""
+    return {key: place for place, key in enumerate(sorted(set(keys)))}
+
+
+def _slots(channels: Sequence[parts.Channel]) -> tuple[tuple[tuple[parts.Gate, ...], ...], int]:
     """Arranges gates as (slot, channel), slow slots first, and returns the number of slow slots."""
-    n_slow = max((len(channel.slow_gates) for channel in channels), default=0)
-    n_instant = max((len(channel.instant_gates) for channel in channels), default=0)
-    columns = []
-    for channel in channels:
-        slow, instant = channel.slow_gates, channel.instant_gates
-        columns.append((*slow, *[_NO_GATE] * (n_slow - len(slow)), *instant, *[_NO_GATE] * (n_instant - len(instant))))
-    return tuple(zip(*columns, strict=True)), n_slow
+    slow = zip_longest(*(channel.slow_gates for channel in channels), fillvalue=_NO_GATE)
+    instant = zip_longest(*(channel.instant_gates for channel in channels), fillvalue=_NO_GATE)
+    slow = tuple(slow)
+    return (*slow, *instant), len(slow)
 
 
-def _frozen(values: Sequence[float] | Array) -> Array:
-    array = np.array(values, dtype=np.float64)
-    array.flags.writeable = False
-    return array
-
-
-def _indices(values: Sequence[int]) -> NDArray[np.intp]:
-    array = np.array(values, dtype=np.intp)
+def _frozen(values: Sequence[float] | Array, kind: type[np.generic] = np.float64) -> NDArray[Any]:
+    array = np.array(values, dtype=kind)
     array.flags.writeable = False
     return array

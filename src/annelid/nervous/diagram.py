@@ -9,17 +9,16 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from annelid.errors import ConfigError
 from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
-from annelid.nervous.synapses import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous.neurons import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.text import printable
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
     from annelid.nervous.neurons import Neuron
 
+# What Graphviz draws for each effect.
 _EDGES = {
     "excitatory": "arrowhead=empty",
     "inhibitory": "arrowhead=dot",
@@ -27,11 +26,10 @@ _EDGES = {
     "gap junction": "arrowhead=none, style=dashed",
     "rectified gap junction": "arrowhead=diamond, style=dashed",
 }
-"""What Graphviz draws for each effect."""
+# Connections beside which there is room for words.
 _MOST_LABELLED = 40
-"""Connections beside which there is room for words."""
+# Pixels from a neuron to the next.
 _PX = 130.0
-"""Pixels from a neuron to the next; an inch has 96."""
 _PX_PER_PT = 96.0 / 72.0
 
 
@@ -69,12 +67,6 @@ def draw_diagram(network: Network) -> Diagram:
 
     Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
     rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim.
-
-    Args:
-        network: Any network.
-
-    Returns:
-        Its Graphviz source and its SVG.
     """
     labels = {name: name for name in network.neurons}
     shapes = network_shapes(network, labels, strengths=len(network.connections) <= _MOST_LABELLED)
@@ -82,10 +74,7 @@ def draw_diagram(network: Network) -> Diagram:
 
 
 def markdown_tables(network: Network) -> str:
-    """Returns neurons, connections, inputs and outputs as Markdown tables.
-
-    Units stand in the headings; the properties that differ from the default are named in the last column.
-    """
+    """Returns neurons, connections, inputs and outputs as Markdown tables."""
     neurons = []
     for name, n in network.neurons.items():
         numbers = n.capacitance_nF, n.leak_conductance_uS, n.rest_mV, n.bias_nA, network.initial_mV[name]
@@ -139,7 +128,6 @@ def _cell(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A DOT string of one line; a control character would end the statement or be unreadable."""
     return json.dumps(_line(text), ensure_ascii=False)
 
 
@@ -185,14 +173,14 @@ def _svg(title: str, shapes: Sequence[Shape]) -> str:
 
 def _svg_element(shape: Shape) -> str:
     if isinstance(shape, Words):
-        x, y = _PX * np.multiply(shape.place, (1.0, -1.0))
+        x, y = _PX * shape.place.real, -_PX * shape.place.imag
         size = _PX_PER_PT * shape.size_pt
         y += {"bottom": 0.0, "center": 0.35, "top": 0.75}[shape.along] * size
         anchor = {"left": "start", "center": "middle", "right": "end"}[shape.across]
         halo = ' stroke="white" stroke-width="2.5" paint-order="stroke"' if shape.halo else ""
         words = escape(_line(shape.text))
         return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:.1f}" text-anchor="{anchor}"{halo}>{words}</text>'
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in _PX * shape.points * (1.0, -1.0))
+    points = " ".join(f"{point.real:.1f},{point.imag:.1f}" for point in _PX * shape.points.conj())
     look = f'fill="{shape.fill or "none"}" stroke="{shape.color}" stroke-width="{_PX_PER_PT * shape.width_pt:.1f}"'
     key = f' id="{escape(_line(shape.key))}"' if shape.key else ""
     dashes = ' stroke-dasharray="5 3"' if shape.dashed else ""

@@ -1,51 +1,55 @@
-"""The drawing of a network as lines and words in a plane, which `annelid.nervous.diagram` and the figures show."""
+"""The drawing of a network: where its neurons lie, how its connections are led around them, and the lines and words.
+
+Points of the plane are complex numbers, x to the right and y upwards, in units of the distance between neighbouring
+neurons. `annelid.nervous.diagram` and the figures show the drawing.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from annelid.nervous.layout import RADIUS, STUB, Stub, arc_length, lay_out, points_at, rounded, with_resistor
-from annelid.nervous.neurons import Array
-from annelid.nervous.synapses import GapJunction, ModulatorySynapse
+from annelid.nervous.neurons import GapJunction, ModulatorySynapse
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Connection, Network
 
+Points = NDArray[np.complexfloating]
+RADIUS = 0.27
+"""Radius of a neuron."""
+STUB = 0.42
+"""Length of the line of an input or an output."""
+_COLUMN_GAP = 1.35
+_CROWDED = 0.4
+_BENDS = (0.0, 0.2, -0.2, 0.35, -0.35, 0.55, -0.55, 0.8, -0.8)
+_NUMBERED = re.compile(r"(.+)_(\d{1,9})")
 Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
+_GREY = "#595959"
 # Dark and light in grey, hues far apart for colour-blind eyes.
 COLORS: dict[Effect, str] = {
     "excitatory": "#c2410c",
     "inhibitory": "#1b2a6b",
-    "modulatory": "#595959",
-    "gap junction": "#595959",
-    "rectified gap junction": "#595959",
+    "modulatory": _GREY,
+    "gap junction": _GREY,
+    "rectified gap junction": _GREY,
 }
 _TRIANGLE, _DOT = 0.17, 0.065
-_HEADER = RADIUS + STUB + 0.16
-"""Height of a segment's name above its uppermost neuron."""
-_GREY = "#4d4d4d"
 _ROUND = 48
 """Corners of what looks round."""
+_ARROW = "#4d4d4d"
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line through points; with a fill it is closed.
+    """A line through points of the layout; with a ``fill`` it is closed. The ``key`` names a part of the network."""
 
-    Attributes:
-        points: In units of the distance between neighbouring neurons, y upwards, shape ``(n, 2)``.
-        color: Of the line.
-        width_pt: Its width, points.
-        fill: Colour of what it encloses; empty for an open line.
-        dashed: Whether the line is dashed.
-        key: Names the part of the network; empty for a part of another shape.
-    """
-
-    points: Array
+    points: Points
     color: str
     width_pt: float = 1.3
     fill: str = ""
@@ -55,19 +59,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """Plain text at a place.
-
-    Attributes:
-        text: The words.
-        place: Shape ``(2,)``, in units of the distance between neighbouring neurons.
-        size_pt: Size of the letters, points.
-        across: Where the words begin, have their middle, or end: at the place.
-        along: Whether the words stand on the place, around it, or hang from it.
-        halo: Whether to clear what lies under the words.
-    """
+    """Plain text at a point of the layout, with that end or the middle there; a ``halo`` clears what lies under it."""
 
     text: str
-    place: Array
+    place: complex
     size_pt: float
     across: Literal["left", "center", "right"] = "center"
     along: Literal["bottom", "center", "top"] = "center"
@@ -98,16 +93,9 @@ def strength_of(connection: Connection) -> str:
 def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bool) -> list[Shape]:
     """Draws each neuron, connection, input and output of a network once.
 
-    Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i the place among the network's connections,
-    ``input-<name>-<neuron>`` and ``output-<name>``.
-
-    Args:
-        network: The network.
-        labels: What stands in each neuron, by its name.
-        strengths: Whether to write on each connection how strong it is.
-
-    Returns:
-        The shapes, from back to front.
+    The shapes are in order from back to front. Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i
+    the place among the network's connections, ``input-<name>-<neuron>`` and ``output-<name>``. In each neuron stands
+    its label, and on each connection how strong it is if ``strengths``.
     """
     layout = lay_out(network)
     columns, paths, marks, numbers, front = [], [], [], [], []
@@ -124,10 +112,9 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
             place = points_at(route, share * arc_length(route)[-1:])[0]
             numbers.append(Words(strength_of(link), place, 7.0, halo=True))
     for stub in layout.inputs:
-        arrow = arrow_shapes(np.array([stub.outer, stub.rim]), f"input-{stub.name}-{stub.neuron}")
-        front += [*arrow, *_name_of(stub)]
+        front += [*arrow_shapes(stub.outer, stub.rim, f"input-{stub.name}-{stub.neuron}"), *_name_of(stub)]
     for stub in layout.outputs:
-        front += [*arrow_shapes(np.array([stub.rim, stub.outer]), f"output-{stub.name}"), *_name_of(stub)]
+        front += [*arrow_shapes(stub.rim, stub.outer, f"output-{stub.name}"), *_name_of(stub)]
     for name, place in layout.places.items():
         neuron = network.neurons[name]
         spiking, gated = neuron.firing is not None, bool(neuron.channels)
@@ -135,7 +122,7 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
     return [*columns, *paths, *marks, *numbers, *front]
 
 
-def neuron_shapes(place: Array, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
+def neuron_shapes(place: complex, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
     """Draws a circle, or an octagon for a neuron that spikes, with a double rim if it has gated channels."""
     size_pt = 9.0 if len(label) <= 3 else min(7.0, max(5.0, 65.0 / len(label)))
     n_corners = 8 if spiking else _ROUND
@@ -145,86 +132,295 @@ def neuron_shapes(place: Array, label: str, *, spiking: bool, gated: bool, key: 
     return [*rims, Words(label, place, size_pt)]
 
 
-def connection_shapes(route: Array, effect: Effect, key: str = "") -> list[Shape]:
-    """Draws a path, ``(n, 2)``, that ends in a triangle, a dot or a square, or has a resistor in its middle."""
-    color, tip = COLORS[effect], route[-1]
-    if effect == "gap junction":
-        return [Line(with_resistor(route), color, key=key)]
-    if effect == "rectified gap junction":
-        along = 0.9 * arc_length(route)[-1]
-        tip, back = points_at(route, np.array([along, along - 0.1]))
-        across = 0.55 * _left_of(tip - back)
+def connection_shapes(route: Points, effect: Effect, key: str = "") -> list[Shape]:
+    """Draws a path that ends in a triangle, a dot or a square, or has a resistor in its middle."""
+    color, along = COLORS[effect], arc_length(route)
+    if "gap" in effect:
+        path = Line(with_resistor(route), color, key=key)
+        if effect == "gap junction":
+            return [path]
+        tip, back = points_at(route, 0.9 * along[-1] - np.array([0.0, 0.1]))
+        across = 0.55j * (tip - back)
         return [
-            Line(with_resistor(route), color, key=key),
-            Line(np.array([tip, back + across, back - across]), color, 1.0, color),
+            path,
+            _triangle(tip, back, across, color, 1.0, color),
             Line(np.array([tip + across, tip - across]), color),
         ]
     length = _TRIANGLE if effect == "excitatory" else 2.0 * _DOT
-    along = arc_length(route)
     end = along[-1] - length
     body = points_at(route, np.append(along[along < end], end))
-    forward = (tip - body[-1]) / np.hypot(*(tip - body[-1]))
+    tip, forward = route[-1], (route[-1] - body[-1]) / abs(route[-1] - body[-1])
     back, middle = tip - length * forward, tip - _DOT * forward
     if effect == "inhibitory":
         mark = Line(_polygon(middle, _DOT, _ROUND), color, 1.0, color)
     elif effect == "excitatory":
-        across = 0.5 * length * _left_of(forward)
-        mark = Line(np.array([tip, back + across, back - across]), color, 1.2, "white")
+        mark = _triangle(tip, back, 0.5j * length * forward, color, 1.2, "white")
     else:
-        across = _DOT * _left_of(forward)
+        across = 1j * _DOT * forward
         mark = Line(np.array([tip, middle + across, back, middle - across]), color, 1.2, "white")
     return [Line(body, color, dashed=effect == "modulatory", key=key), mark]
 
 
-def arrow_shapes(path: Array, key: str = "") -> list[Shape]:
-    """Draws an input or an output from tail to head, ``(2, 2)``."""
-    forward = (path[1] - path[0]) / np.hypot(*(path[1] - path[0]))
-    back, across = path[1] - 0.08 * forward, 0.04 * _left_of(forward)
+def arrow_shapes(tail: complex, head: complex, key: str = "") -> list[Shape]:
+    """Draws an input or an output."""
+    forward = (head - tail) / abs(head - tail)
+    back = head - 0.08 * forward
     return [
-        Line(np.array([path[0], back]), _GREY, 1.0, key=key),
-        Line(np.array([path[1], back + across, back - across]), _GREY, 1.0, _GREY),
+        Line(np.array([tail, back]), _ARROW, 1.0, key=key),
+        _triangle(head, back, 0.04j * forward, _ARROW, 1.0, _ARROW),
     ]
 
 
 def frame_of(shapes: Iterable[Shape], unit_in: float) -> tuple[float, float, float, float]:
     """Returns left, right, bottom and top of all shapes with a margin, if a unit is drawn ``unit_in`` inches long."""
-    corners = [np.zeros(2)]
+    corners: list[Points] = [np.zeros(1, dtype=complex)]
     for shape in shapes:
         if isinstance(shape, Line):
-            corners += [shape.points.min(axis=0), shape.points.max(axis=0)]
+            corners.append(shape.points)
         else:
             height = shape.size_pt / 72.0 / unit_in
             width = 0.6 * height * len(shape.text)
-            left = {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
-            corners += [np.add(shape.place, (left, -height)), np.add(shape.place, (left + width, height))]
-    (left, bottom), (right, top) = np.min(corners, axis=0) - 0.15, np.max(corners, axis=0) + 0.15
-    return float(left), float(right), float(bottom), float(top)
+            left = shape.place + {"left": 0.0, "center": -0.5, "right": -1.0}[shape.across] * width
+            corners.append(np.array([left - 1j * height, left + width + 1j * height]))
+    points: Points = np.concatenate(corners)
+    x, y = points.real, points.imag
+    return float(x.min()) - 0.15, float(x.max()) + 0.15, float(y.min()) - 0.15, float(y.max()) + 0.15
 
 
-def _column(name: str, places: Array) -> list[Shape]:
+def _triangle(tip: complex, back: complex, across: complex, color: str, width_pt: float, fill: str) -> Line:
+    return Line(np.array([tip, back + across, back - across]), color, width_pt, fill)
+
+
+def _column(name: str, places: Points) -> list[Shape]:
     """Draws a segment's background around its neurons, and its name above them."""
-    (left, bottom), (right, top) = places.min(axis=0) - 0.44, places.max(axis=0) + 0.44
+    x, y = places.real, places.imag
+    left, right, bottom, top = x.min() - 0.44, x.max() + 0.44, y.min() - 0.44, y.max() + 0.44
     middle = (left + right) / 2.0
-    corners = np.array([(middle, top), (left, top), (left, bottom), (right, bottom), (right, top), (middle, top)])
-    header = Words(name, np.array([middle, places.max(axis=0)[1] + _HEADER]), 9.0)
-    return [Line(rounded(corners, 0.2), "none", 0.0, "#f1f1f1"), header]
+    corners = [(middle, top), (left, top), (left, bottom), (right, bottom), (right, top), (middle, top)]
+    header = Words(name, complex(middle, y.max() + RADIUS + STUB + 0.16), 9.0)
+    return [Line(rounded(np.array([complex(*corner) for corner in corners]), 0.2), "none", 0.0, "#f1f1f1"), header]
 
 
 def _name_of(stub: Stub) -> list[Shape]:
     """Writes an input's or output's name, unless that is the neuron's, beyond its outer end."""
     if stub.name == stub.neuron:
         return []
-    sideways, upwards = direction = (stub.outer - stub.rim) / STUB
-    across = "center" if abs(sideways) < 0.3 else "left" if sideways > 0 else "right"
-    along = "center" if abs(upwards) < 0.3 else "bottom" if upwards > 0 else "top"
+    direction = (stub.outer - stub.rim) / STUB
+    across = "center" if abs(direction.real) < 0.3 else "left" if direction.real > 0 else "right"
+    along = "center" if abs(direction.imag) < 0.3 else "bottom" if direction.imag > 0 else "top"
     return [Words(stub.name.replace("_", " "), stub.outer + 0.06 * direction, 8.0, across, along)]
 
 
-def _polygon(center: Array, radius: float, n_corners: int) -> Array:
+def _polygon(center: complex, radius: float, n_corners: int) -> Points:
     """Returns the corners of a polygon around a circle, which its sides touch."""
     turn = np.pi * (2 * np.arange(n_corners) + 1) / n_corners
-    return center + radius / np.cos(np.pi / n_corners) * np.column_stack([np.cos(turn), np.sin(turn)])
+    return center + radius / np.cos(np.pi / n_corners) * np.exp(1j * turn)
 
 
-def _left_of(vector: Array) -> Array:
-    return np.array([-vector[1], vector[0]])
+class Stub(NamedTuple):
+    """The short line of the input or output ``name`` from the rim of a neuron to the outside."""
+
+    name: str
+    neuron: str
+    rim: complex
+    outer: complex
+
+
+class Layout(NamedTuple):
+    """Centres of the neurons, paths of the connections in the network's order, and stubs of the inputs and outputs.
+
+    ``columns`` has the names of the neurons of each segment; it is empty in a circular layout.
+    """
+
+    places: dict[str, complex]
+    routes: list[Points]
+    inputs: list[Stub]
+    outputs: list[Stub]
+    columns: dict[int, list[str]]
+
+
+def lay_out(network: Network) -> Layout:
+    """Places neurons and leads connections around them.
+
+    Names that all end in ``_<n>`` make one column for each n, its neurons row by row from the top in their order; other
+    networks are placed on a circle. A connection is straight where no neuron lies on it, and bent otherwise; one from
+    the last column back to the first passes below.
+    """
+    segments, others = by_segment(network.neurons)
+    columns = {} if others else segments
+    places = _in_columns(columns) if columns else _on_circle(list(network.neurons))
+    routes = list(_routes(network, places, columns))
+    # Angles, seen from each neuron, at which there is a connection or a close neighbour.
+    busy: dict[str, list[float]] = {name: [] for name in places}
+    for link, route in zip(network.connections, routes, strict=True):
+        for name, end in ((link.source, route[0]), (link.target, route[-1])):
+            busy[name].append(_angle_of(end - places[name]))
+    for name, place in places.items():
+        gaps = [other - place for key, other in places.items() if key != name]
+        busy[name] += [_angle_of(gap) for gap in gaps if abs(gap) < 1.2]
+
+    def stub(name: str, neuron: str, upwards: float) -> Stub:
+        """Leads a line away where there is room, near to down (up) or out of the circle."""
+        place, taken = places[neuron], busy[neuron]
+        wanted = _angle_of(place) if place and not columns else 0.5 * upwards * np.pi
+
+        def merit(angle: float) -> float:
+            room = min((_angle_between(angle, other) for other in taken), default=np.pi)
+            return min(room, 0.9) + 0.25 * np.cos(angle - wanted)
+
+        angle = max(np.pi / 8.0 * np.arange(16), key=merit)
+        taken.append(float(angle))
+        direction = np.exp(1j * angle)
+        return Stub(name, neuron, place + RADIUS * direction, place + (RADIUS + STUB) * direction)
+
+    outputs = [stub(name, neuron, 1.0) for name, neuron in network.outputs.items()]
+    inputs = [stub(name, neuron, -1.0) for name, neurons in network.inputs.items() for neuron in neurons]
+    return Layout(places, routes, inputs, outputs, columns)
+
+
+def role_of(name: str) -> str:
+    """A neuron's name without its segment's number."""
+    match = _NUMBERED.fullmatch(name)
+    return match[1] if match else name
+
+
+def by_segment(names: Iterable[str]) -> tuple[dict[int, list[str]], list[str]]:
+    """Names by the segment's number they end in, in ascending order, and those that end in none."""
+    segments: dict[int, list[str]] = {}
+    others = []
+    for name in names:
+        match = _NUMBERED.fullmatch(name)
+        if match is None:
+            others.append(name)
+        else:
+            segments.setdefault(int(match[2]), []).append(name)
+    return dict(sorted(segments.items())), others
+
+
+def _in_columns(columns: Mapping[int, list[str]]) -> dict[str, complex]:
+    n_wide = int(np.ceil(np.sqrt(max(len(names) for names in columns.values()))))
+    pitch = n_wide - 1 + _COLUMN_GAP
+    return {
+        name: complex(rank * pitch + index % n_wide, -(index // n_wide))
+        for rank, names in enumerate(columns.values())
+        for index, name in enumerate(names)
+    }
+
+
+def _on_circle(names: list[str]) -> dict[str, complex]:
+    """Neighbours on the circle lie 1.3 apart, the first on the left and the others clockwise."""
+    n = len(names)
+    radius = 0.65 / np.sin(np.pi / n) if n > 1 else 0.0
+    return {name: radius * np.exp(1j * (np.pi - 2.0 * np.pi * i / n)) for i, name in enumerate(names)}
+
+
+def _routes(network: Network, places: Mapping[str, complex], columns: Mapping[int, list[str]]) -> Iterator[Points]:
+    shared = Counter(frozenset((link.source, link.target)) for link in network.connections)
+    taken: dict[frozenset[str], list[float]] = {pair: [] for pair in shared}
+    arrived: dict[str, list[float]] = {name: [] for name in places}
+    n_returns = 0
+    for link in network.connections:
+        start, end = places[link.source], places[link.target]
+        pair = frozenset((link.source, link.target))
+        if link.source == link.target:
+            taken[pair].append(0.0)
+            yield _self_loop(start, np.pi / 4.0 if columns else _angle_of(start), len(taken[pair]))
+        elif _closes_the_ring(link, places, columns):
+            yield _return_path(start, end, min(place.imag for place in places.values()), n_returns)
+            n_returns += 1
+        else:
+            others = np.array([place for name, place in places.items() if name not in pair])
+            # A bend counts from the same side for both directions, so that two paths never coincide.
+            side = 1.0 if link.source < link.target else -1.0
+            bends = _BENDS if shared[pair] == 1 else _BENDS[3:]
+            free = [bend for bend in bends if side * bend not in taken[pair]] or [1.1 + 0.3 * len(taken[pair])]
+            paths = [_bow(start, end, bend) for bend in free]
+            costs = [10 * _n_hit(path, others) + _n_crowded(path[-1] - end, arrived[link.target]) for path in paths]
+            chosen = int(np.argmin(costs))
+            arrived[link.target].append(_angle_of(paths[chosen][-1] - end))
+            taken[pair].append(side * free[chosen])
+            yield paths[chosen]
+
+
+def _closes_the_ring(link: Connection, places: Mapping[str, complex], columns: Mapping[int, list[str]]) -> bool:
+    """Whether a connection leads from the right end of a row in the last column to the left end of one in the first."""
+    if len(columns) < 2:
+        return False
+    first, *_, last = columns.values()
+
+    def at_the_end(name: str, names: list[str], sign: float) -> bool:
+        row = [places[other].real for other in names if places[other].imag == places[name].imag]
+        return name in names and all(sign * x <= sign * places[name].real for x in row)
+
+    return at_the_end(link.source, last, 1.0) and at_the_end(link.target, first, -1.0)
+
+
+def _n_hit(path: Points, others: Points) -> int:
+    """Number of neurons that a path runs over."""
+    return int(np.sum(abs(path[:, np.newaxis] - others).min(axis=0) < 1.25 * RADIUS))
+
+
+def _n_crowded(arrival: complex, others: list[float]) -> int:
+    return sum(_angle_between(_angle_of(arrival), other) < _CROWDED for other in others)
+
+
+def _bow(start: complex, end: complex, bend: float) -> Points:
+    """A parabola from rim to rim, whose middle is off the straight line by ``bend / 2`` of its length."""
+    share = np.linspace(0.0, 1.0, 121)
+    path = (1 - share) * start + share * end + 2.0 * share * (1 - share) * bend * 1j * (end - start)
+    return path[(abs(path - start) >= RADIUS) & (abs(path - end) >= RADIUS)]
+
+
+def _self_loop(place: complex, outwards: float, number: int) -> Points:
+    """Of a circle beside the neuron, the arc outside it."""
+    radius = 0.2 + 0.08 * (number - 1)
+    turn = outwards + np.linspace(-np.pi, np.pi, 121)
+    loop = place + (RADIUS + 0.6 * radius) * np.exp(1j * outwards) + radius * np.exp(1j * turn)
+    return loop[abs(loop - place) >= RADIUS]
+
+
+def _return_path(start: complex, end: complex, bottom: float, lane: int) -> Points:
+    """A path with rounded corners that passes below all neurons, one lane further out for each before it."""
+    aside, below = 0.62 + 0.22 * lane, bottom - 1.1 - 0.22 * lane
+    right, left = start + aside, end - aside
+    under = complex(right.real, below), complex(left.real, below)
+    return rounded(np.array([start + RADIUS, right, *under, left, end - RADIUS]), 0.18)
+
+
+def rounded(corners: Points, radius: float) -> Points:
+    """Replaces the corners of a path by parabolas that begin and end ``radius`` away from them."""
+    share = np.linspace(0.0, 1.0, 9)
+    pieces = [corners[:1]]
+    for before, corner, after in zip(corners[:-2], corners[1:-1], corners[2:], strict=True):
+        enter, leave = (corner + radius * (p - corner) / abs(p - corner) for p in (before, after))
+        pieces.append((1 - share) ** 2 * enter + 2 * share * (1 - share) * corner + share**2 * leave)
+    return np.concatenate([*pieces, corners[-1:]])
+
+
+def with_resistor(path: Points) -> Points:
+    """Turns the middle of a path into a zigzag."""
+    along = arc_length(path)
+    teeth = 0.5 * along[-1] + 0.3 * np.linspace(-0.5, 0.5, 13) * min(1.0, 2.0 * along[-1])
+    direction = np.gradient(points_at(path, teeth))
+    direction /= abs(direction)
+    zigzag = points_at(path, teeth) + 0.08j * np.array([0, *([1, 0, -1, 0] * 3)]) * direction
+    return np.concatenate([path[along < teeth[0]], zigzag[[0, *range(1, 12, 2), 12]], path[along > teeth[-1]]])
+
+
+def arc_length(path: Points) -> NDArray[np.float64]:
+    """Distance of every point from the beginning, along the path."""
+    return np.append(0.0, np.cumsum(abs(np.diff(path))))
+
+
+def points_at(path: Points, along: NDArray[np.float64]) -> Points:
+    """Points at given distances along a path."""
+    return np.interp(along, arc_length(path), path)
+
+
+def _angle_of(vector: complex) -> float:
+    return float(np.angle(vector))
+
+
+def _angle_between(one: float, other: float) -> float:
+    """The smaller angle from one direction to another, rad, 0 .. π."""
+    return abs((one - other + np.pi) % (2.0 * np.pi) - np.pi)

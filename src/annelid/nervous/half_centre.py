@@ -1,11 +1,10 @@
-"""Half-centres: two neurons that inhibit each other and take turns, with their period as a thing to ask for.
+"""Half-centres: two neurons that inhibit each other and take turns, designed for a wanted period.
 
 Each neuron bears a persistent sodium channel that keeps it at the operating range R once it is up, until the partner
-escapes from its inhibition. Whether it does is set by the bifurcation parameter delta (Szczecinski et al. 2017; Riddle
-et al. 2022), and how long it takes by the slow gate's time constant above all.
-
-Conductances follow from the design rules of functional subnetworks (Szczecinski, Hunt and Quinn 2017): say where a
-neuron shall rest while its partners are in a given state, and solve the current balance there for the one unknown,
+escapes from its inhibition. Whether it does is set by the bifurcation parameter delta, and how long it takes mostly by
+the slow gate's time constant (Szczecinski et al. 2017; Riddle et al. 2022). Conductances follow from the design rules
+of functional subnetworks (Szczecinski, Hunt and Quinn 2017): choose where a neuron rests while its partners are in a
+given state, and solve the current balance there for the one unknown,
 
     -Gm U + sum_j g_j a_j (E_j - U) + G_Na m(U) h(U) (E_Na - U) + I = 0.
 
@@ -24,13 +23,12 @@ import numpy as np
 from annelid.errors import ConfigError, require_negative, require_positive, suggest
 from annelid.nervous.functional_subnetworks import Signals
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Array, Channel, Neuron, persistent_sodium
-from annelid.nervous.synapses import Synapse
+from annelid.nervous.neurons import Array, Channel, Neuron, Synapse, persistent_sodium
 
 _TIMESTEP_MS = 1.0
 _CANDIDATES = 9
 _MAX_ROUNDS = 12
-# A neuron that has not escaped within this many gate time constants is taken to be held for good.
+# A neuron that has not escaped within this many gate time constants is taken never to escape.
 _PATIENCE = 40.0
 
 
@@ -44,7 +42,7 @@ class HalfCentre:
         range_mV: Operating range R.
         bifurcation_mV: delta, where a fully inhibited neuron comes to rest: above 0 the half-centre oscillates by
             itself, below 0 both of its states are stable.
-        offset_mV: How far below 0 and above R another neuron holds the half-centre (`add_hold`).
+        offset_mV: How far below 0 and above R another neuron takes the half-centre (`add_hold`).
         inhibitory_reversal_mV: E_inh relative to rest.
         excitatory_reversal_mV: E_ex relative to rest.
         sodium_reversal_mV: E_Na relative to rest.
@@ -84,16 +82,14 @@ class HalfCentre:
 
     @property
     def sodium_uS(self) -> float:
-        """G_Na that lets an isolated neuron with steady gates hold R: ``Gm R = G_Na m(R) h(R) (E_Na - R)``."""
+        """G_Na with which an isolated neuron with steady gates stays at R: ``Gm R = G_Na m(R) h(R) (E_Na - R)``."""
         return self.leak_conductance_uS * self.range_mV / self._channel(1.0).unit_current_mV(self.range_mV)
 
     @property
     def inhibition_uS(self) -> float:
-        """g_CPG that lets a fully inhibited neuron rest at delta, just above the synaptic threshold.
+        """g_CPG that lets a fully inhibited neuron rest at delta, the partner at R or above.
 
-        ``-Gm delta + g_CPG (E_inh - delta) + G_Na m(delta) h(delta) (E_Na - delta) = 0``, the partner at R or above.
-        With delta > 0 the inhibited neuron always escapes in the end, so the half-centre oscillates by itself; with
-        delta < 0 both of its states would be stable.
+        ``-Gm delta + g_CPG (E_inh - delta) + G_Na m(delta) h(delta) (E_Na - delta) = 0``.
         """
         delta, channel = self.bifurcation_mV, self.sodium_channel
         sodium = channel.conductance_uS * channel.unit_current_mV(delta)
@@ -101,7 +97,7 @@ class HalfCentre:
 
     @property
     def hold_up_uS(self) -> float:
-        """g32 with which another neuron at R alone holds a neuron at ``U = R + offset``.
+        """g32 with which another neuron at R alone keeps a neuron at ``U = R + offset``.
 
         ``-Gm U + g_CPG (-offset / R) (E_inh - U) + g32 (E_ex - U) = 0``, with the sodium inactivated, and the partner
         at -offset acting through unclipped, hence slightly negative, transmission.
@@ -116,11 +112,8 @@ class HalfCentre:
         """g31 with which another neuron at R inhibits a neuron as firmly as its partner at R + offset does.
 
         A neuron at -offset receives ``g_CPG (R + offset) / R (E_inh + offset) + Gm offset`` from it; g31 gives the same
-        current to one that has risen to +offset, ``g31 (E_inh - offset)``.
-
-        This is the rule that Riddle et al. 2022 applied, read back from their number. The plain balance at -offset has
-        the driving force ``E_inh + offset`` with the opposite sign: there the partner alone already inhibits too much,
-        and the balance would ask for a negative conductance (about -g_CPG).
+        current to one that has risen to +offset, ``g31 (E_inh - offset)``. Riddle et al. 2022 applied this rule, read
+        back from their number; the plain balance at -offset would ask for a negative conductance.
         """
         reach, offset, inhibitory = self.range_mV, self.offset_mV, self.inhibitory_reversal_mV
         partner = self.inhibition_uS * (reach + offset) / reach * (inhibitory + offset)
@@ -132,22 +125,14 @@ class HalfCentre:
         Args:
             drive_uS: g_drive, the conductance that excites.
             driver_mV: Potential of the neuron that excites; its transmission ``a = U / R`` is not clipped.
-
-        Returns:
-            g, uS.
         """
         return -drive_uS * driver_mV / self.range_mV * self.excitatory_reversal_mV / self.inhibitory_reversal_mV
 
     @property
     def signals(self) -> Signals:
         """How neurons outside the half-centres carry signals."""
-        return Signals(
-            self.range_mV,
-            self.leak_conductance_uS,
-            self.capacitance_nF,
-            self.excitatory_reversal_mV,
-            self.inhibitory_reversal_mV,
-        )
+        membrane = self.range_mV, self.leak_conductance_uS, self.capacitance_nF
+        return Signals(*membrane, self.excitatory_reversal_mV, self.inhibitory_reversal_mV)
 
     @property
     def sodium_channel(self) -> Channel:
@@ -191,23 +176,22 @@ def add_half_centre(
     Raises:
         ConfigError: A name is taken, or the design gives a negative conductance.
     """
-    p = HalfCentre() if half_centre is None else half_centre
-    up, down = (p.range_mV, 0.0) if initial_mV is None else initial_mV
-    network.add_neuron(first, p.neuron, up)
-    network.add_neuron(second, p.neuron, down)
-    network.add_synapse(first, second, p.inhibitory(p.inhibition_uS))
-    network.add_synapse(second, first, p.inhibitory(p.inhibition_uS))
+    p = half_centre or HalfCentre()
+    for name, potential_mV in zip((first, second), initial_mV or (p.range_mV, 0.0), strict=True):
+        network.add_neuron(name, p.neuron, potential_mV)
+    for source, target in ((first, second), (second, first)):
+        network.add_synapse(source, target, p.inhibitory(p.inhibition_uS))
 
 
 def add_hold(network: Network, holder: str, down: str, up: str, half_centre: HalfCentre | None = None) -> None:
-    """Lets a neuron hold a half-centre in one of its states: at R it brings one neuron down and the other up.
+    """Lets a neuron keep a half-centre in one of its states: at R it brings one neuron down and the other up.
 
-    While it holds, they rest near ``-offset`` and ``R + offset``, beyond the reach of their oscillation, so that it
-    begins from the same state whenever the hold ends.
+    Meanwhile they rest near ``-offset`` and ``R + offset``, beyond the reach of their oscillation, so that it always
+    begins from the same state.
 
     Args:
         network: Where all three neurons are.
-        holder: The neuron that holds while it is up.
+        holder: The neuron that keeps them there while it is up.
         down: The neuron that is inhibited.
         up: The neuron that is excited.
         half_centre: The design; default: that of Riddle et al. 2022.
@@ -215,7 +199,7 @@ def add_hold(network: Network, holder: str, down: str, up: str, half_centre: Hal
     Raises:
         ConfigError: No neuron has one of the names, or the design gives a negative conductance.
     """
-    p = HalfCentre() if half_centre is None else half_centre
+    p = half_centre or HalfCentre()
     network.add_synapse(holder, down, p.inhibitory(p.hold_down_uS))
     network.add_synapse(holder, up, p.excitatory(p.hold_up_uS))
 
@@ -242,7 +226,7 @@ def oscillation_periods(half_centres: Sequence[HalfCentre], duration_ms: float |
             constant. The run ends as soon as all have had them.
 
     Returns:
-        Periods, ms, ``(n,)``; infinite where there were fewer than three, hence for one that is held for good.
+        Periods, ms, ``(n,)``; infinite where there were fewer than three.
 
     Raises:
         ConfigError: A design gives a negative conductance, or there is none.
@@ -262,12 +246,10 @@ def oscillation_periods(half_centres: Sequence[HalfCentre], duration_ms: float |
     for step in range(int(duration_ms / _TIMESTEP_MS)):
         stepper.advance(state)
         before, lead = lead, first - second
-        overtaken = (before < 0.0) & (lead >= 0.0)
-        if not overtaken.any():
-            continue
-        for i in np.flatnonzero(overtaken):
+        overtaken = np.flatnonzero((before < 0.0) & (lead >= 0.0))
+        for i in overtaken:
             instants[i].append(_TIMESTEP_MS * (step + before[i] / (before[i] - lead[i])))
-        if all(len(times) >= 3 for times in instants):
+        if overtaken.size and all(len(times) >= 3 for times in instants):
             break
     return np.array([times[-1] - times[-2] if len(times) >= 3 else np.inf for times in instants])
 
@@ -288,18 +270,15 @@ def half_centre_of_period(
         bounds: Least and greatest value to try; default: a tenth and ten times the present one.
         tolerance: Relative error of the period at which to stop.
 
-    Returns:
-        The design with that parameter.
-
     Raises:
         ConfigError: An unknown parameter, bounds that are not in order or of one sign, or a period that cannot be had
-            within them: the sentence tells the range that can.
+            within them; the sentence has the range that can.
     """
-    base = HalfCentre() if half_centre is None else half_centre
+    base = half_centre or HalfCentre()
     names = [field.name for field in fields(HalfCentre)]
     if parameter not in names:
         raise ConfigError(f"unknown parameter {parameter!r} of a half-centre: {suggest(parameter, names)}")
-    low, high = sorted((0.1 * getattr(base, parameter), 10.0 * getattr(base, parameter)))
+    low, high = bounds or sorted((0.1 * getattr(base, parameter), 10.0 * getattr(base, parameter)))
 
     def periods_of(values: Array, duration_ms: float | None) -> Array:
         periods, possible = np.full(values.size, np.inf), {}
@@ -312,8 +291,7 @@ def half_centre_of_period(
             periods[list(possible)] = oscillation_periods(list(possible.values()), duration_ms)
         return periods
 
-    value = find_period(periods_of, period_ms, bounds or (low, high), tolerance, parameter)
-    return replace(base, **{parameter: value})
+    return replace(base, **{parameter: find_period(periods_of, period_ms, (low, high), tolerance, parameter)})
 
 
 def find_period(
@@ -336,37 +314,33 @@ def find_period(
         tolerance: Relative error of the period at which to stop.
         parameter: What to call the parameter in an error.
 
-    Returns:
-        The value.
-
     Raises:
         ConfigError: Bounds that are not in order or of one sign, a period or tolerance that is not positive, or a
-            period that is not attained: the sentence tells the range that is.
+            period that is not attained; the sentence has the range that is.
     """
     low, high = bounds
     if not (low < high and low * high > 0):
         raise ConfigError(f"the bounds of {parameter} must be in ascending order and of one sign, not {bounds}")
     if not (period_ms > 0 and np.isfinite(period_ms) and tolerance > 0):
         raise ConfigError(f"period_ms and tolerance must be positive, not {period_ms} and {tolerance}")
-    # Slower ones need not be waited for, unless nothing else tells them from silent ones.
+    # Slower ones need not be waited for, unless nothing else distinguishes them from silent ones.
     patience: float | None = 5.0 * period_ms
     values = np.geomspace(low, high, _CANDIDATES)
     periods = periods_of(values, patience)
     if _bracket(periods, period_ms)[1]:
         patience = None
         periods = periods_of(values, patience)
-    seen = periods[np.isfinite(periods)]
+    seen = np.empty(0)
     for _ in range(_MAX_ROUNDS):
+        seen = np.append(seen, periods[np.isfinite(periods)])
         errors = np.abs(periods / period_ms - 1.0)
-        best = int(np.argmin(errors))
+        best, (left, _) = int(np.argmin(errors)), _bracket(periods, period_ms)
         if errors[best] <= tolerance:
             return float(values[best])
-        left, _ = _bracket(periods, period_ms)
         if left is None:
             break
         values = np.geomspace(values[left], values[left + 1], _CANDIDATES)
         periods = periods_of(values, patience)
-        seen = np.concatenate([seen, periods[np.isfinite(periods)]])
     if not seen.size:
         raise ConfigError(f"nothing oscillates with {parameter} from {low:g} to {high:g}")
     raise ConfigError(
@@ -381,9 +355,6 @@ def _bracket(periods: Array, wanted: float) -> tuple[int | None, bool]:
     Pairs of two finite periods come first, then those of lower i; None, and True, where there is no pair.
     """
     above, silent = periods > wanted, ~np.isfinite(periods)
-    places = np.flatnonzero(above[:-1] != above[1:])
-    doubtful = silent[places] | silent[places + 1]
-    if not places.size:
-        return None, True
-    first = int(np.argmin(doubtful))
-    return int(places[first]), bool(doubtful[first])
+    pairs = [(bool(silent[i] or silent[i + 1]), int(i)) for i in np.flatnonzero(above[:-1] != above[1:])]
+    doubtful, place = min(pairs, default=(True, None))
+    return place, doubtful

@@ -10,15 +10,20 @@ import numpy as np
 from annelid.errors import ConfigError, require_finite, shown, suggest
 from annelid.nervous.arrays import NetworkArrays, build_arrays
 from annelid.nervous.diagram import Diagram, draw_diagram, markdown_tables
-from annelid.nervous.neurons import Neuron
+from annelid.nervous.neurons import ConnectionKind, GapJunction, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.stepper import Scheme, Stepper
-from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.nervous.toml import read_network, write_network
 
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A synapse or gap junction between two named neurons."""
+    """A synapse or gap junction between two named neurons.
+
+    Attributes:
+        source: Name of the presynaptic neuron.
+        target: Name of the postsynaptic neuron.
+        kind: What joins them.
+    """
 
     source: str
     target: str
@@ -28,45 +33,25 @@ class Connection:
 class Network:
     """Neurons, synapses, inputs and outputs, each known by its name; `compile` makes it run.
 
-    Neurons, inputs and outputs keep the order in which they were added: it is the order of the columns of
-    every array of the compiled network.
+    All are in the order in which they were added, which is that of the columns of every array of the compiled network.
+    They are for reading; the methods below add to them, and check what is added.
 
     Attributes:
         name: What to call the network.
+        neurons: The neurons by name.
+        initial_mV: The initial potential of every neuron, mV.
+        connections: The synapses and gap junctions.
+        inputs: The neurons that each input drives.
+        outputs: The neuron that each output reads.
     """
 
     def __init__(self, name: str = "network") -> None:
         self.name = name
-        self._neurons: dict[str, Neuron] = {}
-        self._initial_mV: dict[str, float] = {}
-        self._connections: list[Connection] = []
-        self._inputs: dict[str, tuple[str, ...]] = {}
-        self._outputs: dict[str, str] = {}
-
-    @property
-    def neurons(self) -> Mapping[str, Neuron]:
-        """The neurons by name, in order."""
-        return dict(self._neurons)
-
-    @property
-    def initial_mV(self) -> Mapping[str, float]:
-        """The initial potential of every neuron, mV, in order."""
-        return dict(self._initial_mV)
-
-    @property
-    def connections(self) -> tuple[Connection, ...]:
-        """The synapses and gap junctions, in order."""
-        return tuple(self._connections)
-
-    @property
-    def inputs(self) -> Mapping[str, tuple[str, ...]]:
-        """The neurons that each input drives, in order."""
-        return dict(self._inputs)
-
-    @property
-    def outputs(self) -> Mapping[str, str]:
-        """The neuron that each output reads, in order."""
-        return dict(self._outputs)
+        self.neurons: dict[str, Neuron] = {}
+        self.initial_mV: dict[str, float] = {}
+        self.connections: list[Connection] = []
+        self.inputs: dict[str, tuple[str, ...]] = {}
+        self.outputs: dict[str, str] = {}
 
     def add_neuron(self, name: str, neuron: Neuron, initial_mV: float | None = None) -> None:
         """Adds a neuron.
@@ -79,55 +64,70 @@ class Network:
         Raises:
             ConfigError: The name is taken, or is no text; the potential is not finite.
         """
-        _refuse_duplicate("neuron", name, self._neurons)
+        _refuse_duplicate("neuron", name, self.neurons)
         require_finite(**{f"neuron {shown(name)}: initial_mV": initial_mV})
-        self._neurons[name] = neuron
-        self._initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
+        self.neurons[name] = neuron
+        self.initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
 
     def add_synapse(self, source: str, target: str, synapse: Synapse | SpikingSynapse | ModulatorySynapse) -> None:
-        """Adds a graded, spiking or modulatory synapse from one neuron onto another.
+        """Adds a graded, spiking or modulatory synapse; currents of several add up, factors of modulation multiply.
 
-        The currents of several between the same two add up; factors of modulation multiply.
+        Args:
+            source: Name of the presynaptic neuron.
+            target: Name of the postsynaptic neuron.
+            synapse: Its properties.
 
         Raises:
             ConfigError: No neuron has one of the names (the sentence suggests the nearest), or the source of a
                 spiking synapse does not spike.
         """
-        if isinstance(synapse, SpikingSynapse):
-            self._require_neuron(source)
-            if self._neurons[source].firing is None:
-                raise ConfigError(f"neuron {source!r} has no firing, and a spiking synapse needs a source that spikes")
-        self._connect(source, target, synapse)
+        self._require_neurons(source, target)
+        if isinstance(synapse, SpikingSynapse) and self.neurons[source].firing is None:
+            raise ConfigError(f"neuron {source!r} has no firing, and a spiking synapse needs a source that spikes")
+        self.connections.append(Connection(source, target, synapse))
 
     def add_gap_junction(self, source: str, target: str, junction: GapJunction) -> None:
         """Adds a gap junction between two neurons; the order matters only for a rectified one.
 
+        Args:
+            source: Name of one neuron.
+            target: Name of the other.
+            junction: Its properties.
+
         Raises:
             ConfigError: No neuron has one of the names; the sentence suggests the nearest.
         """
-        self._connect(source, target, junction)
+        self._require_neurons(source, target)
+        self.connections.append(Connection(source, target, junction))
 
     def add_input(self, name: str, targets: str | Sequence[str]) -> None:
-        """Adds an input: its current (nA) flows into the target, or in full into each of several.
+        """Adds an input.
+
+        Args:
+            name: Its name.
+            targets: Name of the neuron that its current (nA) flows into, or of several, each of which gets all of it.
 
         Raises:
             ConfigError: The name is taken, or no neuron has the name of a target.
         """
-        _refuse_duplicate("input", name, self._inputs)
+        _refuse_duplicate("input", name, self.inputs)
         neurons = (targets,) if isinstance(targets, str) else tuple(targets)
-        for neuron in neurons:
-            self._require_neuron(neuron)
-        self._inputs[name] = neurons
+        self._require_neurons(*neurons)
+        self.inputs[name] = neurons
 
     def add_output(self, name: str, source: str) -> None:
-        """Adds an output that reads the potential (mV) of one neuron.
+        """Adds an output.
+
+        Args:
+            name: Its name.
+            source: Name of the neuron whose potential (mV) it reads.
 
         Raises:
             ConfigError: The name is taken, or no neuron has the name of the source.
         """
-        _refuse_duplicate("output", name, self._outputs)
-        self._require_neuron(source)
-        self._outputs[name] = source
+        _refuse_duplicate("output", name, self.outputs)
+        self._require_neurons(source)
+        self.outputs[name] = source
 
     def arrays(self) -> NetworkArrays:
         """Returns the network as frozen arrays.
@@ -135,8 +135,6 @@ class Network:
         Raises:
             ConfigError: The network has no neurons.
         """
-        if not self._neurons:
-            raise ConfigError(f"network {self.name!r} has no neurons: add_neuron comes first")
         return build_arrays(self)
 
     def compile(self, timestep_ms: float = 1.0, scheme: Scheme = "euler", n_worms: int = 1) -> Stepper:
@@ -144,7 +142,7 @@ class Network:
 
         Args:
             timestep_ms: Step, ms.
-            scheme: ``"euler"`` (potentials and gates both from the old state, as in Riddle 2022),
+            scheme: ``"euler"`` (potentials and gates both from the old state, as in Riddle et al. 2022),
                 ``"toolbox"`` (gates first, as SNS-Toolbox does) or ``"heun"`` (second order).
             n_worms: Copies to advance together.
 
@@ -163,7 +161,7 @@ class Network:
         """
         arrays = self.arrays()
         total = arrays.weights[:, : len(arrays.neurons)].sum(axis=0)
-        total += np.abs(arrays.weights[arrays.drive_slices()["rectified"], len(arrays.neurons) :]).sum(axis=0)
+        total += np.abs(arrays.weights[arrays.drive["rectified"], len(arrays.neurons) :]).sum(axis=0)
         return float(np.min(2.0 * arrays.capacitance_nF / np.maximum(total, np.finfo(float).tiny)))
 
     def diagram(self) -> Diagram:
@@ -188,15 +186,11 @@ class Network:
         """
         return read_network(text, cls)
 
-    def _connect(self, source: str, target: str, kind: ConnectionKind) -> None:
-        self._require_neuron(source)
-        self._require_neuron(target)
-        self._connections.append(Connection(source, target, kind))
-
-    def _require_neuron(self, name: str) -> None:
-        if name not in self._neurons:
-            hint = suggest(name, self._neurons) if self._neurons else "the network has no neurons yet"
-            raise ConfigError(f"unknown neuron {shown(name)}: {hint}")
+    def _require_neurons(self, *names: str) -> None:
+        for name in names:
+            if name not in self.neurons:
+                hint = suggest(name, self.neurons) if self.neurons else "the network has no neurons yet"
+                raise ConfigError(f"unknown neuron {shown(name)}: {hint}")
 
 
 def _refuse_duplicate(kind: str, name: str, taken: Mapping[str, object]) -> None:

@@ -1,4 +1,4 @@
-"""Leaky neurons, spiking or not, with or without gated ion channels such as the persistent sodium channel.
+"""Neurons, spiking or not, with or without gated channels, and what joins them: synapses and gap junctions.
 
 Potentials in mV (relative to rest unless a neuron says otherwise), conductances in uS, currents in nA,
 capacitances in nF, times in ms: a consistent set, since uS mV = nA and nF mV / ms = nA.
@@ -7,29 +7,22 @@ capacitances in nF, times in ms: a consistent set, since uS mV = nA and nF mV / 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import ConfigError, require_finite, require_positive
+from annelid.errors import ConfigError, require_finite, require_positive, suggest
 
 Array = NDArray[np.float64]
 
 
-def check_numbers(
+def _check_numbers(
     owner: str, item: Any, *, positive: tuple[str, ...] = (), not_negative: tuple[str, ...] = ("conductance_uS",)
 ) -> None:
-    """Refuses a part of a network for the first number that is infinite, not a number, or of the wrong sign.
+    """Refuses a dataclass for the first number that is infinite, not a number, or of the wrong sign.
 
-    Args:
-        owner: What it is, for the sentence: "a neuron's".
-        item: A dataclass.
-        positive: Fields that must be positive, unless they are None.
-        not_negative: Fields that must not be negative, of those that it has.
-
-    Raises:
-        ConfigError: Of the first such number.
+    Fields of ``positive`` may be None, those of ``not_negative`` may be absent.
     """
     numbers = {field.name: getattr(item, field.name) for field in fields(item)}
     require_finite(**{f"{owner} {name}": value for name, value in numbers.items()})
@@ -67,7 +60,7 @@ class Gate:
     time_constant_ms: float | None = None
 
     def __post_init__(self) -> None:
-        check_numbers("a gate's", self, positive=("time_constant_ms",))
+        _check_numbers("a gate's", self, positive=("time_constant_ms",))
         if self.factor < 0 or (self.time_constant_ms is not None and self.factor == 0):
             raise ConfigError(f"a gate's factor must be positive (0 only without time constant), not {self.factor}")
 
@@ -76,7 +69,7 @@ class Gate:
         return 1.0 / (1.0 + self.factor * np.exp(self.slope_per_mV * (self.midpoint_mV - potential_mV)))
 
     def toolbox_start(self, potential_mV: Array | float) -> Array:
-        """Returns the value at which SNS-Toolbox 1.5.2 starts a gate: the slope's sign the other way round."""
+        """Returns the value at which SNS-Toolbox 1.5.2 starts a gate: with the slope's sign reversed."""
         return 1.0 / (1.0 + self.factor * np.exp(self.slope_per_mV * (potential_mV - self.midpoint_mV)))
 
 
@@ -98,7 +91,7 @@ class Channel:
     gates: tuple[Gate, ...] = ()
 
     def __post_init__(self) -> None:
-        check_numbers("a channel's", self)
+        _check_numbers("a channel's", self)
 
     def unit_current_mV(self, potential_mV: float) -> float:
         """Current (nA) per uS of conductance at a potential, with every gate at its steady state."""
@@ -147,7 +140,7 @@ class Firing:
     adaptation_time_constant_ms: float = 5.0
 
     def __post_init__(self) -> None:
-        check_numbers("a firing neuron's", self, positive=("adaptation_time_constant_ms",))
+        _check_numbers("a firing neuron's", self, positive=("adaptation_time_constant_ms",))
         if not self.reset_mV < self.threshold_mV:
             raise ConfigError(
                 f"a firing neuron's reset_mV must be below its threshold_mV = {self.threshold_mV}, not {self.reset_mV}"
@@ -178,7 +171,7 @@ class Neuron:
     firing: Firing | None = None
 
     def __post_init__(self) -> None:
-        check_numbers("a neuron's", self, positive=("capacitance_nF",), not_negative=("leak_conductance_uS",))
+        _check_numbers("a neuron's", self, positive=("capacitance_nF",), not_negative=("leak_conductance_uS",))
 
 
 def persistent_sodium(
@@ -206,3 +199,127 @@ def persistent_sodium(
     opening = Gate(slope_per_mV=slope_per_mV, midpoint_mV=range_mV)
     closing = Gate(slope_per_mV=-slope_per_mV, factor=0.5, time_constant_ms=time_constant_ms)
     return Channel(conductance_uS, reversal_mV, (opening, closing))
+
+
+Modulated = Literal["leak", "channels", "membrane", "gates"]
+
+
+@dataclass(frozen=True, slots=True)
+class Synapse:
+    """A graded chemical synapse, ``I = clip((U_pre - threshold) / (saturation - threshold), 0, 1) g (E - U)``.
+
+    Szczecinski et al. 2017, eq. 2. With the threshold at rest and the saturation at R this is the
+    transmission synapse of the paper.
+
+    Attributes:
+        conductance_uS: Largest conductance g.
+        reversal_mV: Reversal potential E, on the scale of the postsynaptic potential; below rest it inhibits.
+        threshold_mV: Presynaptic potential at which transmission begins.
+        saturation_mV: Presynaptic potential at which it is largest.
+
+    Raises:
+        ConfigError: A number that is not finite, a negative conductance, or a saturation equal to the threshold.
+    """
+
+    conductance_uS: float
+    reversal_mV: float
+    threshold_mV: float = 0.0
+    saturation_mV: float = 20.0
+
+    def __post_init__(self) -> None:
+        _check_numbers("a synapse's", self)
+        _check_opening("a synapse's", self)
+
+
+@dataclass(frozen=True, slots=True)
+class GapJunction:
+    """An electrical synapse: the same current out of one neuron and into the other.
+
+    Attributes:
+        conductance_uS: Conductance g of ``I = g (U_pre - U_post)``.
+        rectified: Conducts only while the presynaptic potential is the higher one.
+
+    Raises:
+        ConfigError: A number that is not finite, a negative conductance.
+    """
+
+    conductance_uS: float
+    rectified: bool = False
+
+    def __post_init__(self) -> None:
+        _check_numbers("a gap junction's", self)
+
+
+@dataclass(frozen=True, slots=True)
+class SpikingSynapse:
+    """A synapse that conducts after each spike of its source: ``I = g s (E - U)``, the release s in [0, 1].
+
+    A spike makes s jump to ``min(s + increment, 1)`` at the end of the step in which it falls; between spikes
+    ``ds/dt = -s / tau``, of which every step takes the exact factor ``exp(-dt / tau)``. With increment 1 each spike
+    opens the synapse fully, as in SNS-Toolbox (Nourse et al. 2023).
+
+    Attributes:
+        conductance_uS: Largest conductance g.
+        reversal_mV: Reversal potential E.
+        time_constant_ms: tau of the decay.
+        increment: Jump of the release at a spike.
+
+    Raises:
+        ConfigError: A number that is not finite, a negative conductance, a time constant that is not positive, or an
+            increment outside (0, 1].
+    """
+
+    conductance_uS: float
+    reversal_mV: float
+    time_constant_ms: float = 1.0
+    increment: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_numbers("a spiking synapse's", self, positive=("time_constant_ms",))
+        if not 0 < self.increment <= 1:
+            raise ConfigError(f"a spiking synapse's increment must be above 0 and at most 1, not {self.increment}")
+
+
+@dataclass(frozen=True, slots=True)
+class ModulatorySynapse:
+    """A synapse that carries no current: its source scales a conductance or a time constant of its target.
+
+    The quantity is multiplied by ``factor ** a``, ``a = clip((U_pre - threshold) / (saturation - threshold), 0, 1)``:
+    by 1 while the source is silent, by the factor while it is saturated, and geometrically in between. Factors of
+    several modulatory synapses multiply in any order, and never change the quantity's sign. An own form, chosen for
+    these properties.
+
+    Attributes:
+        quantity: ``"leak"``: the leak conductance; ``"channels"``: the conductance of all gated channels;
+            ``"membrane"``: the capacitance, hence the membrane's time constant and nothing else; ``"gates"``: the
+            time constants of all slow gates.
+        factor: What a saturated source multiplies the quantity by.
+        threshold_mV: Presynaptic potential at which modulation begins.
+        saturation_mV: Presynaptic potential at which it is full.
+
+    Raises:
+        ConfigError: A number that is not finite, an unknown quantity, a factor that is not positive, or a saturation
+            equal to the threshold.
+    """
+
+    quantity: Modulated
+    factor: float
+    threshold_mV: float = 0.0
+    saturation_mV: float = 20.0
+
+    def __post_init__(self) -> None:
+        _check_numbers("a modulatory synapse's", self, positive=("factor",))
+        if self.quantity not in get_args(Modulated):
+            raise ConfigError(
+                f"unknown modulated quantity {self.quantity!r}: {suggest(self.quantity, get_args(Modulated))}"
+            )
+        _check_opening("a modulatory synapse's", self)
+
+
+ConnectionKind = Synapse | GapJunction | SpikingSynapse | ModulatorySynapse
+"""Everything that can join two neurons."""
+
+
+def _check_opening(owner: str, synapse: Synapse | ModulatorySynapse) -> None:
+    if synapse.saturation_mV == synapse.threshold_mV:
+        raise ConfigError(f"{owner} saturation_mV must differ from its threshold_mV, both are {synapse.threshold_mV}")

@@ -7,35 +7,22 @@ to walking with a salamander robot driven by a spinal cord model", Science 315, 
     d2r_i/dt2 = a (a/4 (R_i - r_i) - dr_i/dt)
     x_i = r_i (1 + cos theta_i)
 
-Intrinsic frequency nu and amplitude R are linear in the drive d within an oscillator's range and 0 outside, where it is
-said to saturate (their Table S1): nu = 0.2 d + 0.3 Hz and R = 0.065 d + 0.196 for 1 <= d <= 5 in the body,
-nu = 0.2 d Hz and R = 0.131 d + 0.131 for 1 <= d <= 3 in the limbs; a = 20/s, w = 10/s within the body, 30/s from limbs
-to body. With d rising the animal rests, walks (from 1: limbs force their slow rhythm and a standing wave on the body),
-swims (from 3: limbs saturate, the body is left with its own faster travelling wave), and falls silent (from 5).
-
-The salamander has two such chains in antiphase. As phi = pi between them, their coupling vanishes in that state, and
-one side is enough for a worm, whose muscles are rings.
-
-Locked chain. In a chain with neighbours coupled both ways, phi_{k+1,k} = -phi_{k,k+1} = lag, and equal amplitudes R,
-the couplings cancel in the sum over all: the common frequency is the mean of the intrinsic ones. Balance of the first k
-oscillators gives the phase by which k+1 follows k:
-
-    theta_k - theta_{k+1} = lag + arcsin(2 pi sum_{i<=k} (nu_i - mean nu) / (w R)),
-
-and there is no locked state where an argument leaves [-1, 1]. Two oscillators follow at
-lag + arcsin(pi (nu_1 - nu_2) / (w R)).
+Intrinsic frequency nu and amplitude R are linear in the drive d within an oscillator's range and 0 outside. With d
+rising the animal rests, walks (from 1: limbs force their slow rhythm and a standing wave on the body), swims (from 3:
+limbs saturate, the body is left with its own faster travelling wave), and falls silent (from 5). The salamander has two
+such chains in antiphase, where their coupling vanishes; one side is enough for a worm, whose muscles are rings.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.errors import ConfigError, require_at_least
-
-Array = NDArray[np.float64]
+from annelid.nervous.neurons import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +58,15 @@ class DriveResponse:
         return np.where((d >= self.lowest_drive) & (d <= self.highest_drive), slope * d + offset, 0.0)
 
 
+# The salamander's constants: Ijspeert et al. 2007, Table S1. Rates are 1/s.
 BODY = DriveResponse(1.0, 5.0, 0.2, 0.3, 0.065, 0.196)
-"""The salamander's body oscillators (Ijspeert et al. 2007, Table S1)."""
 LIMB = DriveResponse(1.0, 3.0, 0.2, 0.0, 0.131, 0.131)
-"""The salamander's limb oscillators (Ijspeert et al. 2007, Table S1)."""
 AMPLITUDE_RATE_PER_S = 20.0
-"""a, the rate at which amplitudes settle, 1/s (Ijspeert et al. 2007)."""
+"""a, the rate at which amplitudes settle."""
 BODY_COUPLING_PER_S = 10.0
-"""w between body oscillators and between limb oscillators, 1/s (Ijspeert et al. 2007)."""
+"""w between body oscillators and between limb oscillators."""
 LIMB_COUPLING_PER_S = 30.0
-"""w from a limb to the body oscillators of its girdle, 1/s (Ijspeert et al. 2007)."""
+"""w from a limb to the body oscillators of its girdle."""
 
 
 @dataclass(frozen=True)
@@ -109,30 +95,29 @@ class PhaseNetwork:
 
     def frequency_Hz(self, drive: ArrayLike) -> Array:
         """Returns the intrinsic frequencies, Hz, ``(*drive.shape, n)``."""
-        of_kind = {response: response.frequency_Hz(drive) for response in set(self.responses)}
-        return np.stack([of_kind[response] for response in self.responses], axis=-1)
+        return self._of_each(lambda response: response.frequency_Hz(drive))
 
     def amplitude(self, drive: ArrayLike) -> Array:
         """Returns the intrinsic amplitudes, ``(*drive.shape, n)``."""
-        of_kind = {response: response.amplitude(drive) for response in set(self.responses)}
+        return self._of_each(lambda response: response.amplitude(drive))
+
+    def _of_each(self, answer: Callable[[DriveResponse], Array]) -> Array:
+        of_kind = {response: answer(response) for response in set(self.responses)}
         return np.stack([of_kind[response] for response in self.responses], axis=-1)
 
 
 def phase_chain(
     n_body: int, lag_rad: float | None = None, coupling_per_s: float = BODY_COUPLING_PER_S, limbs: bool = False
 ) -> PhaseNetwork:
-    """Builds one side of the salamander's network for any number of segments.
+    """Builds one side of the salamander's network for any number of segments; Ijspeert et al. 2007, Fig. 1.
 
     Args:
-        n_body: Body oscillators in a chain, at least 2, coupled to their neighbours both ways.
+        n_body: Body oscillators in a chain, at least 2, coupled to their neighbours in both directions.
         lag_rad: Phase by which each follows the one before it, rad; default one wave on the body, 2 pi / n_body.
         coupling_per_s: w within the body and between the limbs, 1/s.
         limbs: Adds two limb oscillators at the end, the fore limb's and the hind limb's, in antiphase with each
             other; each acts on the oscillators of its half of the body (the front half has the middle one) with
             phi = pi, three times as strongly as those act on one another.
-
-    Returns:
-        The network of ``n_body`` or ``n_body + 2`` oscillators. Ijspeert et al. 2007, Fig. 1.
 
     Raises:
         ConfigError: Fewer than 2 body oscillators.
@@ -154,16 +139,17 @@ def phase_chain(
 
 
 def steady_lags(frequency_Hz: ArrayLike, amplitude: float, coupling_per_s: float, lag_rad: float) -> Array:
-    """Phases by which neighbours of a locked chain follow one another; the module's docstring derives them.
+    """Returns the phases by which neighbours of a locked chain follow one another, rad, ``(.., n - 1)``.
+
+    With equal amplitudes R the couplings cancel in the sum over all, so the common frequency is the mean of the
+    intrinsic ones; balance of the first k oscillators then gives ``theta_k - theta_{k+1} = lag + arcsin(2 pi sum_{i<=k}
+    (nu_i - mean nu) / (w R))``, and NaN where the chain cannot lock.
 
     Args:
         frequency_Hz: Intrinsic frequencies along the chain, Hz, ``(.., n)``.
         amplitude: Amplitude R of all.
         coupling_per_s: w, 1/s.
         lag_rad: Phase bias from each to the next, rad.
-
-    Returns:
-        Lags, rad, ``(.., n - 1)``; NaN where the chain cannot lock.
     """
     nu = np.asarray(frequency_Hz, dtype=float)
     excess = np.cumsum(nu - nu.mean(axis=-1, keepdims=True), axis=-1)[..., :-1]
@@ -194,7 +180,12 @@ class PhaseStepper:
     """
 
     def __init__(self, network: PhaseNetwork, timestep_s: float) -> None:
-        """Prepares a step of ``timestep_s``."""
+        """Prepares a step.
+
+        Args:
+            network: The oscillators.
+            timestep_s: Step, s.
+        """
         if not 0 < timestep_s * AMPLITUDE_RATE_PER_S <= 1:
             raise ConfigError(
                 f"a time step of {timestep_s:g} s is too long for phase oscillators: "
@@ -228,23 +219,18 @@ class PhaseStepper:
         """
         drives = np.broadcast_to(np.asarray(drive, dtype=float), state.phase_rad.shape[:1])
         turn, target = 2.0 * np.pi * self.network.frequency_Hz(drives), self.network.amplitude(drives)
+        a = AMPLITUDE_RATE_PER_S
+
+        def rates(now: Array) -> Array:
+            phase, amplitude, rate = now
+            pull = np.sin(phase[:, self._from] - phase[:, self._to] - self._bias)
+            turned = turn + (amplitude[:, self._from] * self._weight * pull) @ self._gather
+            return np.stack([turned, rate, a * (0.25 * a * (target - amplitude) - rate)])
+
         here = np.stack([state.phase_rad, state.amplitude, state.amplitude_rate_per_s])
-        first = self._rates(here, turn, target)
-        second = self._rates(here + self.timestep_s * first, turn, target)
-        return PhaseState(*(here + 0.5 * self.timestep_s * (first + second)))
+        first = rates(here)
+        return PhaseState(*(here + 0.5 * self.timestep_s * (first + rates(here + self.timestep_s * first))))
 
     def output(self, state: PhaseState) -> Array:
         """Returns x = r (1 + cos theta), ``(n_networks, n)``."""
         return state.amplitude * (1.0 + np.cos(state.phase_rad))
-
-    def _rates(self, state: Array, turn: Array, target: Array) -> Array:
-        phase, amplitude, rate = state
-        pull = np.sin(phase[:, self._from] - phase[:, self._to] - self._bias)
-        a = AMPLITUDE_RATE_PER_S
-        return np.stack(
-            [
-                turn + (amplitude[:, self._from] * self._weight * pull) @ self._gather,
-                rate,
-                a * (0.25 * a * (target - amplitude) - rate),
-            ]
-        )

@@ -1,29 +1,22 @@
-"""A peristalsis network whose rhythm goes on whatever the sensors say: the paper's neurons, joined in another way.
+"""A peristalsis network whose rhythm goes on whatever the sensors report: the paper's neurons, joined differently.
 
-Each segment keeps the half-centre of the paper, contraction against expansion neuron, its hold and its relay. In the
-paper's network the stretch sensors hold segments expanded, so that a sensor that is on for good, or off too early,
-decides the order; with all of them on nothing contracts again. The changes, each with its reason:
+Each segment has the half-centre of the paper, a hold and a relay. In the paper's network stretch sensors keep segments
+expanded, so that a sensor that is always on, or off too early, decides the order. Here, by our own design:
 
-1. *Others hold, not the sensor.* The hold of a segment is excited by the contraction neurons of all other segments. So
-   a second contraction is suppressed by the first. The hold's synapses onto the half-centre saturate, which makes the
-   suppression the same for any number of segments.
-2. *A tonic neuron* excites the contraction neuron of segment 1, which therefore contracts whenever nobody holds it: so
-   silence is unstable. With a tonic drive to all segments they could contract and suppress each other in unison.
-3. *The half-centre is bistable* (delta < 0): it remembers whose turn it is. With the paper's delta > 0 the turn ends by
-   the escape of the expansion neuron, a time that depends on how long the segment had rested.
-4. *The relay is slow and counts the turn.* It is charged by its own segment's contraction neuron. When it has reached
-   half of its range, it ends the hold of the next segment and excites its contraction neuron. The next contraction
-   holds the present segment, and discharges the relay through a shunt, so that every turn begins alike.
-5. *The sensor entrains.* A stretch neuron and its slow copy, the habit, push the relay with opposite sign, each through
-   a saturating synapse: a segment that is longer than it is used to hands over earlier, a shorter one later. A constant
-   signal has almost no effect in the end, and no signal changes the relay's drive by more than the entrained share.
+1. *Others suppress, not the sensor.* The hold of a segment is excited by the contraction neurons of all other segments,
+   with synapses onto the half-centre that saturate, so that suppression is the same for any number of segments.
+2. *A tonic neuron* excites the contraction neuron of segment 1 alone, so silence is unstable.
+3. *The half-centre is bistable* (delta < 0): it remembers whose turn it is, however long the segment had rested.
+4. *The relay counts the turn.* Its own segment's contraction neuron charges it slowly. At half of its range it ends the
+   hold of the next segment and excites its contraction neuron; that contraction suppresses the present segment, and
+   discharges the relay through a shunt, so that every turn begins alike.
+5. *The sensor entrains.* A stretch neuron and its slow copy, the habit, push the relay with opposite sign through
+   saturating synapses: a segment that is longer than it is used to hands over earlier, a shorter one later.
 
-**The turn.** A charging relay follows ``U(t) = R (1 - exp(-t / tau))``, ``tau = C / (Gm + g)`` with the conductance g
-of its charge. The hold yields at the relay's potential U* (`yield_mV`, closed), so ``tau = turn / ln(R / (R - U*))``.
-What the half-centre takes to flip comes on top, up to 2 % of the paper's 875 ms.
-
-**The bounds.** With entrainment e the relay's drive stays within ``(1 +- e) R`` and so does where it starts, within
-``+- e R``; since U* is about R / 2, a turn changes by at most about ``2 e / ln 2`` of itself: 6 % with e = 0.02.
+A charging relay follows ``U(t) = R (1 - exp(-t / tau))``, ``tau = C / (Gm + g)`` with the conductance g of its charge.
+The hold yields at the relay's potential U* (`yield_mV`), so ``tau = turn / ln(R / (R - U*))``; what the half-centre
+takes to flip comes on top, up to 2 % of the paper's 875 ms. Entrainment e keeps the relay's drive within
+``(1 +- e) R``, and so a turn within about ``2 e / ln 2`` of itself: 6 % with e = 0.02.
 """
 
 from __future__ import annotations
@@ -35,20 +28,21 @@ from annelid.errors import ConfigError, require_at_least, require_negative, requ
 from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Neuron
-from annelid.nervous.synapses import Synapse
+from annelid.nervous.neurons import Neuron, Synapse
+from annelid.nervous.peristalsis import DRIVE_NEURON, add_drive
 
 ROLES = ("contraction", "expansion", "hold", "relay", "stretch", "habit")
 """The six neurons of a segment, in order."""
 TONIC_NEURON = "tonic"
-"""The neuron that excites the first contraction neuron."""
-
+# The relay ends the next segment's hold between this share of R and one window above.
 THRESHOLD = 0.5
-"""The relay begins to end the next segment's hold at this share of R."""
 _WINDOW = 0.05
-"""It ends it altogether this share of R above."""
+# The next contraction multiplies the relay's conductance by one more than this.
 DISCHARGE = 4.0
-"""The next contraction multiplies the relay's conductance by one more than this."""
+# Conductance that charges a motor neuron, over its leak: it rises ten times as fast as it falls, and rests at this
+# share of R while its segment's contraction neuron is at R or above.
+_MOTOR_CHARGE = 9.0
+MOTOR_SHARE = _MOTOR_CHARGE / (1.0 + _MOTOR_CHARGE)
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,7 @@ class RobustParameters(HalfCentre):
 
     Raises:
         ConfigError: As `HalfCentre`; a delta that is not negative, a time or push that is not positive, a negative
-            entrainment, or a push with which the hold would not yield to the relay, or not hold.
+            entrainment, or a push with which the hold would never yield to the relay, or not suppress.
     """
 
     bifurcation_mV: float = -1.0
@@ -76,8 +70,7 @@ class RobustParameters(HalfCentre):
         super().__post_init__()
         require_negative(bifurcation_mV=self.bifurcation_mV)
         require_positive(turn_ms=self.turn_ms, push_nA=self.push_nA, habit_ms=self.habit_ms)
-        if not self.entrainment >= 0:
-            raise ConfigError(f"entrainment must not be negative, not {self.entrainment}")
+        require_at_least(0, entrainment=self.entrainment)
         if not 0.0 < yielding_hold(self, self.push_nA) < 1.0:
             least = -yielding_hold(self, 0.0) * self.hold_down_uS * -self.inhibitory_reversal_mV
             most = least - self.hold_down_uS * self.inhibitory_reversal_mV
@@ -98,17 +91,11 @@ class RobustParameters(HalfCentre):
 
 
 def yielding_hold(p: RobustParameters, excitation_nA: float) -> float:
-    """Activity of the hold at which the contraction neuron of an expanded segment comes to inhibit its partner.
+    """Activity a of the hold at which the contraction neuron of an expanded segment comes to inhibit its partner.
 
-    Balance of the contraction neuron at 0 with its partner at R and a steady gate:
-    ``a g_hold E_inh + g_CPG E_inh + G_Na m(0) h(0) E_Na + I = 0``.
-
-    Args:
-        p: The design.
-        excitation_nA: I, what excites the contraction neuron, nA.
-
-    Returns:
-        a; the segment contracts without a hold if it is positive, and can be held if it is below 1.
+    Balance of the contraction neuron at 0 under an excitation I, with its partner at R and a steady gate:
+    ``a g_hold E_inh + g_CPG E_inh + G_Na m(0) h(0) E_Na + I = 0``. The segment contracts without a hold if a is
+    positive, and can be suppressed if it is below 1.
     """
     drive = excitation_nA + p.sodium_uS * p.sodium_channel.unit_current_mV(0.0)
     return (drive + p.inhibition_uS * p.inhibitory_reversal_mV) / (-p.hold_down_uS * p.inhibitory_reversal_mV)
@@ -120,12 +107,6 @@ def yield_opening(p: RobustParameters) -> float:
     The hold, excited by one contraction neuron (g_1) and inhibited by the relay (b g_2), rests at
     ``(g_1 E_ex + b g_2 E_inh) / (Gm + g_1 + b g_2)``. That this is R times `yielding_hold` under the push ``b I`` is a
     quadratic equation for b.
-
-    Args:
-        p: The design.
-
-    Returns:
-        b, between 0 and 1.
     """
     reach, leak = p.range_mV, p.leak_conductance_uS + p.charge_uS
     alone = yielding_hold(p, 0.0)
@@ -137,88 +118,119 @@ def yield_opening(p: RobustParameters) -> float:
 
 
 def yield_mV(p: RobustParameters) -> float:
-    """Potential U* of the relay at which the next segment's hold yields, mV, from `yield_opening`."""
+    """Potential U* of the relay at which the next segment's hold yields, mV."""
     return p.range_mV * (THRESHOLD + _WINDOW * yield_opening(p))
 
 
-def tonic_nA(p: RobustParameters) -> float:
-    """Current of the tonic neuron into the first contraction neuron at rest.
-
-    It is what a relay pushes with when the hold yields, so that the first segment takes its turn as all others do.
-    """
-    return p.push_nA * yield_opening(p)
-
-
-def neuron_names(n_segments: int) -> list[str]:
-    """Returns the names of all neurons: those of every segment by `ROLES`, then the tonic neuron."""
-    return [*(f"{role}_{segment}" for segment in range(1, n_segments + 1) for role in ROLES), TONIC_NEURON]
-
-
 def robust_network(n_segments: int, parameters: RobustParameters | None = None) -> Network:
-    """Builds the robust peristalsis network in its initial state: segment 1 contracted, all others held expanded.
+    """Builds the robust peristalsis network in its initial state: segment 1 contracted, all others expanded.
 
-    Inputs are ``stretch_1`` .. ``stretch_N``, currents into the stretch neurons and their habits; ``Gm R`` nA drives
-    them to R. Outputs are ``contraction_s`` and ``expansion_s`` of every segment.
-
-    Args:
-        n_segments: Number of segments, at least 3.
-        parameters: What to design it from; default: the paper's half-centres and interval.
-
-    Returns:
-        A network of ``6 n_segments + 1`` neurons, named by `neuron_names`.
+    Its neurons are those of every segment by `ROLES`, then the tonic neuron. Inputs are ``stretch_1`` .. ``stretch_N``,
+    currents into the stretch neurons and their habits; ``Gm R`` nA drives them to R. Outputs are ``contraction_s`` and
+    ``expansion_s`` of every segment.
 
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
     """
     require_at_least(3, n_segments=n_segments)
-    p = RobustParameters() if parameters is None else parameters
+    p = parameters or RobustParameters()
+    segments, leak, reach = range(1, n_segments + 1), p.leak_conductance_uS, p.range_mV
+    tau_ms = p.turn_ms / log(reach / (reach - yield_mV(p)))
+    # Both carry the same current into a relay at rest, e Gm R, so that a steady stretch cancels.
+    share_nA = p.entrainment * leak * reach
     network = Network(f"robust peristalsis of {n_segments} segments")
-    for segment in range(1, n_segments + 1):
-        _add_segment(network, p, segment)
-    leak_nA = p.leak_conductance_uS * p.range_mV
-    network.add_neuron(TONIC_NEURON, Neuron(p.capacitance_nF, p.leak_conductance_uS, bias_nA=leak_nA), p.range_mV)
-    network.add_synapse(TONIC_NEURON, "contraction_1", p.excitatory(tonic_nA(p) / p.excitatory_reversal_mV))
-    for segment in range(1, n_segments + 1):
-        _join_segment(network, p, segment, n_segments)
-    for segment in range(1, n_segments + 1):
+    for segment in segments:
+        contraction, expansion, hold, relay, stretch, habit = (f"{role}_{segment}" for role in ROLES)
+        first = segment == 1
+        held = (-p.offset_mV, reach + p.offset_mV)
+        add_half_centre(network, contraction, expansion, p, (reach, p.bifurcation_mV) if first else held)
+        network.add_neuron(hold, p.signals.neuron, 0.0 if first else reach)
+        network.add_neuron(relay, Neuron(tau_ms * (leak + p.charge_uS), leak), 0.0)
+        network.add_neuron(stretch, p.signals.neuron, 0.0)
+        network.add_neuron(habit, Neuron(p.habit_ms * leak, leak), 0.0)
+        add_hold(network, hold, down=contraction, up=expansion, half_centre=p)
+        network.add_synapse(contraction, relay, p.excitatory(p.charge_uS))
+        network.add_synapse(stretch, relay, p.excitatory(share_nA / p.excitatory_reversal_mV))
+        network.add_synapse(habit, relay, p.inhibitory(-share_nA / p.inhibitory_reversal_mV))
+    network.add_neuron(TONIC_NEURON, Neuron(p.capacitance_nF, leak, bias_nA=leak * reach), reach)
+    # What a relay pushes with when the hold yields, so that the first segment takes its turn as all others do.
+    tonic_nA = p.push_nA * yield_opening(p)
+    network.add_synapse(TONIC_NEURON, "contraction_1", p.excitatory(tonic_nA / p.excitatory_reversal_mV))
+    # Below R / 2 nobody is suppressed: else many segments that all begin to contract could keep each other from it.
+    suppression = Synapse(p.charge_uS, p.excitatory_reversal_mV, 0.5 * reach, reach)
+    opening = THRESHOLD * reach, (THRESHOLD + _WINDOW) * reach
+    release = Synapse(p.release_uS, p.inhibitory_reversal_mV, *opening)
+    push = Synapse(p.push_nA / p.excitatory_reversal_mV, p.excitatory_reversal_mV, *opening)
+    discharge = Synapse(DISCHARGE * (leak + p.charge_uS), 0.0, 0.0, reach)
+    for segment in segments:
+        following = segment % n_segments + 1
+        for other in segments:
+            if other != segment:
+                network.add_synapse(f"contraction_{segment}", f"hold_{other}", suppression)
+        network.add_synapse(f"relay_{segment}", f"hold_{following}", release)
+        if following != 1:
+            network.add_synapse(f"relay_{segment}", f"contraction_{following}", push)
+        network.add_synapse(f"contraction_{following}", f"relay_{segment}", discharge)
+    for segment in segments:
         network.add_input(f"stretch_{segment}", (f"stretch_{segment}", f"habit_{segment}"))
         network.add_output(f"contraction_{segment}", f"contraction_{segment}")
         network.add_output(f"expansion_{segment}", f"expansion_{segment}")
     return network
 
 
-def _add_segment(network: Network, p: RobustParameters, segment: int) -> None:
-    """Adds the six neurons of a segment, and what joins them."""
-    contraction, expansion, hold, relay, stretch, habit = (f"{role}_{segment}" for role in ROLES)
-    leak, reach, first = p.leak_conductance_uS, p.range_mV, segment == 1
-    tau_ms = p.turn_ms / log(reach / (reach - yield_mV(p)))
-    contracted, held = (reach, p.bifurcation_mV), (-p.offset_mV, reach + p.offset_mV)
-    add_half_centre(network, contraction, expansion, p, contracted if first else held)
-    network.add_neuron(hold, p.signals.neuron, 0.0 if first else reach)
-    network.add_neuron(relay, Neuron(tau_ms * (leak + p.charge_uS), leak), 0.0)
-    network.add_neuron(stretch, p.signals.neuron, 0.0)
-    network.add_neuron(habit, Neuron(p.habit_ms * leak, leak), 0.0)
-    add_hold(network, hold, down=contraction, up=expansion, half_centre=p)
-    network.add_synapse(contraction, relay, p.excitatory(p.charge_uS))
-    # Both carry the same current into a relay at rest, e Gm R, so that a steady stretch cancels.
-    share_nA = p.entrainment * leak * reach
-    network.add_synapse(stretch, relay, p.excitatory(share_nA / p.excitatory_reversal_mV))
-    network.add_synapse(habit, relay, p.inhibitory(-share_nA / p.inhibitory_reversal_mV))
+def driven_robust_network(
+    n_segments: int,
+    parameters: RobustParameters | None = None,
+    *,
+    lift: float = 0.45,
+    per_segment: float = 0.5,
+    drive_ms: float = 200.0,
+    pressure_ms: float = 200.0,
+) -> Network:
+    """Builds the robust network with a descending neuron and a pressure neuron in every segment.
+
+    With activity a, the drive, the descending neuron excites all relays with a conductance ``a g_d``, which lifts a
+    resting one to ``a g_d E_ex / (Gm + a g_d)``, below the half of R at which relays act: the drive alone never makes a
+    segment contract, but charged relays count their turns faster. Pressure neurons, which low-pass the pressure on the
+    backs, excite the descending one: belly and back are pressed at once only in a pipe as narrow as the worm.
+
+    The neurons ``descending``, ``pressure_1`` .. ``pressure_N`` and the inputs ``drive``, ``pressure_1`` ..
+    ``pressure_N`` come behind those of `robust_network`. ``Gm R`` nA keeps such a neuron at R.
+
+    Args:
+        n_segments: Number of segments, at least 3.
+        parameters: Of the network.
+        lift: Share of R, below 1/2, to which drive 1 lifts a resting relay.
+        per_segment: Drive that one segment gives whose pressure neuron is at R.
+        drive_ms: Time constant of the descending neuron, ms.
+        pressure_ms: Time constant of the pressure neurons, ms.
+
+    Raises:
+        ConfigError: As `robust_network`, or a lift outside 0 .. 1/2.
+    """
+    if not 0.0 < lift < THRESHOLD:
+        raise ConfigError(f"lift must be between 0 and {THRESHOLD:g}, not {lift}")
+    p, segments = parameters or RobustParameters(), range(1, n_segments + 1)
+    network, leak = robust_network(n_segments, p), p.leak_conductance_uS
+    relays = (f"relay_{segment}" for segment in segments)
+    add_drive(network, p, relays, transmission(lift, p.signals).conductance_uS, drive_ms)
+    share = p.excitatory(per_segment * leak * p.range_mV / p.excitatory_reversal_mV)
+    for segment in segments:
+        pressure = f"pressure_{segment}"
+        network.add_neuron(pressure, Neuron(pressure_ms * leak, leak))
+        network.add_input(pressure, pressure)
+        network.add_synapse(pressure, DRIVE_NEURON, share)
+    return network
 
 
-def _join_segment(network: Network, p: RobustParameters, segment: int, n_segments: int) -> None:
-    """Adds the holds that a segment excites, and what passes between it and the next one."""
-    following = segment % n_segments + 1
-    contraction, relay = f"contraction_{segment}", f"relay_{segment}"
-    # Below R / 2 nobody is held: else many segments that all begin to contract could keep each other from it.
-    suppression = Synapse(p.charge_uS, p.excitatory_reversal_mV, 0.5 * p.range_mV, p.range_mV)
-    for other in range(1, n_segments + 1):
-        if other != segment:
-            network.add_synapse(contraction, f"hold_{other}", suppression)
-    opening = THRESHOLD * p.range_mV, (THRESHOLD + _WINDOW) * p.range_mV
-    network.add_synapse(relay, f"hold_{following}", Synapse(p.release_uS, p.inhibitory_reversal_mV, *opening))
-    if following != 1:
-        push_uS = p.push_nA / p.excitatory_reversal_mV
-        network.add_synapse(relay, f"contraction_{following}", Synapse(push_uS, p.excitatory_reversal_mV, *opening))
-    discharge = Synapse(DISCHARGE * (p.leak_conductance_uS + p.charge_uS), 0.0, 0.0, p.range_mV)
-    network.add_synapse(f"contraction_{following}", relay, discharge)
+def add_motor_neurons(network: Network, n_segments: int, p: RobustParameters, let_go_ms: float) -> None:
+    """Adds ``motor_1`` .. ``motor_N``, which outlast the contraction neurons that excite them.
+
+    They fall with the time constant ``let_go_ms`` and rise with a tenth of it. So a segment is still contracted while
+    the next ones contract: several share the wave, the more the shorter the turns are.
+    """
+    leak = p.leak_conductance_uS
+    charge = Synapse(_MOTOR_CHARGE * leak, p.range_mV, 0.0, p.range_mV)
+    for segment in range(1, n_segments + 1):
+        network.add_neuron(f"motor_{segment}", Neuron(let_go_ms * leak, leak))
+        network.add_synapse(f"contraction_{segment}", f"motor_{segment}", charge)

@@ -5,30 +5,14 @@ Node i of N has an activity x_i >= 0 of unit size (Lotka-Volterra competition; H
 
     dx_i = x_i (alpha - sum_j rho_ij x_j) dt + mu_i dt + epsilon dW_i,   reflected at 0.
 
-With rho_ii = alpha every x = e_i is a saddle, near which x_j grows at the rate alpha - rho_ji. The design here chooses
-these rates outright: alpha / nu for the successor of i (its only unstable direction, lambda_u) and -alpha for all
-others (with the direction along x_i itself: lambda_s = alpha). The ring of saddles attracts for a saddle value
-nu = lambda_s / lambda_u above 1. Rates in 1/s, times in s, activities without a unit.
+With rho_ii = alpha every x = e_i is a saddle, near which x_j grows at the rate alpha - rho_ji: here alpha / nu for the
+successor of i (its only unstable direction, lambda_u) and -alpha for all others (so lambda_s = alpha). The ring of
+saddles attracts for a saddle value nu = lambda_s / lambda_u above 1.
 
-Dwell time. Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0, starting from what it
-was held at while it decayed at the rate lambda_s. Its exponentially growing part has, without noise, the amplitude
-mu (1/lambda_u + 1/lambda_s); without mu, it is Gaussian (reflection at 0 gives its modulus) with the variance
-epsilon^2 (1/lambda_u + 1/lambda_s) / 2. The time to reach a distance delta is then, for mu or epsilon small,
-
-    T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u
-    <T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u
-
-with Euler's gamma, as <ln|Z|> = -(gamma + ln 2) / 2 for a standard normal Z. So the dwell time grows as
-ln(1 / noise) / lambda_u (Stone and Holmes 1990, "Random perturbations of heteroclinic attractors", eq. 2.28), and its
-standard deviation, pi / (sqrt(8) lambda_u), does not depend on the noise.
-
-Largest gain. With every cue on, feedback of gain k adds mu_i = k x_{i-1}, and the ring has a fixed point with all nodes
-alike, x = (alpha + k) / (alpha s) with s = 2 N - 2 - 1/nu. A perturbation that turns by the angle t = 2 pi / N from
-node to node grows there at the rate -k (1 - cos t) + x alpha (1 + (1 + 1/nu) cos t). Beyond
-
-    k = alpha A / (1 - A),    A = (1 + (1 + 1/nu) cos t) / (s (1 - cos t)),
-
-it decays, and a ring all of whose segments are long at once comes to rest between its nodes.
+Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0, starting from its value while it
+decayed at the rate lambda_s. Its exponentially growing part has, without noise, the amplitude
+mu (1/lambda_u + 1/lambda_s); without mu, it is the modulus of a Gaussian of variance
+epsilon^2 (1/lambda_u + 1/lambda_s) / 2. From this follow the dwell times below.
 """
 
 from __future__ import annotations
@@ -36,11 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.errors import ConfigError, require_at_least, require_positive
-
-Array = NDArray[np.float64]
+from annelid.nervous.neurons import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,16 +65,16 @@ class HeteroclinicRing:
 
 
 def noise_dwell_s(ring: HeteroclinicRing, noise: ArrayLike, distance: ArrayLike = 0.5) -> Array:
-    """Mean time that noise alone takes to leave a node, in the limit of small noise.
+    """Returns the mean time, s, that noise alone takes to leave a node, in the limit of small noise.
+
+    ``<T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u`` with
+    Euler's gamma, as ``<ln|Z|> = -(gamma + ln 2) / 2`` for a standard normal Z (Stone and Holmes 1990, "Random
+    perturbations of heteroclinic attractors", eq. 2.28). Its standard deviation is ``pi / (sqrt(8) lambda_u)``.
 
     Args:
         ring: The ring.
         noise: epsilon, 1/sqrt(s), any shape.
-        distance: delta, the successor's activity that counts as having left; small beside 1 for a good estimate,
-            as what the linear saddle leaves out is a constant time.
-
-    Returns:
-        Time, s, shape of the arguments. Stone and Holmes 1990, eq. 2.28; derived in the module's docstring.
+        distance: delta, the successor's activity that counts as having left, small beside 1.
     """
     leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
     constant = 0.5 * (np.euler_gamma + np.log(4.0 * leave * settle / (leave + settle)))
@@ -99,15 +82,14 @@ def noise_dwell_s(ring: HeteroclinicRing, noise: ArrayLike, distance: ArrayLike 
 
 
 def bias_dwell_s(ring: HeteroclinicRing, bias_per_s: ArrayLike, distance: ArrayLike = 0.5) -> Array:
-    """Time that a constant input alone takes to leave a node, in the limit of a small one.
+    """Returns the time, s, that a constant input alone takes to leave a node, in the limit of a small one.
+
+    ``T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u``.
 
     Args:
         ring: The ring.
         bias_per_s: mu, 1/s, any shape.
         distance: delta, as for `noise_dwell_s`.
-
-    Returns:
-        Time, s, shape of the arguments; derived in the module's docstring.
     """
     leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
     reach = np.asarray(distance) * leave * settle / (leave + settle)
@@ -115,13 +97,13 @@ def bias_dwell_s(ring: HeteroclinicRing, bias_per_s: ArrayLike, distance: ArrayL
 
 
 def largest_gain_per_s(ring: HeteroclinicRing) -> float:
-    """Feedback gain from which a ring with every cue on can rest between its nodes; see the module's docstring.
+    """Gain of `handover_input`, 1/s, from which a ring with every cue on can rest between its nodes; may be infinite.
 
-    Args:
-        ring: The ring.
+    With mu_i = k x_{i-1} the ring has a fixed point with all nodes alike, x = (alpha + k) / (alpha s) with
+    s = 2 N - 2 - 1/nu. A perturbation that turns by the angle t = 2 pi / N from node to node grows there at the rate
+    -k (1 - cos t) + x alpha (1 + (1 + 1/nu) cos t), which is negative beyond
 
-    Returns:
-        Gain of `handover_input`, 1/s; infinite where no gain does.
+        k = alpha A / (1 - A),    A = (1 + (1 + 1/nu) cos t) / (s (1 - cos t)).
     """
     cosine, over = np.cos(2.0 * np.pi / ring.n_nodes), 1.0 + 1.0 / ring.saddle_value
     # Larger turns have smaller cosines and decay before this one does.
@@ -140,7 +122,12 @@ class HeteroclinicStepper:
     """
 
     def __init__(self, ring: HeteroclinicRing, timestep_s: float) -> None:
-        """Prepares a step of ``timestep_s``."""
+        """Prepares a step.
+
+        Args:
+            ring: The ring.
+            timestep_s: Step, s.
+        """
         if not 0 < timestep_s * ring.growth_rate_per_s <= 0.5:
             raise ConfigError(
                 f"a time step of {timestep_s:g} s does not fit growth_rate_per_s = {ring.growth_rate_per_s:g}: "
@@ -173,7 +160,7 @@ class HeteroclinicStepper:
 
 
 def handover_input(state: Array, cue: ArrayLike, gain_per_s: float) -> Array:
-    """Input that excites the successor of a node whose segment gives its cue.
+    """Returns the input that excites the successor of every node whose segment gives its cue.
 
     Args:
         state: Activities, ``(n_networks, n_nodes)``.

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from functools import partial
-from math import prod
-from typing import Literal, Self, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 from annelid.nervous.arrays import NetworkArrays
-from annelid.nervous.neurons import Array
-from annelid.nervous.synapses import Modulated
+from annelid.nervous.neurons import Array, Modulated
 
 Scheme = Literal["euler", "toolbox", "heun"]
 GateStart = Literal["steady", "toolbox"]
-Operations = list[Callable[[], object]]
+Factors = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""Places of the neurons or channels of which something is modulated, and the column of the factor of each."""
 
 # As arrays, numpy need not convert them at every call.
-_ZERO, _HALF, _ONE = np.array(0.0), np.array(0.5), np.array(1.0)
+_ZERO, _ONE = np.array(0.0), np.array(1.0)
 
 
 @dataclass(slots=True)
@@ -48,41 +46,16 @@ class NetworkState:
         return NetworkState(*(getattr(self, field.name).copy() for field in fields(self)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Motion:
-    """Gates and potentials, or a change of them, in one row of numbers, so that one call adds both.
-
-    Attributes:
-        all: The row.
-        gate: Its slow gates, ``(n_slow, n_worms, n_channels)``.
-        potential: Its potentials, ``(n_worms, n_neurons)``.
-    """
-
-    all: Array
-    gate: Array
-    potential: Array
-
-    @classmethod
-    def empty(cls, arrays: NetworkArrays, n_worms: int) -> Self:
-        gates = arrays.n_slow, n_worms, arrays.channel_neuron.size
-        row = np.empty(prod(gates) + n_worms * len(arrays.neurons))
-        return cls(row, row[: prod(gates)].reshape(gates), row[prod(gates) :].reshape(n_worms, -1))
-
-
 class Stepper:
     """Advances ``n_worms`` copies of a compiled network by a fixed step.
 
     With ``y = sqrt(factor exp(slope (midpoint - U)))`` a gate's steady state is ``1 / (1 + y^2)`` and its rate
-    ``(1 - z (1 + y^2)) / (y time_constant_ms)``, which needs one exponential a gate. The exponents of the gates and
+    ``(1 - z (1 + y^2)) / (y time_constant_ms)``, which needs one exponential per gate. The exponents of the gates and
     the open fractions of the terminals are one affine map of the potentials; ``dt / C`` is part of the weights.
 
-    For small networks the time goes into calling numpy, not into arithmetic. So a step is laid down once as a list of
-    calls bound to fixed buffers, and made by going through the list. Every copy gets the same bits whatever their
-    number: the product with the weights is taken copy by copy, since a matrix product of all copies sums in another
-    order.
-
-    Two steppers that run at once need not share anything but their arrays; one stepper keeps scratch buffers
-    and must not be used from two threads.
+    Every copy gets the same bits whatever their number: the product with the weights is taken copy by copy, since a
+    matrix product of all copies sums in another order. A stepper has scratch buffers and must not be used from two
+    threads; two steppers share nothing but their arrays.
 
     Attributes:
         arrays: The network's parameters.
@@ -103,117 +76,83 @@ class Stepper:
         self.timestep_ms = float(timestep_ms)
         self.scheme: Scheme = scheme
         self.n_worms = n_worms
-        self._prepare_parameters()
-        self._prepare_buffers()
-        self._step = self._lay_down_step()
 
-    def _prepare_parameters(self) -> None:
-        a, dt, w = self.arrays, self.timestep_ms, self.n_worms
-        n_slots, n_slow, n_channels = len(a.gates), a.n_slow, a.channel_neuron.size
+        a, dt, w = arrays, self.timestep_ms, n_worms
+        n_channels, n_terminals = a.channel_neuron.size, a.terminal_neuron.size
         gates = [gate for slot in a.gates for gate in slot]
         with np.errstate(divide="ignore"):
             log_factor = np.log([gate.factor for gate in gates])
         slope = np.array([gate.slope_per_mV for gate in gates])
         midpoint = np.array([gate.midpoint_mV for gate in gates])
         power = np.array([gate.power for gate in gates])
-        taus = [gate.time_constant_ms for slot in a.gates[:n_slow] for gate in slot]
+        taus = [gate.time_constant_ms for slot in a.gates[: a.n_slow] for gate in slot]
 
-        def by_slot(values: Array, n: int) -> Array:
-            """A row of channels for every slot and copy, as the buffers of the gates have it."""
-            return np.repeat(values.reshape(n, 1, n_channels), w, axis=1)
+        def by_slot(values: Array, n_slots: int) -> Array:
+            """A row of channels for every slot and copy."""
+            return np.repeat(values.reshape(n_slots, 1, n_channels), w, axis=1)
 
-        def laid_out(of_terminals: Array, of_gates: Array) -> Array:
-            """A row of terminals for every copy, then the gates."""
-            return np.concatenate([np.tile(of_terminals, w), by_slot(of_gates, n_slots).ravel()])
+        def in_row(of_terminals: Array, of_gates: Array) -> Array:
+            """Terminals of all copies, then gates of all copies, so that one call serves both."""
+            return np.concatenate([np.tile(of_terminals, w), by_slot(of_gates, len(a.gates)).ravel()])
 
         terminal_slope = a.terminal_slope_per_mV
-        self._affine_slope = laid_out(terminal_slope, -0.5 * slope)
-        self._affine_offset = laid_out(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
+        self._affine_slope = in_row(terminal_slope, -0.5 * slope)
+        self._affine_offset = in_row(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
         first = len(a.neurons) * np.arange(w)[:, np.newaxis]
         bearers = (first + a.channel_neuron).ravel()
-        self._looked_at = np.concatenate([(first + a.terminal_neuron).ravel(), *[bearers] * n_slots])
-        self._power = None if (power == 1.0).all() else by_slot(power, n_slots)
-        self._gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), n_slow)
+        self._looked_at = np.concatenate([(first + a.terminal_neuron).ravel(), *[bearers] * len(a.gates)])
+        self._power = None if (power == 1.0).all() else by_slot(power, len(a.gates))
+        self._gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), a.n_slow)
         membrane_rate = dt / a.capacitance_nF
         self._weights = a.weights * np.tile(membrane_rate, 2)
         self._leak_step = a.leak_conductance_uS * membrane_rate
         self._threshold_rate = dt / a.adaptation_time_constant_ms
         self._release_decay = np.exp(-dt / a.release_time_constant_ms)
-        self._prepare_modulation()
 
-    def _prepare_modulation(self) -> None:
-        """Finds, for each modulated quantity, which factor scales which column."""
-        a = self.arrays
-
-        def pairs(quantity: Modulated, neurons: Iterable[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-            factors = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
-            found = [(place, factors[neuron]) for place, neuron in enumerate(neurons) if neuron in factors]
+        def factors(quantity: Modulated, neurons: Iterable[int]) -> Factors:
+            column = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
+            found = [(place, column[neuron]) for place, neuron in enumerate(neurons) if neuron in column]
             places, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
             return places, columns
 
-        everyone, bearers = range(len(a.neurons)), a.channel_neuron.tolist()
-        self._leak_factor = pairs("leak", everyone)
-        self._membrane_factor = pairs("membrane", everyone)
-        self._channel_factor = pairs("channels", bearers)
-        self._gate_factor = pairs("gates", bearers)
+        self._leak_factors = factors("leak", range(len(a.neurons)))
+        self._membrane_factors = factors("membrane", range(len(a.neurons)))
+        self._channel_factors = factors("channels", a.channel_neuron.tolist())
+        self._gate_factors = factors("gates", a.channel_neuron.tolist())
 
-    def _prepare_buffers(self) -> None:
-        a, w, n = self.arrays, self.n_worms, len(self.arrays.neurons)
-        n_channels, n_slow, n_slots = a.channel_neuron.size, a.n_slow, len(a.gates)
-        n_terminals, n_firing = a.terminal_neuron.size, a.firing_neuron.size
-        where = a.drive_slices()
-        drive = np.zeros((w, a.weights.shape[0]))
-        # One matrix-vector product a copy.
-        self._drive = drive[:, np.newaxis]
-        self._open = drive[:, where["terminals"]]
-        self._release = drive[:, where["releases"]]
-        self._channel_open = drive[:, where["channels"]]
-        self._rectified = drive[:, where["rectified"]]
-        self._potentials = drive[:, where["potentials"]]
-        drive[:, where["one"]] = 1.0
-        self._inputs = drive[:, where["inputs"]]
-        total = np.empty((w, 2 * n))
-        self._total = total[:, np.newaxis]
-        self._conductance, self._current = total[:, :n], total[:, n:]
-        # Terminals and gates of all copies lie in one row, so that one call serves both at any number of copies.
-        self._affine = np.empty(self._looked_at.size)
-        self._transmission = self._affine[: w * n_terminals].reshape(w, n_terminals)
-        self._exponent = self._affine[w * n_terminals :]
-        self._y = self._exponent.reshape(n_slots, w, n_channels)
-        self._y_slow = self._y[:n_slow]
-        self._q = np.empty((n_slots, w, n_channels))
-        self._q_slow, self._q_instant = self._q[:n_slow], self._q[n_slow:]
-        self._z = np.empty((n_slots, w, n_channels))
-        self._gate_scratch = np.empty((n_slow, w, n_channels))
-        self._rectified_target = np.empty((w, a.rectified_target.size))
-        self._modulation = np.ones((w, len(a.modulated)))
-        self._motion = _Motion.empty(a, w)
-        self._now = NetworkState(
-            self._motion.potential,
-            self._motion.gate.swapaxes(0, 1),
-            np.empty((w, n_firing)),
-            np.empty((w, a.release_source.size)),
-            np.zeros((w, n_firing), dtype=bool),
-        )
+        self._drive = drive = np.zeros((w, a.weights.shape[0]))
+        drive[:, a.drive["one"]] = 1.0
+        self._open = drive[:, a.drive["terminals"]]
+        self._release = drive[:, a.drive["releases"]]
+        self._channel_open = drive[:, a.drive["channels"]]
+        self._rectified = drive[:, a.drive["rectified"]]
+        self._potentials = drive[:, a.drive["potentials"]]
+        self._inputs = drive[:, a.drive["inputs"]]
+        self._seen = np.empty(self._looked_at.size)
+        self._opening = self._seen[: w * n_terminals].reshape(w, n_terminals)
+        self._y = self._seen[w * n_terminals :].reshape(len(a.gates), w, n_channels)
+        self._q = np.empty(self._y.shape)
+        self._y_slow, self._q_slow, self._q_instant = self._y[: a.n_slow], self._q[: a.n_slow], self._q[a.n_slow :]
+        self._total = np.empty((w, 2 * len(a.neurons)))
+        self._conductance, self._current = np.split(self._total, 2, axis=1)
 
     def initial_state(self, gate_start: GateStart = "steady") -> NetworkState:
         """Returns the state at the start.
 
         Args:
             gate_start: ``"steady"``: slow gates at their steady state at the initial potential;
-                ``"toolbox"``: as SNS-Toolbox 1.5.2 starts them, with the slope's sign the other way round.
+                ``"toolbox"``: as SNS-Toolbox 1.5.2 starts them, with the slope's sign reversed.
 
         Raises:
             ConfigError: An unknown start.
         """
         if gate_start not in get_args(GateStart):
             raise ConfigError(f"unknown gate start {gate_start!r}: {suggest(gate_start, get_args(GateStart))}")
-        a = self.arrays
+        a, w = self.arrays, self.n_worms
         gate = np.empty((a.n_slow, a.channel_neuron.size))
         for slot, row in enumerate(a.gates[: a.n_slow]):
             starts = [one.steady if gate_start == "steady" else one.toolbox_start for one in row]
             gate[slot] = [start(a.initial_mV[neuron]) for start, neuron in zip(starts, a.channel_neuron, strict=True)]
-        w = self.n_worms
         return NetworkState(
             potential=np.tile(a.initial_mV, (w, 1)),
             gate=np.tile(gate, (w, 1, 1)),
@@ -231,23 +170,29 @@ class Stepper:
                 copies alike; None for no current.
             n_steps: Number of steps; bit for bit the same as so many calls.
         """
-        now, step = self._now, self._step
+        potential, gate = state.potential, state.gate.swapaxes(0, 1)
+        spiking = state.fired.size
         self._inputs[...] = 0.0 if inputs_nA is None else inputs_nA
-        now.potential[...] = state.potential
-        now.gate[...] = state.gate
-        fires = state.fired.size
-        if fires:
-            now.threshold[...] = state.threshold
-            now.release[...] = state.release
         for _ in range(n_steps):
-            for operation in step:
-                operation()
-        state.potential[...] = now.potential
-        state.gate[...] = now.gate
-        if fires:
-            state.threshold[...] = now.threshold
-            state.release[...] = now.release
-            state.fired[...] = now.fired
+            if spiking:
+                self._release[...] = state.release
+            gate_step = self._gate_step(potential, gate)
+            if self.scheme == "toolbox":
+                gate += gate_step
+                potential_step = self._potential_step(potential, gate)
+            else:
+                potential_step = self._potential_step(potential, gate)
+                if self.scheme == "heun":
+                    # The mean of the Euler steps at the beginning and at the end that they lead to.
+                    potential_ahead, gate_ahead = potential + potential_step, gate + gate_step
+                    gate_step = (gate_step + self._gate_step(potential_ahead, gate_ahead)) * 0.5
+                    potential_step = (potential_step + self._potential_step(potential_ahead, gate_ahead)) * 0.5
+                gate += gate_step
+            if spiking:
+                self._adapt_thresholds(state)
+            potential += potential_step
+            if spiking:
+                self._fire(state)
 
     def outputs(self, state: NetworkState) -> Array:
         """Returns the potentials that the outputs read, mV, shape ``(n_worms, n_outputs)``."""
@@ -271,145 +216,79 @@ class Stepper:
             trace[i + 1] = state.potential
         return trace
 
-    def _lay_down_step(self) -> Operations:
-        """Lists the operations that take the present state one step on."""
-        now, spiking = self._motion, self._now
-        step, middle, end = (_Motion.empty(self.arrays, self.n_worms) for _ in range(3))
-        take_step = partial(np.add, now.all, step.all, now.all)
-        look, gates, potentials = self._euler_step(now, step)
-        operations = [*look, *gates, *potentials]
-        if self.scheme == "toolbox":
-            take_gate_step = partial(np.add, now.gate, step.gate, now.gate)
-            operations = [*look, *gates, take_gate_step, *potentials]
-            take_step = partial(np.add, now.potential, step.potential, now.potential)
-        elif self.scheme == "heun":
-            # The mean of the Euler steps at the beginning and at the end that they lead to.
-            operations.append(partial(np.add, now.all, step.all, middle.all))
-            for part in self._euler_step(middle, end):
-                operations += part
-            operations.append(partial(np.add, step.all, end.all, step.all))
-            operations.append(partial(np.multiply, step.all, _HALF, step.all))
-        if not spiking.fired.size:
-            return [*operations, take_step]
-        release = partial(np.copyto, self._release, spiking.release)
-        return [release, *operations, self._adapt_thresholds, take_step, self._fire]
+    def _gate_step(self, potential: Array, gate: Array) -> Array:
+        """Looks at the potentials, for the step of the potentials too, and returns the slow gates' Euler step."""
+        seen, y, q = self._seen, self._y, self._q
+        potential.take(self._looked_at, None, seen, "clip")
+        np.multiply(seen, self._affine_slope, seen)
+        np.add(seen, self._affine_offset, seen)
+        np.maximum(self._opening, _ZERO, out=self._opening)
+        np.minimum(self._opening, _ONE, out=self._open)
+        if self.arrays.modulated:
+            self._modulation = np.exp(np.matmul(self._open[:, np.newaxis], self.arrays.log_modulation)[:, 0])
+        np.exp(y, y)
+        np.square(y, q)
+        np.add(q, _ONE, q)
+        step = self._q_slow * gate
+        np.subtract(_ONE, step, step)
+        np.multiply(step, self._gate_rate / self._y_slow, step)
+        if self._gate_factors[0].size:
+            self._scale(np.divide, step, self._gate_factors)
+        return step
 
-    def _euler_step(self, state: _Motion, step: _Motion) -> tuple[Operations, Operations, Operations]:
-        """Writes the Euler step at a state: what depends on potentials alone, then the gates', then the potentials'."""
-        return (
-            self._look(state.potential),
-            self._gate_step(state.gate, step.gate),
-            self._potential_step(state.potential, state.gate, step.potential),
-        )
-
-    def _look(self, potential: Array) -> Operations:
-        """Finds all that depends on the potentials alone: terminals, exponentials of gates, modulation."""
-        affine, opened, q = self._affine, self._open, self._q
-        if not affine.size:
-            return []
-        operations: Operations = [
-            partial(potential.take, self._looked_at, None, affine, "clip"),
-            partial(np.multiply, affine, self._affine_slope, affine),
-            partial(np.add, affine, self._affine_offset, affine),
-        ]
-        if opened.size:
-            transmission = self._transmission
-            operations.append(partial(np.maximum, transmission, _ZERO, out=transmission))
-            operations.append(partial(np.minimum, transmission, _ONE, out=opened))
-        if q.size:
-            operations.append(partial(np.exp, self._exponent, self._exponent))
-            operations.append(partial(np.square, self._y, q))
-            operations.append(partial(np.add, q, _ONE, q))
-        if self._modulation.size:
-            factors = self._modulation
-            each_open, each_factor = opened[:, np.newaxis], factors[:, np.newaxis]
-            operations.append(partial(np.matmul, each_open, self.arrays.log_modulation, each_factor))
-            operations.append(partial(np.exp, factors, factors))
-        return operations
-
-    def _gate_step(self, gate: Array, step: Array) -> Operations:
-        """Writes the slow gates' Euler step at the potential last looked at."""
-        if not step.size:
-            return []
-        pace = self._gate_scratch
-        operations: Operations = [
-            partial(np.multiply, self._q_slow, gate, step),
-            partial(np.subtract, _ONE, step, step),
-            partial(np.divide, self._gate_rate, self._y_slow, pace),
-            partial(np.multiply, step, pace, step),
-        ]
-        if self._gate_factor[0].size:
-            operations.append(partial(self._slow_down, step, *self._gate_factor))
-        return operations
-
-    def _potential_step(self, potential: Array, gate: Array, step: Array) -> Operations:
-        """Writes the potentials' Euler step; `potential` is what was last looked at."""
+    def _potential_step(self, potential: Array, gate: Array) -> Array:
+        """Returns the potentials' Euler step at the potentials last looked at."""
         a = self.arrays
-        operations = self._open_channels(gate) if self._channel_open.size else []
+        if self._channel_open.size:
+            self._open_channels(gate)
         if self._rectified.size:
-            difference, target = self._rectified, self._rectified_target
-            operations += [
-                partial(potential.take, a.rectified_source, 1, difference, "clip"),
-                partial(potential.take, a.rectified_target, 1, target, "clip"),
-                partial(np.subtract, difference, target, difference),
-                partial(np.maximum, difference, _ZERO, out=difference),
-            ]
+            difference = potential[:, a.rectified_source] - potential[:, a.rectified_target]
+            np.maximum(difference, 0.0, out=self._rectified)
         if self._potentials.size:
-            operations.append(partial(np.copyto, self._potentials, potential))
-        operations.append(self._sum_currents())
-        if self._leak_factor[0].size:
-            operations.append(partial(self._modulate_leaks, *self._leak_factor))
-        operations.append(partial(np.multiply, self._conductance, potential, step))
-        operations.append(partial(np.subtract, self._current, step, step))
-        if self._membrane_factor[0].size:
-            operations.append(partial(self._slow_down, step, *self._membrane_factor))
-        return operations
-
-    def _sum_currents(self) -> Callable[[], object]:
-        """Writes conductances and currents: for every copy the same product of a vector and the weights."""
+            self._potentials[...] = potential
         if self.n_worms == 1:
             # Calls the same routine of BLAS with less ado.
-            return partial(self._drive[0, 0].dot, self._weights, self._total[0, 0])
-        return partial(np.matmul, self._drive, self._weights, self._total)
-
-    def _open_channels(self, gate: Array) -> Operations:
-        """Multiplies the powers of all gates of each channel."""
-        n_slow, z = self.arrays.n_slow, self._z
-        if self._power is None and len(z) == 2 and n_slow == 1:
-            operations: Operations = [partial(np.divide, gate[0], self._q[1], self._channel_open)]
+            self._drive.dot(self._weights, self._total)
         else:
-            operations = [
-                partial(np.copyto, z[:n_slow], gate),
-                partial(np.reciprocal, self._q_instant, z[n_slow:]),
-            ]
+            # One product of a vector and the matrix per copy.
+            np.matmul(self._drive[:, np.newaxis], self._weights, self._total[:, np.newaxis])
+        neurons, columns = self._leak_factors
+        if neurons.size:
+            more = self._leak_step[neurons] * (self._modulation[:, columns] - 1.0)
+            self._conductance[:, neurons] += more
+            self._current[:, neurons] += more * a.rest_mV[neurons]
+        step = self._conductance * potential
+        np.subtract(self._current, step, step)
+        if self._membrane_factors[0].size:
+            self._scale(np.divide, step, self._membrane_factors)
+        return step
+
+    def _open_channels(self, gate: Array) -> None:
+        """Multiplies the powers of all gates of each channel."""
+        if self._power is None and len(self._q) == 2 and len(gate) == 1:
+            np.divide(gate[0], self._q_instant[0], self._channel_open)
+        else:
+            open_gates = np.concatenate([gate, 1.0 / self._q_instant])
             if self._power is not None:
-                operations.append(partial(np.power, z, self._power, z))
-            operations.append(partial(np.multiply.reduce, z, axis=0, out=self._channel_open))
-        if self._channel_factor[0].size:
-            operations.append(partial(self._modulate_channels, *self._channel_factor))
-        return operations
+                open_gates **= self._power
+            np.multiply.reduce(open_gates, axis=0, out=self._channel_open)
+        if self._channel_factors[0].size:
+            self._scale(np.multiply, self._channel_open, self._channel_factors)
 
-    def _slow_down(self, step: Array, columns: NDArray[np.intp], factors: NDArray[np.intp]) -> None:
-        """Divides columns of a step by modulation factors, which lengthen their time constants."""
-        step[..., columns] /= self._modulation[:, factors]
+    def _scale(self, apply: np.ufunc, values: Array, factors: Factors) -> None:
+        """Multiplies or divides columns of values by modulation factors, in place."""
+        places, columns = factors
+        values[..., places] = apply(values[..., places], self._modulation[:, columns])
 
-    def _modulate_leaks(self, neurons: NDArray[np.intp], factors: NDArray[np.intp]) -> None:
-        more = self._leak_step[neurons] * (self._modulation[:, factors] - 1.0)
-        self._conductance[:, neurons] += more
-        self._current[:, neurons] += more * self.arrays.rest_mV[neurons]
-
-    def _modulate_channels(self, channels: NDArray[np.intp], factors: NDArray[np.intp]) -> None:
-        self._channel_open[:, channels] *= self._modulation[:, factors]
-
-    def _adapt_thresholds(self) -> None:
+    def _adapt_thresholds(self, state: NetworkState) -> None:
         """Takes the thresholds' Euler step, from the potentials before this step."""
-        a, state = self.arrays, self._now
+        a = self.arrays
         depolarisation = state.potential[:, a.firing_neuron] - a.rest_mV[a.firing_neuron]
         state.threshold += self._threshold_rate * (a.threshold_mV - state.threshold + a.adaptation * depolarisation)
 
-    def _fire(self) -> None:
+    def _fire(self, state: NetworkState) -> None:
         """Resets the neurons at or above their thresholds, and lets their synapses release."""
-        a, state = self.arrays, self._now
+        a = self.arrays
         reached = state.potential[:, a.firing_neuron]
         np.greater_equal(reached, state.threshold, out=state.fired)
         state.potential[:, a.firing_neuron] = np.where(state.fired, a.reset_mV, reached)

@@ -8,21 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import ConfigError, require_finite, shown, suggest
-from annelid.nervous.neurons import Channel, Firing, Gate, Neuron
-from annelid.nervous.synapses import ConnectionKind, GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous import neurons
 from annelid.textfiles import parse_toml, toml_text
 
 if TYPE_CHECKING:
     from annelid.nervous.network import Network
 
-KINDS: dict[str, type[ConnectionKind]] = {
-    "synapse": Synapse,
-    "gap_junction": GapJunction,
-    "spiking_synapse": SpikingSynapse,
-    "modulatory_synapse": ModulatorySynapse,
+KINDS: dict[str, type[neurons.ConnectionKind]] = {
+    "synapse": neurons.Synapse,
+    "gap_junction": neurons.GapJunction,
+    "spiking_synapse": neurons.SpikingSynapse,
+    "modulatory_synapse": neurons.ModulatorySynapse,
 }
 """What a connection's ``kind`` is called in the text."""
 
@@ -48,59 +48,40 @@ def write_network(network: Network) -> str:
 
 
 def read_network(text: str, make: type[Network]) -> Network:
-    """Builds a network from TOML text.
-
-    Args:
-        text: As `write_network` writes it; fields with a default may be left out.
-        make: The network's class.
-
-    Returns:
-        The network.
-
-    Raises:
-        ConfigError: No valid TOML, an unknown or missing field, a value of the wrong type, or one that is refused.
-    """
+    """Builds a network of the class ``make`` from TOML text."""
     document = parse_toml(text, "the network")
     _refuse_unknown(document, {"name", "neuron", "connection", "input", "output"}, "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))
     for place, entry in _tables(document, "neuron"):
-        name = _strings(entry, place, "name")[0]
-        neuron = _build(Neuron, entry, place, {"name", "initial_mV"})
-        initial = entry.get("initial_mV")
-        network.add_neuron(name, neuron, None if initial is None else _number(initial, f"{place}: initial_mV"))
+        [name] = _strings(entry, place, "name")
+        initial = _number(entry["initial_mV"], f"{place}: initial_mV") if "initial_mV" in entry else None
+        network.add_neuron(name, _build(neurons.Neuron, {"name", "initial_mV"}, entry, place), initial)
     for place, entry in _tables(document, "connection"):
         source, target, kind = _strings(entry, place, "source", "target", "kind")
         if kind not in KINDS:
             raise ConfigError(f"{place}: unknown kind {shown(kind)}: {suggest(kind, KINDS)}")
-        built = _build(KINDS[kind], entry, place, {"source", "target", "kind"})
-        if isinstance(built, GapJunction):
-            network.add_gap_junction(source, target, built)
-        else:
-            network.add_synapse(source, target, built)
+        built = _build(KINDS[kind], {"source", "target", "kind"}, entry, place)
+        add = network.add_gap_junction if kind == "gap_junction" else network.add_synapse
+        add(source, target, built)
     for place, entry in _tables(document, "input"):
         _refuse_unknown(entry, {"name", "targets"}, place)
-        targets = _required(entry, "targets", place)
-        if not isinstance(targets, list):
-            raise ConfigError(f"{place}: targets must be a list of names, not {shown(targets)}")
+        targets = _of_type(list, "a list of names")(_required(entry, "targets", place), f"{place}: targets")
         names = [_string(target, f"{place}: targets") for target in targets]
         network.add_input(_strings(entry, place, "name")[0], names)
     for place, entry in _tables(document, "output"):
         _refuse_unknown(entry, {"name", "source"}, place)
-        name, source = _strings(entry, place, "name", "source")
-        network.add_output(name, source)
+        network.add_output(*_strings(entry, place, "name", "source"))
     return network
 
 
-def _build(kind: type, entry: Mapping[str, Any], place: str, others: Collection[str] = ()) -> Any:
+def _build(kind: type, others: Collection[str], entry: Any, place: str) -> Any:
     """Makes one of the frozen classes from a table, after naming whatever does not fit."""
     known = {field.name: field for field in fields(kind)}
-    _refuse_unknown(entry, {*known, *others}, place)
+    _refuse_unknown(_table(entry, place), {*known, *others}, place)
     values: dict[str, Any] = {}
     for name, field in known.items():
-        if name in entry:
-            values[name] = _READERS.get(name, _number)(entry[name], f"{place}: {name}")
-        elif field.default is MISSING:
-            raise ConfigError(f"{place}: {name} is missing")
+        if name in entry or field.default is MISSING:
+            values[name] = _READERS.get(name, _number)(_required(entry, name, place), f"{place}: {name}")
     try:
         return kind(**values)
     except ConfigError as error:
@@ -109,9 +90,7 @@ def _build(kind: type, entry: Mapping[str, Any], place: str, others: Collection[
 
 def _tables(document: Mapping[str, Any], key: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """The tables of an array, each with words that say where it is."""
-    entries = document.get(key, [])
-    if not isinstance(entries, list):
-        raise ConfigError(f"{key} must be an array of tables, [[{key}]], not {shown(entries)}")
+    entries = _of_type(list, f"an array of tables, [[{key}]]")(document.get(key, []), key)
     for number, entry in enumerate(entries, start=1):
         name = _table(entry, f"{key} {number}").get("name")
         yield f"{key} {number}" + (f" ({shown(name)})" if name is not None else ""), entry
@@ -144,8 +123,7 @@ def _of_type(kind: type, words: str) -> Callable[[Any, str], Any]:
     return read
 
 
-_string, _table = _of_type(str, "a string"), _of_type(dict, "a table")
-_truth, _array = _of_type(bool, "true or false"), _of_type(list, "an array of tables")
+_string, _table, _array = _of_type(str, "a string"), _of_type(dict, "a table"), _of_type(list, "an array of tables")
 
 
 def _number(value: Any, place: str) -> float:
@@ -160,14 +138,14 @@ def _number(value: Any, place: str) -> float:
 
 
 def _several(kind: type) -> Callable[[Any, str], Any]:
-    return lambda value, place: tuple(_build(kind, _table(part, place), place) for part in _array(value, place))
+    return lambda value, place: tuple(_build(kind, (), part, place) for part in _array(value, place))
 
 
 _READERS: dict[str, Callable[[Any, str], Any]] = {
-    "channels": _several(Channel),
-    "gates": _several(Gate),
-    "firing": lambda value, place: _build(Firing, _table(value, place), place),
+    "channels": _several(neurons.Channel),
+    "gates": _several(neurons.Gate),
+    "firing": partial(_build, neurons.Firing, ()),
     "quantity": _string,
-    "rectified": _truth,
+    "rectified": _of_type(bool, "true or false"),
 }
 """How fields are read that are no numbers."""

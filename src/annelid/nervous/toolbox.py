@@ -18,8 +18,7 @@ import numpy as np
 
 from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Channel, Gate, Neuron
-from annelid.nervous.synapses import GapJunction, Synapse
+from annelid.nervous.neurons import Channel, GapJunction, Gate, Neuron, Synapse
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -40,7 +39,7 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
             ``"as_written"``: capacitance C, as the neuron's equation says. The same for Gm = 1 uS.
 
     Returns:
-        The network; neurons, inputs and outputs in the toolbox's order.
+        The network, everything in the toolbox's order.
 
     Raises:
         MissingDependency: SNS-Toolbox or torch is not installed.
@@ -57,7 +56,8 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
         raise ConfigError(f"network {title!r} has spiking neurons or synapses; only non-spiking ones can come over")
     with np.errstate(divide="ignore"):  # it divides by a leak of zero
         model = toolbox_network.compile(dt=1.0, backend="numpy")
-    names = _neuron_names(toolbox_network)
+    populations = [(population["name"], population["number"]) for population in toolbox_network.populations]
+    names = _unique([name if size == 1 else f"{name}_{i}" for name, size in populations for i in range(size)])
     network = Network(title)
     for i, name in enumerate(names):
         leak = float(model.g_m[i])
@@ -73,15 +73,23 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
             channels=_channels(model, i),
         )
         network.add_neuron(name, neuron, float(model.V_0[i]))
-    _import_connections(model, names, network)
+    for post, pre in np.argwhere(model.g_max_non != 0.0).tolist():
+        numbers = (float(matrix[post, pre]) for matrix in (model.g_max_non, model.del_e, model.e_lo, model.e_hi))
+        network.add_synapse(names[pre], names[post], Synapse(*numbers))
+    if model.electrical:
+        for post, pre in np.argwhere(np.triu(model.g_electrical, 1) != 0.0).tolist():
+            network.add_gap_junction(names[pre], names[post], GapJunction(float(model.g_electrical[post, pre])))
+    if model.electrical_rectified:
+        for post, pre in np.argwhere(model.g_rectified != 0.0).tolist():
+            if post != pre:
+                junction = GapJunction(float(model.g_rectified[post, pre]), rectified=True)
+                network.add_gap_junction(names[pre], names[post], junction)
 
     input_names = _unique([entry["name"] for entry in toolbox_network.inputs for _ in range(entry["size"])])
     for column, name in enumerate(input_names):
         network.add_input(name, [names[i] for i in np.flatnonzero(model.input_connectivity[:, column])])
-    populations = toolbox_network.populations
-    output_names = _unique(
-        [entry["name"] for entry in toolbox_network.outputs for _ in range(populations[entry["source"]]["number"])]
-    )
+    outputs = [(entry["name"], populations[entry["source"]][1]) for entry in toolbox_network.outputs]
+    output_names = _unique([name for name, size in outputs for _ in range(size)])
     for row, name in enumerate(output_names):
         network.add_output(name, names[int(np.argmax(model.output_voltage_connectivity[row]))])
     return network
@@ -100,43 +108,59 @@ def export_network(network: Network) -> Any:
 
     Raises:
         MissingDependency: SNS-Toolbox or torch is not installed.
-        ConfigError: Something the toolbox cannot say: two synapses between the same two neurons, an input
-            into several neurons, a neuron without leak, or more than one instantaneous or two slow gates in
-            a channel, spiking neurons, or spiking or modulatory synapses; the sentence names it.
+        ConfigError: Something the toolbox cannot express: two synapses between the same two neurons, an input into
+            several neurons, a neuron without leak, more than one instantaneous or two slow gates in a channel, spiking
+            neurons, or spiking or modulatory synapses; the sentence names it.
     """
     toolbox = _toolbox()
-    _require_exportable(network)
+    if not network.neurons:
+        raise ConfigError(f"network {network.name!r} has no neurons to export")
     exported = toolbox.networks.Network(name=network.name)
     n_channels = max(len(neuron.channels) for neuron in network.neurons.values())
     for name, neuron in network.neurons.items():
-        membrane = {
+        if neuron.firing is not None:
+            raise ConfigError(f"neuron {name!r} spikes; only non-spiking networks can go over to SNS-Toolbox")
+        if neuron.leak_conductance_uS == 0:
+            raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
+        membrane: dict[str, Any] = {
             "membrane_capacitance": neuron.capacitance_nF * neuron.leak_conductance_uS,
             "membrane_conductance": neuron.leak_conductance_uS,
             "resting_potential": neuron.rest_mV,
             "bias": neuron.bias_nA,
         }
+        kind = toolbox.neurons.NonSpikingNeuron
         if neuron.channels:
-            kind = toolbox.neurons.NonSpikingNeuronWithGatedChannels(
-                **_channel_arguments(neuron.channels, n_channels), **membrane
-            )
-        else:
-            kind = toolbox.neurons.NonSpikingNeuron(**membrane)
-        exported.add_neuron(kind, name=name, initial_value=network.initial_mV[name])
+            kind = toolbox.neurons.NonSpikingNeuronWithGatedChannels
+            membrane |= _channel_arguments(name, neuron.channels, n_channels)
+        exported.add_neuron(kind(**membrane), name=name, initial_value=network.initial_mV[name])
+    pairs = Counter()
     for connection in network.connections:
-        kind = connection.kind
+        kind, source, target = connection.kind, connection.source, connection.target
         if isinstance(kind, Synapse):
-            synapse = toolbox.connections.NonSpikingSynapse(
-                max_conductance=kind.conductance_uS,
-                reversal_potential=kind.reversal_mV,
-                e_lo=kind.threshold_mV,
-                e_hi=kind.saturation_mV,
-            )
+            pair = "synapse", source, target
+            numbers = kind.conductance_uS, kind.reversal_mV, kind.threshold_mV, kind.saturation_mV
+            names = "max_conductance", "reversal_potential", "e_lo", "e_hi"
+            synapse = toolbox.connections.NonSpikingSynapse(**dict(zip(names, numbers, strict=True)))
         elif isinstance(kind, GapJunction):
+            pair = (kind.rectified, source, target) if kind.rectified else (False, *sorted((source, target)))
             synapse = toolbox.connections.ElectricalSynapse(kind.conductance_uS, rect=kind.rectified)
         else:
-            continue
-        exported.add_connection(synapse, connection.source, connection.target)
+            raise ConfigError(
+                f"{source!r} and {target!r} are joined by a {type(kind).__name__}; only graded synapses and gap "
+                "junctions can go over to SNS-Toolbox"
+            )
+        pairs[pair] += 1
+        exported.add_connection(synapse, source, target)
+    for (_, source, target), count in pairs.items():
+        if count > 1:
+            raise ConfigError(
+                f"{count} connections of one kind join {source!r} and {target!r}; SNS-Toolbox keeps only the last"
+            )
     for name, targets in network.inputs.items():
+        if len(targets) != 1:
+            raise ConfigError(
+                f"input {name!r} drives {len(targets)} neurons; an SNS-Toolbox input drives one, so split it"
+            )
         exported.add_input(targets[0], name=name)
     for name, source in network.outputs.items():
         exported.add_output(source, name=name)
@@ -152,26 +176,6 @@ def _toolbox() -> ModuleType:
         raise MissingDependency(
             f"SNS-Toolbox cannot be imported ({error}): install it with  pip install 'annelid[sns]'"
         ) from None
-
-
-def _import_connections(model: Any, names: Sequence[str], network: Network) -> None:
-    for post, pre in np.argwhere(model.g_max_non != 0.0).tolist():
-        synapse = Synapse(
-            conductance_uS=float(model.g_max_non[post, pre]),
-            reversal_mV=float(model.del_e[post, pre]),
-            threshold_mV=float(model.e_lo[post, pre]),
-            saturation_mV=float(model.e_hi[post, pre]),
-        )
-        network.add_synapse(names[pre], names[post], synapse)
-    if model.electrical:
-        for post, pre in np.argwhere(np.triu(model.g_electrical, 1) != 0.0).tolist():
-            junction = GapJunction(float(model.g_electrical[post, pre]))
-            network.add_gap_junction(names[pre], names[post], junction)
-    if model.electrical_rectified:
-        for post, pre in np.argwhere(model.g_rectified != 0.0).tolist():
-            if post != pre:
-                junction = GapJunction(float(model.g_rectified[post, pre]), rectified=True)
-                network.add_gap_junction(names[pre], names[post], junction)
 
 
 def _channels(model: Any, neuron: int) -> tuple[Channel, ...]:
@@ -190,75 +194,36 @@ def _channels(model: Any, neuron: int) -> tuple[Channel, ...]:
     return tuple(channels)
 
 
-def _channel_arguments(channels: Sequence[Channel], n_channels: int) -> dict[str, Any]:
+def _channel_arguments(name: str, channels: Sequence[Channel], n_channels: int) -> dict[str, Any]:
     """Keyword arguments of the toolbox's gated neuron, filled up with channels that conduct nothing.
 
-    The toolbox needs the same number of channels in every gated neuron of a network: it spreads a single
-    one over all rows. Plain lists, since it asks for the truth of each value.
+    The toolbox needs the same number of channels in every gated neuron of a network, and plain lists.
     """
+    for channel in channels:
+        if len(channel.instant_gates) > 1 or len(channel.slow_gates) > 2:
+            raise ConfigError(
+                f"neuron {name!r} has a channel with {len(channel.instant_gates)} instantaneous and "
+                f"{len(channel.slow_gates)} slow gates; SNS-Toolbox has room for one and two"
+            )
     none = Gate(slope_per_mV=0.0, power=0.0, time_constant_ms=1.0)
     filled = [*channels, *[Channel(0.0, 0.0)] * (n_channels - len(channels))]
     arguments: dict[str, Any] = {
         "g_ion": [channel.conductance_uS for channel in filled],
         "e_ion": [channel.reversal_mV for channel in filled],
     }
-    for letter, pick in (("a", 0), ("b", 0), ("c", 1)):
-        gates = [
-            next(iter((c.instant_gates if letter == "a" else c.slow_gates)[pick : pick + 1]), none) for c in filled
-        ]
-        arguments[f"pow_{letter}"] = [gate.power for gate in gates]
-        arguments[f"k_{letter}"] = [gate.factor for gate in gates]
-        arguments[f"slope_{letter}"] = [gate.slope_per_mV for gate in gates]
-        arguments[f"e_{letter}"] = [gate.midpoint_mV for gate in gates]
+    gates = {
+        "a": [(*channel.instant_gates, none)[0] for channel in filled],
+        "b": [(*channel.slow_gates, none)[0] for channel in filled],
+        "c": [(*channel.slow_gates, none, none)[1] for channel in filled],
+    }
+    for letter, each in gates.items():
+        arguments[f"pow_{letter}"] = [gate.power for gate in each]
+        arguments[f"k_{letter}"] = [gate.factor for gate in each]
+        arguments[f"slope_{letter}"] = [gate.slope_per_mV for gate in each]
+        arguments[f"e_{letter}"] = [gate.midpoint_mV for gate in each]
         if letter != "a":
-            arguments[f"tau_max_{letter}"] = [gate.time_constant_ms for gate in gates]
+            arguments[f"tau_max_{letter}"] = [gate.time_constant_ms for gate in each]
     return arguments
-
-
-def _require_exportable(network: Network) -> None:
-    if not network.neurons:
-        raise ConfigError(f"network {network.name!r} has no neurons to export")
-    for name, neuron in network.neurons.items():
-        if neuron.firing is not None:
-            raise ConfigError(f"neuron {name!r} spikes; only non-spiking networks can go over to SNS-Toolbox")
-        if neuron.leak_conductance_uS == 0:
-            raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
-        for channel in neuron.channels:
-            if len(channel.instant_gates) > 1 or len(channel.slow_gates) > 2:
-                raise ConfigError(
-                    f"neuron {name!r} has a channel with {len(channel.instant_gates)} instantaneous and "
-                    f"{len(channel.slow_gates)} slow gates; SNS-Toolbox has room for one and two"
-                )
-    pairs = Counter()
-    for connection in network.connections:
-        kind = connection.kind
-        if not isinstance(kind, Synapse | GapJunction):
-            raise ConfigError(
-                f"{connection.source!r} and {connection.target!r} are joined by a {type(kind).__name__}; only graded "
-                "synapses and gap junctions can go over to SNS-Toolbox"
-            )
-        symmetric = isinstance(kind, GapJunction) and not kind.rectified
-        ends = (connection.source, connection.target)
-        kind_of_pair = "synapse" if isinstance(kind, Synapse) else f"junction, rectified={kind.rectified}"
-        pairs[kind_of_pair, tuple(sorted(ends)) if symmetric else ends] += 1
-    for (_, (source, target)), count in pairs.items():
-        if count > 1:
-            raise ConfigError(
-                f"{count} connections of one kind join {source!r} and {target!r}; SNS-Toolbox keeps only the last"
-            )
-    for name, targets in network.inputs.items():
-        if len(targets) != 1:
-            raise ConfigError(
-                f"input {name!r} drives {len(targets)} neurons; an SNS-Toolbox input drives one, so split it"
-            )
-
-
-def _neuron_names(toolbox_network: Any) -> list[str]:
-    names = []
-    for population in toolbox_network.populations:
-        number, name = population["number"], population["name"]
-        names += [name] if number == 1 else [f"{name}_{i}" for i in range(number)]
-    return _unique(names)
 
 
 def _unique(names: Sequence[str]) -> list[str]:

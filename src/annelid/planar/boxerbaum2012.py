@@ -1,9 +1,9 @@
 """The planar worm of Boxerbaum et al. 2012: rhombi whose sides bend in their middle, touching no ground.
 
-Each side of a segment is two rigid halves of ``s / 2`` with a torsional spring between them, so the compliance lies
-within the segment. The sides of neighbouring segments are one strand that crosses the axis straight, as in a braided
-mesh: on hinges alone a side with no load between its ends would stay straight and its spring never act. Hence the
-inner halves on both sides of joint ``j`` have one slope, and with the joints' rises ``a_j`` as coordinates
+Each side of a segment is two rigid halves of ``s / 2`` with a torsional spring between them. The sides of neighbouring
+segments are one strand that crosses the axis straight, as in a braided mesh, since on hinges a side would stay straight
+and its spring never act. Hence the inner halves on both sides of joint ``j`` have one slope, and with the joints' rises
+``a_j`` as coordinates
 
     q = (x_0, h_1 .. h_N, a_0 .. a_N)
     r = (a_(i-1), h_i/2 - a_(i-1), h_i/2 - a_i, a_i)   of the four halves of segment i, front to rear
@@ -12,18 +12,17 @@ inner halves on both sides of joint ``j`` have one slope, and with the joints' r
     T = sum over joints m_j/2 (dX/dt)^2 + sum over vertices and middles of sides m/2 [(dX/dt)^2 + (dy/dt)^2]
     U = sum k_s/2 (l_i - l_0)^2 + sum over all sides k_t/2 (phi_outer - phi_inner)^2
 
-in m, kg, s, N, rad and J. Muscles pull the upper and the lower vertex of a segment together, return springs along
-the segments push them apart; there is neither gravity nor ground, so the centre of mass stays where it is.
-`annelid.planar.linkage` states forces and mass matrix in general, and `annelid.planar.midpoint` the stepper.
+Muscles pull the upper and the lower vertex of a segment together, return springs along the segments push them apart;
+there is neither gravity nor ground, so the centre of mass stays where it is.
 
 Source: Boxerbaum, Shaw, Chiel and Quinn 2012, Continuous wave peristaltic motion in a robot, Int. J. Robot. Res. 31,
-302-318, as described by Riddle et al. 2023, section 2.1. The constants are this package's own
-(`Boxerbaum2012Body`), as are the force-height law of the muscles and the dampers.
+302-318, as described by Riddle et al. 2023, section 2.1. The constants are this package's own, as are the force-height
+law of the muscles and the dampers.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field
@@ -34,14 +33,14 @@ from annelid.planar.linkage import Linkage
 from annelid.planar.sections import DynamicPlanarWorm
 
 if TYPE_CHECKING:
-    from annelid.config.run import Clock, RunConfig
+    from annelid.config.run import RunConfig
 
 
 class Boxerbaum2012Body(DynamicPlanarWorm):
     """The planar worm of Boxerbaum 2012: rhombi whose sides bend in their middle, without ground."""
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("boxerbaum2012", "the planar worm"),)
-    touches_ground: ClassVar[bool] = False
+    cites = (("boxerbaum2012", "the planar worm"),)
+    touches_ground = False
     kind: Literal["boxerbaum2012"] = "boxerbaum2012"
     middle_mass_kg: Positive = Field(default=0.02, description="mass of the middle of a side")
     torsion_stiffness_Nm_per_rad: Positive = Field(default=0.2, description="torsional spring in the middle of a side")
@@ -50,19 +49,6 @@ class Boxerbaum2012Body(DynamicPlanarWorm):
     def build(self, config: RunConfig) -> Boxerbaum2012Plant:
         """Builds the worm, as `BodyKind.build`."""
         return Boxerbaum2012Plant(self, config.clock)
-
-
-class Boxerbaum2012Plant(DynamicPlanarPlant):
-    """The worm of Boxerbaum et al. 2012 as a plant; the module states its equations."""
-
-    def __init__(self, body: Boxerbaum2012Body, clock: Clock) -> None:
-        """Lays the worm down at rest.
-
-        Args:
-            body: Section of the body.
-            clock: Section of the time steps.
-        """
-        super().__init__(boxerbaum_linkage(body), clock, "planar worm of Boxerbaum et al. 2012")
 
 
 def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
@@ -101,3 +87,10 @@ def boxerbaum_linkage(body: Boxerbaum2012Body) -> Linkage:
         torsion_stiffness_Nm_per_rad=body.torsion_stiffness_Nm_per_rad,
         torsion_damping_Nms_per_rad=body.torsion_damping_Nms_per_rad,
     )
+
+
+class Boxerbaum2012Plant(DynamicPlanarPlant):
+    """The worm of Boxerbaum et al. 2012 as a plant; the module states its equations."""
+
+    description = "planar worm of Boxerbaum et al. 2012"
+    linkage = staticmethod(boxerbaum_linkage)

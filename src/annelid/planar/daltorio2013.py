@@ -2,10 +2,9 @@
 
 Each segment is a rhombus of sides ``s``: with the height ``h`` its length is ``l = sqrt(4 s^2 - h^2)`` (the paper's
 ``l^2 + w^2 = 4 l_s^2``). A muscle pulls the upper and the lower vertex together, a return spring along the segment
-pushes them apart again, and torsional springs resist that the sides of neighbouring segments differ in their angle,
-``k_t/2 sum (phi_(i+1) - phi_i)^2`` with ``sin phi = h / 2s``. There is no gravity. The vertices press against the
-walls of a straight pipe, the same all round, so the worm stays symmetric about the pipe's axis and each segment has
-one coordinate; the front tip's place ``x_0`` completes them:
+pushes them apart again, and torsional springs resist that the sides of neighbouring segments differ in their angle phi,
+``sin phi = h / 2s``. There is no gravity. The vertices press against the walls of a straight pipe, so the worm stays
+symmetric about the pipe's axis and each segment has one coordinate; the front tip's place ``x_0`` completes them:
 
     q = (x_0, h_1 .. h_N),   r_i = h_i / 2,   c_i = sqrt(s^2 - r_i^2),   l_i = 2 c_i
     d/dt dT/d(dq/dt) - dT/dq = -dU/dq - C dq/dt - F + J^T f
@@ -13,18 +12,17 @@ one coordinate; the front tip's place ``x_0`` completes them:
     U = sum k_s/2 (l_i - l_0)^2 + sum k_t/2 (phi_(i+1) - phi_i)^2 + sum k_w (h_i/2 - D/2)_+^2
     N_i = k_w (h_i/2 - D/2)_+,   |f_i| <= 2 mu N_i,   f_i = -2 mu N_i sign(dX_i/dt) where the vertices slide
 
-in m, kg, s, N, rad and J. `annelid.planar.linkage` states forces and mass matrix in general, and
-`annelid.planar.midpoint` the stepper. Slip loss is the work that friction takes from vertices that slide.
+Slip loss is the work that friction takes from vertices that slide.
 
 Source: Daltorio, Boxerbaum, Horchler, Shaw, Chiel and Quinn 2013, Efficient worm-like locomotion: slip and control of
 soft-bodied peristaltic robots, Bioinspir. Biomim. 8, 035003, as described by Riddle et al. 2023, section 2.1. The
-constants are this package's own (`annelid.config.Daltorio2013Body`), as are the force-height law of the muscles, the
-linear walls, and the dampers beside the muscles.
+constants are this package's own, as are the force-height law of the muscles, the linear walls, and the dampers beside
+the muscles.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -35,13 +33,13 @@ from annelid.planar.linkage import Linkage
 from annelid.planar.sections import DynamicPlanarWorm
 
 if TYPE_CHECKING:
-    from annelid.config.run import Clock, RunConfig
+    from annelid.config.run import RunConfig
 
 
 class Daltorio2013Body(DynamicPlanarWorm):
     """The planar worm of Daltorio 2013: rigid-sided rhombi, torsional springs between them, and the walls of a pipe."""
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("daltorio2013", "the planar worm"),)
+    cites = (("daltorio2013", "the planar worm"),)
     kind: Literal["daltorio2013"] = "daltorio2013"
     torsion_stiffness_Nm_per_rad: NonNegative = Field(
         default=0.2, description="torsional springs between neighbouring segments"
@@ -70,19 +68,6 @@ class Daltorio2013Body(DynamicPlanarWorm):
         return Daltorio2013Plant(self, config.clock)
 
 
-class Daltorio2013Plant(DynamicPlanarPlant):
-    """The worm of Daltorio et al. 2013 as a plant; the module states its equations."""
-
-    def __init__(self, body: Daltorio2013Body, clock: Clock) -> None:
-        """Lays the worm down at rest in its pipe.
-
-        Args:
-            body: Section of the body and its pipe.
-            clock: Section of the time steps.
-        """
-        super().__init__(daltorio_linkage(body), clock, "planar worm of Daltorio et al. 2013 in a pipe")
-
-
 def daltorio_linkage(body: Daltorio2013Body) -> Linkage:
     """Returns the mechanics of the worm: one link a segment, which stands for its four equal sides."""
     n = body.n_segments
@@ -109,3 +94,10 @@ def daltorio_linkage(body: Daltorio2013Body) -> Linkage:
         wall_stiffness_N_per_m=body.wall_stiffness_N_per_m,
         friction=body.wall_friction,
     )
+
+
+class Daltorio2013Plant(DynamicPlanarPlant):
+    """The worm of Daltorio et al. 2013 as a plant; the module states its equations."""
+
+    description = "planar worm of Daltorio et al. 2013 in a pipe"
+    linkage = staticmethod(daltorio_linkage)

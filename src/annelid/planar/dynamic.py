@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.clock import StepRatio
 from annelid.errors import SimulationStopped
 from annelid.planar.linkage import Linkage
 from annelid.planar.midpoint import midpoint_step
-from annelid.protocols import Array, Recordable, Sensation, Signal, State
+from annelid.planar.sections import DynamicPlanarWorm
+from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import Clock
@@ -21,129 +21,110 @@ _STEEPEST = 0.9999
 _HALVINGS = 80
 # What the state has for every segment: last forces, N, and energies so far, J.
 _OF_SEGMENTS = ("muscle_force", "friction", "muscle_work", "positive_work", "slip_loss")
+_OF_WALLS = ("contact_force", "slip_loss")
 
 
-class DynamicPlanarPlant:
+class DynamicPlanarPlant(SavedAndRecorded):
     """A `Linkage` as a plant; the worms of the literature derive from it.
 
     Segment 1 is at the front, which points to -x. A segment's one stretch sensor is its length, at rest when the worm
     lies unactuated. ``contact_force`` is the force of the walls along x on both vertices, and along z that of the lower
-    wall; the upper one presses with the same force the other way. The centre of mass stays on the axis.
+    wall. Energies add up: kinetic + elastic = muscle work - damping loss - slip loss + the start's energy, up to the
+    error of the integrator (`annelid.planar.midpoint`).
 
-    Energies add up: kinetic + elastic = muscle work - damping loss - slip loss + the start's energy, up to the error of
-    the integrator (`annelid.planar.midpoint`).
+    Attributes:
+        description: What it is, for the run file.
+        linkage: Makes its mechanics from its section of the configuration.
     """
 
-    def __init__(self, worm: Linkage, clock: Clock, description: str) -> None:
-        """Lays the worm down at rest.
+    description: ClassVar[str]
+    linkage: ClassVar[Callable[[Any], Linkage]]
+    recorded = (
+        (
+            "contact_force",
+            ("segment", "axis"),
+            "N",
+            "force of the walls along x on a segment, and of the lower wall along z",
+        ),
+        ("slip_loss", ("segment",), "J", "work of a segment lost to friction so far"),
+        ("stretch_length", ("segment", "sensor"), "m", "length of a segment"),
+        ("ring_length", ("muscle",), "m", "height of a rhombus"),
+        ("muscle_force", ("muscle",), "N", "contractile force of an actuator"),
+        ("center_of_mass", ("axis",), "m", "centre of mass; the front points to -x"),
+        ("outline", ("corner", "plane_axis"), "m", "upper half, front tip first: x and z"),
+        ("kinetic_energy", (), "J", "kinetic energy"),
+        ("elastic_energy", (), "J", "energy of springs and walls"),
+        ("muscle_work", ("muscle",), "J", "net work done by an actuator so far"),
+        ("positive_work", ("muscle",), "J", "positive work of an actuator so far, none regained"),
+        ("damping_loss", (), "J", "energy lost to dampers so far"),
+    )
+
+    def __init__(self, body: DynamicPlanarWorm, clock: Clock) -> None:
+        """Puts the worm at rest.
 
         Args:
-            worm: Its mechanics.
+            body: Section of the body.
             clock: Section of the time steps.
-            description: What it is, for the run file.
         """
-        self.worm = worm
+        self.worm = worm = type(self).linkage(body)
         self._ratio = StepRatio(clock.control_timestep_s, clock.physics_timestep_s)
-        self._description = description
         self.n_segments = self.n_muscles = worm.n_segments
-        self._rest = resting_posture(worm)
+        self._rest = _resting_posture(worm)
         self._rest_length_m = worm.lengths(worm.posture(self._rest))[:, np.newaxis]
         self.reset(0)
 
     def reset(self, seed: int) -> Sensation:
         """Returns to rest at time zero, the front tip at x = 0; nothing here is random."""
-        self._state: dict[str, Array] = {
+        self._now = {
             "q": self._rest.copy(),
             "p": np.zeros_like(self._rest),
             **{name: np.zeros(self.n_segments) for name in _OF_SEGMENTS},
             "damping_loss": np.zeros(()),
+            "n_control_steps": np.array(0),
         }
-        self._n_control_steps = 0
         self._converged = True
-        self._posture = self.worm.posture(self._state["q"])
+        self._posture = self.worm.posture(self._now["q"])
         return self._sense()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step.
-
-        Args:
-            activation: Shape ``(n_segments,)``, in [0, 1].
-
-        Returns:
-            The sensation at its end.
+        """Advances by one control step, as `annelid.Plant.step`.
 
         Raises:
             SimulationStopped: The step has no unique solution.
         """
         activation = np.asarray(activation, dtype=np.float64)
-        self._n_control_steps += 1
-        now = self._state
-        for _ in range(self._ratio.physics_steps_due(self._n_control_steps)):
+        self._now["n_control_steps"] += 1
+        for _ in range(self._ratio.physics_steps_due(int(self._now["n_control_steps"]))):
             try:
-                step = midpoint_step(self.worm, now["q"], now["p"], activation, self._ratio.physics_timestep_s)
+                after, converged = midpoint_step(self.worm, self._now, activation, self._ratio.physics_timestep_s)
             except np.linalg.LinAlgError:
                 raise SimulationStopped(
                     "the planar worm's equations of motion have no unique solution: its masses, stiffnesses or "
                     "dampings differ by too much"
                 ) from None
-            now["q"], now["p"] = step.q, step.p
-            now["muscle_force"], now["friction"] = step.muscle_force_N, step.friction_N
-            now["muscle_work"] = now["muscle_work"] + step.muscle_work_J
-            now["positive_work"] = now["positive_work"] + np.maximum(step.muscle_work_J, 0.0)
-            now["slip_loss"] = now["slip_loss"] + step.slip_loss_J
-            now["damping_loss"] = np.asarray(now["damping_loss"] + step.damping_loss_J)
-            self._converged &= step.converged
-        self._posture = self.worm.posture(now["q"])
+            self._now |= after
+            self._converged &= converged
+        self._posture = self.worm.posture(self._now["q"])
         return self._sense()
 
     def kinetic_energy_J(self) -> float:
         """Returns the present kinetic energy, J."""
-        momentum = self._state["p"]
+        momentum = self._now["p"]
         return 0.5 * float(momentum @ np.linalg.solve(self._posture.mass, momentum))
 
     def elastic_energy_J(self) -> float:
         """Returns the present energy of springs and walls, J."""
         return self.worm.elastic_energy(self._posture)
 
-    def recordable(self) -> Recordable:
-        """Names lengths, forces, the energies and the outline; contact and slip only where there are walls."""
-        n, corners = self.n_segments, len(self.worm.outline)
-        walls = "force of the walls along x on a segment, and of the lower wall along z"
-        slip = "work of a segment lost to friction so far"
-        contact = (
-            Signal("contact_force", ("segment", "axis"), (n, 3), "N", walls),
-            Signal("slip_loss", ("segment",), (n,), "J", slip),
-        )
-        return Recordable(
-            signals=(
-                *(contact if self.worm.wall_stiffness_N_per_m else ()),
-                Signal("stretch_length", ("segment", "sensor"), (n, 1), "m", "length of a segment"),
-                Signal("ring_length", ("muscle",), (n,), "m", "height of a rhombus"),
-                Signal("muscle_force", ("muscle",), (n,), "N", "contractile force of an actuator"),
-                Signal("center_of_mass", ("axis",), (3,), "m", "centre of mass; the front points to -x"),
-                Signal("outline", ("corner", "plane_axis"), (corners, 2), "m", "upper half, front tip first: x and z"),
-                Signal("kinetic_energy", (), (), "J", "kinetic energy"),
-                Signal("elastic_energy", (), (), "J", "energy of springs and walls"),
-                Signal("muscle_work", ("muscle",), (n,), "J", "net work done by an actuator so far"),
-                Signal("positive_work", ("muscle",), (n,), "J", "positive work of an actuator so far, none regained"),
-                Signal("damping_loss", (), (), "J", "energy lost to dampers so far"),
-            ),
-            coords={"segment": list(range(1, n + 1)), "axis": ["x", "y", "z"]},
-            attrs={"plant": self._description, "total_mass_kg": float(self.worm.lump_mass_kg.sum())},
-        )
-
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
-        felt, now = self._sense(), self._state
-        contact = {"contact_force": felt.contact_force_N, "slip_loss": now["slip_loss"].copy()}
-        return {
-            **(contact if self.worm.wall_stiffness_N_per_m else {}),
-            "stretch_length": felt.stretch_m,
-            "ring_length": felt.ring_length_m,
-            "muscle_force": felt.muscle_force_N,
-            "center_of_mass": felt.center_of_mass_m,
+    def _values(self) -> Values:
+        sensed, now = self._sense(), self._now
+        values = {
+            "contact_force": sensed.contact_force_N,
+            "slip_loss": now["slip_loss"].copy(),
+            "stretch_length": sensed.stretch_m,
+            "ring_length": sensed.ring_length_m,
+            "muscle_force": sensed.muscle_force_N,
+            "center_of_mass": sensed.center_of_mass_m,
             "outline": self.worm.places(self._posture)[self.worm.outline],
             "kinetic_energy": self.kinetic_energy_J(),
             "elastic_energy": self.elastic_energy_J(),
@@ -151,17 +132,19 @@ class DynamicPlanarPlant:
             "positive_work": now["positive_work"].copy(),
             "damping_loss": float(now["damping_loss"]),
         }
+        walls = bool(self.worm.wall_stiffness_N_per_m)
+        return {name: value for name, value in values.items() if walls or name not in _OF_WALLS}
 
-    def get_state(self) -> State:
-        """Returns copies of coordinates (m), momenta (kg m/s), last forces (N), energies so far (J) and the steps."""
-        state: State = {name: array.copy() for name, array in self._state.items()}
-        return state | {"n_control_steps": np.array(self._n_control_steps)}
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        return {"segment": list(range(1, self.n_segments + 1)), "axis": ["x", "y", "z"]}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        return {"plant": self.description, "total_mass_kg": float(self.worm.lump_mass_kg.sum())}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
-        self._state = {name: np.array(state[name], dtype=np.float64) for name in self._state}
-        self._n_control_steps = int(state["n_control_steps"])
-        self._posture = self.worm.posture(self._state["q"])
+        super().set_state(state)
+        self._posture = self.worm.posture(self._now["q"])
 
     def alarm(self) -> str | None:
         """Returns a sentence if a side stands upright, a segment is squeezed flat, or a step had no solution."""
@@ -169,7 +152,7 @@ class DynamicPlanarPlant:
         # Written so that NaN fails it.
         if not slope.max() <= _STEEPEST:
             return f"a side rises by {slope.max():.4g} of its length, more than {_STEEPEST:g}: the worm has folded up"
-        height = self.worm.heights(self._state["q"])
+        height = self.worm.heights(self._now["q"])
         if not height.min() > 0.0:
             return f"the height of segment {int(np.argmin(height)) + 1} is {height.min():.4g} m, not above 0"
         if not self._converged:
@@ -182,26 +165,22 @@ class DynamicPlanarPlant:
     def _sense(self) -> Sensation:
         worm, posture = self.worm, self._posture
         contact = np.zeros((self.n_segments, 3))
-        contact[:, 0] = self._state["friction"]
+        contact[:, 0] = self._now["friction"]
         contact[:, 2] = worm.wall_force(posture.q)
         places_x = posture.q[0] + worm.lump_runs @ posture.run
         return Sensation(
-            time_s=self._n_control_steps * self._ratio.control_timestep_s,
+            time_s=int(self._now["n_control_steps"]) * self._ratio.control_timestep_s,
             stretch_m=worm.lengths(posture)[:, np.newaxis],
             rest_stretch_m=self._rest_length_m.copy(),
             ring_length_m=worm.heights(posture.q).copy(),
-            muscle_force_N=self._state["muscle_force"].copy(),
+            muscle_force_N=self._now["muscle_force"].copy(),
             contact_force_N=contact,
             center_of_mass_m=np.array([worm.lump_mass_kg @ places_x / worm.lump_mass_kg.sum(), 0.0, 0.0]),
         )
 
 
-def resting_posture(worm: Linkage) -> Array:
-    """Returns the coordinates of the straight worm in equilibrium without activation, m.
-
-    All segments are equally high and all sides straight, so that hinges carry no load; the height is where return
-    springs and walls balance, found by bisection.
-    """
+def _resting_posture(worm: Linkage) -> Array:
+    """Returns the coordinates of the straight worm, m, at the height where return springs and walls balance."""
     high = worm.body.height_relaxed_m
     low = min(high, 2.0 * worm.wall_radius_m)
     for _ in range(_HALVINGS):

@@ -1,18 +1,13 @@
 """The kinematic tube of Huang et al.: a braided mesh with rigid sides, without forces, in closed form.
 
-Crossings lie on planes across the axis, ``n`` on each, evenly round it and turned by half a step, ``pi / n``, from one
-plane to the next. Neighbours on adjacent planes are joined by straight sides of the one length ``s``. Where planes of
-radii ``R_1`` and ``R_2`` are ``d`` apart,
+Crossings lie on planes across the axis, ``n`` on each, evenly round it and turned by ``pi / n`` from one plane to the
+next. Neighbours on adjacent planes are joined by straight sides of the one length ``s``. Where planes of radii ``R_1``
+and ``R_2`` are ``d`` apart, ``s^2 = d^2 + R_1^2 + R_2^2 - 2 R_1 R_2 cos(pi / n)``. In a uniform tube a rhombus is
+``l = 2 d`` long, a ring through the crossings of a plane measures ``C = 2 n R sin(pi / n)``, and so
 
-    s^2 = d^2 + R_1^2 + R_2^2 - 2 R_1 R_2 cos(pi / n)
+    l^2 + w^2 = 4 s^2   with   w = C / (n cos(pi / 2n)),
 
-In a uniform tube a rhombus is ``l = 2 d`` long, a ring through the crossings of a plane measures
-``C = 2 n R sin(pi / n)``, and so
-
-    l^2 + w^2 = 4 s^2   with   w = C / (n cos(pi / 2n))
-
-which is the planar worm's rhombus with the width ``w``. Ring length against segment length is thus a quarter of an
-ellipse, whatever the forces. Lengths in m.
+the planar worm's rhombus with the width ``w``: ring length against segment length is a quarter of an ellipse.
 
 Source: the construction of Huang et al. as described by Riddle et al. 2023, section 3 ("rigid side lengths", no
 forces); the closed form is derived here.

@@ -26,7 +26,7 @@ import numpy as np
 from annelid.planar.sections import DynamicPlanarWorm
 from annelid.protocols import Array
 
-_NO_WAY_M = 1e-12
+_NO_MOVE_M = 1e-12
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,14 @@ class Linkage:
         body: Springs k_s, dampers d_h, muscles (F_0, h_0, h_s) and number of segments N; the first N coordinates behind
             ``x_0`` are their heights.
         rises: G without the column of ``x_0``, shape ``(n_links, n_coordinates)``.
-        link_length_m: L, shape ``(n_links,)``.
+        link_length_m: L.
         lump_runs: H, shape ``(n_lumps, n_links)``.
         lump_heights: R without the column of ``x_0``, shape ``(n_lumps, n_coordinates)``.
-        lump_mass_kg: m, shape ``(n_lumps,)``; a lump off the axis is counted with its mirror image.
-        vertices: The lump of every segment's upper and lower vertex, shape ``(n_segments,)``.
+        lump_mass_kg: m; a lump off the axis is counted with its mirror image.
+        vertices: The lump of every segment's upper and lower vertex.
         outline: The lumps along the upper half, from the front tip to the rear one.
         segment_runs: E, shape ``(n_segments, n_links)``.
-        straight: Coordinates per height of the worm with straight sides and equal heights, ``(1 + n_coordinates,)``.
+        straight: Coordinates, with ``x_0``, per height of the worm with straight sides and equal heights.
         hinges: B, shape ``(n_hinges, n_links)``.
         torsion_stiffness_Nm_per_rad: k_t.
         torsion_damping_Nms_per_rad: d_t.
@@ -95,9 +95,7 @@ class Linkage:
 
     @cached_property
     def _vertical_mass(self) -> Array:
-        mass = np.zeros((self.n_coordinates, self.n_coordinates))
-        mass[1:, 1:] = self.lump_heights.T @ (self.lump_mass_kg[:, np.newaxis] * self.lump_heights)
-        return mass
+        return _with_front(self.lump_heights.T @ (self.lump_mass_kg[:, np.newaxis] * self.lump_heights))
 
     @cached_property
     def _hinge_stiffness(self) -> Array:
@@ -125,10 +123,7 @@ class Linkage:
         return q[1 : 1 + self.n_segments]
 
     def posture(self, q: Array) -> Posture:
-        """Works out all that depends on the coordinates ``q``, shape ``(n_coordinates,)``, alone.
-
-        A link that would have to be longer than it is has the run NaN.
-        """
+        """Computes all that depends on the coordinates alone; a link that would have to stretch has the run NaN."""
         rise = self.rises @ q[1:]
         with np.errstate(invalid="ignore", divide="ignore"):
             run = np.sqrt(self.link_length_m**2 - rise * rise)
@@ -156,25 +151,19 @@ class Linkage:
         return self.wall_stiffness_N_per_m * np.maximum(self.heights(q) / 2.0 - self.wall_radius_m, 0.0)
 
     def mean_wall_force(self, start: Array, end: Array) -> tuple[Array, Array]:
-        """Averages the walls' force over the way from one posture to another, so that its work is what they store.
+        """Returns the walls' force averaged such that its work is what they store, and its derivative by the end.
 
-        Args:
-            start: Coordinates ``q``, m.
-            end: The same at the end of the way.
-
-        Returns:
-            Mean force on each vertex, N, and its derivative by the height at the end, N/m; ``(n_segments,)`` each.
+        They are of each vertex, in N and N per m of the height at the end, from coordinates ``start`` to ``end``.
         """
         if not self.wall_stiffness_N_per_m:
             return np.zeros(self.n_segments), np.zeros(self.n_segments)
         before = self.heights(start) / 2.0 - self.wall_radius_m
         after = self.heights(end) / 2.0 - self.wall_radius_m
-        way = after - before
-        moves = np.abs(way) > _NO_WAY_M
-        way = np.where(moves, way, 1.0)
+        moves = np.abs(after - before) > _NO_MOVE_M
+        move = np.where(moves, after - before, 1.0)
         squeeze, at_end = np.maximum(before, 0.0), np.maximum(after, 0.0)
-        mean = np.where(moves, 0.5 * (at_end**2 - squeeze**2) / way, 0.5 * (at_end + squeeze))
-        slope = np.where(moves, (at_end - mean) / way, 0.5 * (after > 0.0))
+        mean = np.where(moves, 0.5 * (at_end**2 - squeeze**2) / move, 0.5 * (at_end + squeeze))
+        slope = np.where(moves, (at_end - mean) / move, 0.5 * (after > 0.0))
         return self.wall_stiffness_N_per_m * mean, 0.5 * self.wall_stiffness_N_per_m * slope
 
     def _stretch(self, posture: Posture) -> Array:
@@ -193,17 +182,14 @@ class Linkage:
 
     def kinetic_force(self, posture: Posture, velocity: Array) -> Array:
         """Returns dT/dq at given velocities, N, shape ``(n_coordinates,)``."""
-        force = np.zeros(self.n_coordinates)
         momentum = self.lump_mass_kg * (posture.jacobian @ velocity)
-        force[1:] = self.rises.T @ (posture.run_2 * (self.rises @ velocity[1:]) * (self.lump_runs.T @ momentum))
-        return force
+        by_rise = posture.run_2 * (self.rises @ velocity[1:]) * (self.lump_runs.T @ momentum)
+        return _with_front(self.rises.T @ by_rise)
 
     def spring_force(self, posture: Posture) -> Array:
         """Returns -dU/dq of all springs, without the walls, N, shape ``(n_coordinates,)``."""
         tension, torque = self._link_loads(posture)
-        force = np.zeros(self.n_coordinates)
-        force[1:] = -self.rises.T @ (posture.run_1 * tension + torque / posture.run)
-        return force
+        return _with_front(-self.rises.T @ (posture.run_1 * tension + torque / posture.run))
 
     def spring_stiffness(self, posture: Posture) -> Array:
         """Returns the second derivatives of the springs' energy, N/m, ``(n_coordinates, n_coordinates)``."""
@@ -211,15 +197,12 @@ class Linkage:
         by_rise = posture.run_1[:, np.newaxis] * self._segment_stiffness * posture.run_1
         by_rise += self._hinge_stiffness / (posture.run[:, np.newaxis] * posture.run)
         by_rise += np.diag(posture.run_2 * tension + posture.rise / posture.run**3 * torque)
-        stiffness = np.zeros((self.n_coordinates, self.n_coordinates))
-        stiffness[1:, 1:] = self.rises.T @ by_rise @ self.rises
-        return stiffness
+        return _with_front(self.rises.T @ by_rise @ self.rises)
 
     def damping(self, posture: Posture) -> Array:
         """Returns the matrix of viscous resistances, N s/m, shape ``(n_coordinates, n_coordinates)``."""
-        matrix = np.zeros((self.n_coordinates, self.n_coordinates))
         by_rise = self._hinge_damping / (posture.run[:, np.newaxis] * posture.run)
-        matrix[1:, 1:] = self.rises.T @ by_rise @ self.rises
+        matrix = _with_front(self.rises.T @ by_rise @ self.rises)
         heights = np.arange(1, 1 + self.n_segments)
         matrix[heights, heights] += self.body.height_damping_Ns_per_m
         return matrix
@@ -228,3 +211,10 @@ class Linkage:
         """Derivatives of U by the runs (N) and by the slopes (N m) of the links."""
         tension = self.body.spring_stiffness_N_per_m * (self.segment_runs.T @ self._stretch(posture))
         return tension, self._hinge_stiffness @ self.slopes(posture)
+
+
+def _with_front(part: Array) -> Array:
+    """Puts zeros for the coordinate ``x_0`` before a vector or a matrix."""
+    whole = np.zeros([n + 1 for n in part.shape])
+    whole[(slice(1, None),) * part.ndim] = part
+    return whole

@@ -5,71 +5,43 @@ One step of length ``dt`` from coordinates and momenta ``(q_0, p_0)``: with the 
 
     M(q_m) u - dt/2 [dT/dq + Q](q_m, u) - dt/2 J^T f = p_0,     q_1 = q_0 + dt u,     p_1 = 2 M(q_m) u - p_0
 
-where ``Q`` holds springs, walls, dampers and muscles, ``J u`` is the slip of the vertices along the wall and ``f``
+where ``Q`` has springs, walls, dampers and muscles, ``J u`` is the slip of the vertices along the wall and ``f``
 their friction, ``|f| <= 2 mu N`` for the two vertices of a segment. The force ``N`` of a wall, which has a kink, is its
-mean over the way from ``q_0`` to ``q_1``, so that its work is what the wall stores (a discrete gradient, Gonzalez
-1996). Without walls, dampers, friction and muscles the rule is symplectic and of second order (Marsden and West 2001),
-so that the energy's error stays bounded, and the momentum along the body is kept. ``u`` is found by Newton's method
-with the friction's complementarity problem solved in each iteration.
+mean from ``q_0`` to ``q_1``, so that its work is what the wall stores (a discrete gradient, Gonzalez 1996). Without
+walls, dampers, friction and muscles the rule is symplectic and of second order (Marsden and West 2001), so that the
+energy's error stays bounded, and the momentum along the body is kept. ``u`` is found by Newton's method with the
+friction's complementarity problem solved in each iteration.
 
-Vertices that stick do not move at all during the step. An impulse at its end takes away the velocity that they had
-kept at its beginning; what that costs is work lost to friction, and so is ``-f J u dt`` of the sliding ones.
+Vertices that stick do not move during the step. An impulse at its end takes away the velocity that they had at its
+beginning; what that costs is work lost to friction, and so is ``-f J u dt`` of the sliding ones.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from annelid.planar.friction import coulomb
 from annelid.planar.linkage import Linkage
 from annelid.protocols import Array
 
 _ITERATIONS = 50
 _TOLERANCE_M_PER_S = 1e-9
+_FRICTION_ROUNDS = 30
+_FRICTION_SWEEPS = 2000
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
-    """The outcome of one step.
+def midpoint_step(
+    worm: Linkage, now: dict[str, NDArray[Any]], activation: Array, timestep_s: float
+) -> tuple[dict[str, Array], bool]:
+    """Returns the state of a worm one step on, and whether Newton's method has converged.
 
-    Attributes:
-        q: Coordinates at its end, m.
-        p: Momenta at its end, kg m/s.
-        muscle_force_N: Contractile force, shape ``(n_segments,)``, in the middle of the step.
-        wall_force_N: Force of the wall on each of a segment's two vertices, likewise.
-        friction_N: Friction on both vertices of a segment together along x, likewise.
-        muscle_work_J: Work done by every muscle.
-        damping_loss_J: Energy lost to the dampers.
-        slip_loss_J: Energy lost to friction by every segment.
-        converged: Whether Newton's method did.
+    The state is: coordinates ``q``, m, and momenta ``p``, kg m/s, NaN where a link would have had to stretch;
+    ``muscle_force`` and ``friction`` (on both vertices of a segment together, along x) in the middle of the last step,
+    N; the energies so far ``muscle_work``, ``positive_work`` and ``slip_loss`` of a segment, and ``damping_loss``, J.
     """
-
-    q: Array
-    p: Array
-    muscle_force_N: Array
-    wall_force_N: Array
-    friction_N: Array
-    muscle_work_J: Array
-    damping_loss_J: float
-    slip_loss_J: Array
-    converged: bool
-
-
-def midpoint_step(worm: Linkage, q: Array, p: Array, activation: Array, timestep_s: float) -> Step:
-    """Advances a worm by one step.
-
-    Args:
-        worm: The worm.
-        q: Coordinates, m, shape ``(n_coordinates,)``.
-        p: Momenta, kg m/s, same shape.
-        activation: Activation of the muscles in [0, 1], shape ``(n_segments,)``.
-        timestep_s: Length of the step, s.
-
-    Returns:
-        The outcome; it holds NaN where a link would have had to stretch.
-    """
+    q, p = now["q"], now["p"]
     half = 0.5 * timestep_s
     heights = np.arange(1, 1 + worm.n_segments)
     pull_stiffness = worm.muscle_stiffness(activation)
@@ -105,22 +77,23 @@ def midpoint_step(worm: Linkage, q: Array, p: Array, activation: Array, timestep
     middle = worm.posture(q + half * velocity)
     pull = worm.muscle_force(activation, middle.q)
     end = q + timestep_s * velocity
-    normal, _ = worm.mean_wall_force(q, end)
-    momentum = 2.0 * middle.mass @ velocity - p
     sticks = np.abs(friction) < limit
-    momentum, lost_in_stopping = _stop(worm, end, momentum, sticks)
+    momentum, stopping_loss = _stop(worm, end, 2.0 * middle.mass @ velocity - p, sticks)
     slip = middle.jacobian[worm.vertices] @ velocity
-    return Step(
-        q=end,
-        p=momentum,
-        muscle_force_N=pull,
-        wall_force_N=normal,
-        friction_N=friction,
-        muscle_work_J=-timestep_s * pull * worm.heights(velocity),
-        damping_loss_J=timestep_s * float(velocity @ worm.damping(middle) @ velocity),
-        slip_loss_J=lost_in_stopping - timestep_s * friction * np.where(sticks, 0.0, slip),
-        converged=converged,
-    )
+    work = -timestep_s * pull * worm.heights(velocity)
+    after = {
+        "q": end,
+        "p": momentum,
+        "muscle_force": pull,
+        "friction": friction,
+        "muscle_work": now["muscle_work"] + work,
+        "positive_work": now["positive_work"] + np.maximum(work, 0.0),
+        "slip_loss": now["slip_loss"] + (stopping_loss - timestep_s * friction * np.where(sticks, 0.0, slip)),
+        "damping_loss": np.asarray(
+            now["damping_loss"] + timestep_s * float(velocity @ worm.damping(middle) @ velocity)
+        ),
+    }
+    return after, converged
 
 
 def _stop(worm: Linkage, q: Array, p: Array, sticks: np.ndarray) -> tuple[Array, Array]:
@@ -135,3 +108,38 @@ def _stop(worm: Linkage, q: Array, p: Array, sticks: np.ndarray) -> tuple[Array,
     impulse = np.linalg.solve(slip_of @ answers[:, 1:], -slip)
     loss[sticks] = -0.5 * impulse * slip
     return p + slip_of.T @ impulse, loss
+
+
+def coulomb(mobility: Array, free_slip: Array, limit: Array) -> Array:
+    """Finds the friction forces ``f`` of all contacts at once, as a complementarity problem.
+
+    With the slip ``v = free_slip + mobility f`` each contact has ``v = 0`` and ``|f| <= limit`` (it sticks), or
+    ``f = -limit sign(v)`` (it slides). For a positive definite mobility there is exactly one solution. Contacts are
+    guessed to stick or slide and the guess is corrected until it is right; where the corrections go round in a circle,
+    projected Gauss-Seidel takes over. Mobility is slip per force, and the free slip that without friction.
+    """
+    slides = np.where(limit > 0.0, 0.0, -1.0)
+    own = np.eye(len(limit))
+    for _ in range(_FRICTION_ROUNDS):
+        stick, at_limit = slides == 0.0, -slides * limit
+        system = np.where(stick[:, np.newaxis], mobility, own)
+        force = np.where(stick, np.linalg.solve(system, np.where(stick, -free_slip, at_limit)), at_limit)
+        slip = free_slip + mobility @ force
+        too_much = stick & (np.abs(force) > limit)
+        reversed_ = ~stick & (slip * slides < 0.0) & (limit > 0.0)
+        if not (too_much.any() or reversed_.any()):
+            return force
+        slides = np.where(too_much, -np.sign(force), np.where(reversed_, 0.0, slides))
+    return _gauss_seidel(mobility, free_slip, limit)
+
+
+def _gauss_seidel(mobility: Array, free_slip: Array, limit: Array) -> Array:
+    force = np.zeros_like(free_slip)
+    for _ in range(_FRICTION_SWEEPS):
+        before = force.copy()
+        for i in range(len(force)):
+            slip = free_slip[i] + mobility[i] @ force
+            force[i] = min(max(force[i] - slip / mobility[i, i], -limit[i]), limit[i])
+        if np.abs(force - before).max() <= 1e-13 * limit.max():
+            break
+    return force

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from annelid.clock import StepRatio
 from annelid.config.sections import Positive
 from annelid.errors import ConfigError
 from annelid.planar.sections import PlanarWorm
-from annelid.protocols import Array, Recordable, Sensation, Signal, State
+from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
 
 if TYPE_CHECKING:
     from annelid.config.run import Clock, RunConfig
@@ -22,51 +20,27 @@ if TYPE_CHECKING:
 class PlanarBody(PlanarWorm):
     """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
 
-    cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2022", "the planar worm"),)
-    touches_ground: ClassVar[bool] = False
+    cites = (("riddle2022", "the planar worm"),)
+    touches_ground = False
     kind: Literal["riddle2022"] = "riddle2022"
-    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    heights = ("height_min_m", "height_max_m")
     height_min_m: Positive = Field(default=0.065, description="height when contracted")
     height_max_m: Positive = Field(default=0.11, description="height when relaxed")
     gain: Positive = Field(
         default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
     )
 
-    @model_validator(mode="after")
-    def _heights_fit_the_rhombus(self) -> Self:
-        if not self.height_min_m < self.height_max_m < 2 * self.side_m:
-            raise ValueError(
-                f"body.height_min_m = {self.height_min_m:g} and body.height_max_m = {self.height_max_m:g} must satisfy "
-                f"height_min_m < height_max_m < 2 side_m = {2 * self.side_m:g}"
-            )
-        return self
-
-    def published_period_s(self, config: RunConfig) -> float | None:
-        """Returns the period that the authors' code gives for their time constants and gains, s."""
-        gate_ms = float(getattr(config.controller, "gate_time_constant_ms", 0.0))
-        return _PUBLISHED_PERIODS_S.get((self.n_segments, gate_ms, self.gain))
-
     def build(self, config: RunConfig) -> Riddle2022Plant:
         """Builds the worm, as `BodyKind.build`."""
         return Riddle2022Plant(self, config.clock)
 
-
-# (segments, tau_h,max in ms, gain): period in s.
-_PUBLISHED_PERIODS_S = {
-    (3, 300.0, 1.3): 2.625,
-    (6, 300.0, 1.3): 5.250,
-    (3, 200.0, 1.9): 1.867,
-    (6, 200.0, 1.9): 3.734,
-    (3, 100.0, 3.6): 1.124,
-    (6, 100.0, 3.6): 2.248,
-}
 
 # A spool at 20 turns a minute takes up 2 pi 20 / 60 cm/s per cm of radius; the authors' loop moves 1/300 of that
 # number a millisecond for each unit of gain and of height error, so per second it is 1000 / 300 of it.
 _RATE_PER_S = 2.0 * np.pi * 20.0 / 60.0 / 300.0 * 1000.0
 
 
-class Riddle2022Plant:
+class Riddle2022Plant(SavedAndRecorded):
     """A chain of rhombi: each height follows its activation, each length follows from the rigid sides.
 
     Heights are commanded to ``h_max - activation (h_max - h_min)`` and approach it in proportion to the gap,
@@ -79,6 +53,12 @@ class Riddle2022Plant:
     Raises:
         ConfigError: ``gain`` times the physics step is so long that heights would overshoot their targets.
     """
+
+    recorded = (
+        ("stretch_length", ("segment", "sensor"), "m", "length of a segment"),
+        ("ring_length", ("muscle",), "m", "height of a rhombus"),
+        ("center_of_mass", ("axis",), "m", "NaN: a kinematic worm does not travel"),
+    )
 
     def __init__(self, body: PlanarBody, clock: Clock) -> None:
         """Builds the worm in its initial posture.
@@ -102,96 +82,64 @@ class Riddle2022Plant:
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the initial posture at time zero; nothing here is random."""
-        self._height_m = np.full(self.n_segments, self._body.height_max_m)
-        self._height_m[0] = self._body.height_min_m
-        self._n_control_steps = 0
+        height_m = np.full(self.n_segments, self._body.height_max_m)
+        height_m[0] = self._body.height_min_m
+        self._now = {"height": height_m, "n_control_steps": np.array(0)}
         return self.sense()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step.
-
-        Args:
-            activation: Shape ``(n_segments,)``, in [0, 1]; 1 commands the smallest height.
-
-        Returns:
-            The sensation at its end.
-        """
-        self._n_control_steps += 1
-        self._move(self._height_m, activation, self._n_control_steps)
+        """Advances by one control step, as `annelid.Plant.step`; activation 1 commands the smallest height."""
+        self._now = self.step_copies(self._now, activation)
         return self.sense()
 
     def sense(self) -> Sensation:
-        """Returns what the body feels at this instant."""
-        return self._sensation(self._height_m, self._n_control_steps)
+        """Returns what the body senses at this instant."""
+        return self.sense_copies(self._now)
 
     def step_copies(self, states: State, activation: Array) -> State:
         """Advances many copies by one control step at once, as `step` does one; changes nothing here.
 
         Args:
-            states: As `get_state` returns them, the heights with one more axis in front, ``n_copies`` long.
+            states: As `get_state` returns them, the heights (m) with one more axis in front, ``n_copies`` long.
             activation: Shape ``(n_copies, n_segments)``.
 
         Returns:
             The states one step on.
         """
-        height, n_control_steps = states["height"].astype(np.float64), int(states["n_control_steps"]) + 1
-        self._move(height, activation, n_control_steps)
-        return {"height": height, "n_control_steps": np.array(n_control_steps)}
-
-    def sense_copies(self, states: State) -> Sensation:
-        """Returns what many copies feel: every array with their axis in front, and one time for all."""
-        return self._sensation(states["height"].astype(np.float64), int(states["n_control_steps"]))
-
-    def recordable(self) -> Recordable:
-        """Names lengths, heights and the (absent) centre of mass."""
-        n = self.n_segments
-        return Recordable(
-            signals=(
-                Signal("stretch_length", ("segment", "sensor"), (n, 1), "m", "length of a segment"),
-                Signal("ring_length", ("muscle",), (n,), "m", "height of a rhombus"),
-                Signal("center_of_mass", ("axis",), (3,), "m", "NaN: a kinematic worm does not travel"),
-            ),
-            coords={"segment": list(range(1, n + 1)), "axis": ["x", "y", "z"]},
-            attrs={"plant": "planar kinematic worm of Riddle et al. 2022"},
-        )
-
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
-        """Reads the signals that `recordable` names; there are none at frame rate."""
-        if frame:
-            return {}
-        return {
-            "stretch_length": self._length(self._height_m)[:, np.newaxis],
-            "ring_length": self._height_m.copy(),
-            "center_of_mass": np.full(3, np.nan),
-        }
-
-    def get_state(self) -> State:
-        """Returns copies of the heights (m) and the number of control steps taken."""
-        return {"height": self._height_m.copy(), "n_control_steps": np.array(self._n_control_steps)}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        self._height_m[...] = state["height"]
-        self._n_control_steps = int(state["n_control_steps"])
-
-    def _move(self, height_m: Array, activation: Array, n_control_steps: int) -> None:
-        """Moves heights, ``(.., n_segments)``, in place by the physics steps that this control step completes."""
-        body = self._body
+        body, height_m = self._body, states["height"].astype(np.float64)
+        n_control_steps = int(states["n_control_steps"]) + 1
         target = body.height_max_m - np.asarray(activation) * (body.height_max_m - body.height_min_m)
         for _ in range(self._ratio.physics_steps_due(n_control_steps)):
             height_m += self._approach * (target - height_m)
+        return {"height": height_m, "n_control_steps": np.array(n_control_steps)}
 
-    def _length(self, height_m: Array) -> Array:
-        return np.sqrt((2.0 * self._body.side_m) ** 2 - height_m * height_m)
-
-    def _sensation(self, height_m: Array, n_control_steps: int) -> Sensation:
+    def sense_copies(self, states: State) -> Sensation:
+        """Returns what many copies sense: every array with their axis in front, and one time for all."""
+        height_m = states["height"].astype(np.float64)
         copies = height_m.shape[:-1]
         return Sensation(
-            time_s=n_control_steps * self._ratio.control_timestep_s,
+            time_s=int(states["n_control_steps"]) * self._ratio.control_timestep_s,
             stretch_m=self._length(height_m)[..., np.newaxis],
             rest_stretch_m=self._rest_length_m + np.zeros((*copies, 1, 1)),
-            ring_length_m=height_m.copy(),
+            ring_length_m=height_m,
             muscle_force_N=np.full(height_m.shape, np.nan),
             contact_force_N=np.zeros((*height_m.shape, 3)),
             center_of_mass_m=np.full((*copies, 3), np.nan),
         )
+
+    def _values(self) -> Values:
+        sensed = self.sense()
+        return {
+            "stretch_length": sensed.stretch_m,
+            "ring_length": sensed.ring_length_m,
+            "center_of_mass": sensed.center_of_mass_m,
+        }
+
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        return {"segment": list(range(1, self.n_segments + 1)), "axis": ["x", "y", "z"]}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        return {"plant": "planar kinematic worm of Riddle et al. 2022"}
+
+    def _length(self, height_m: Array) -> Array:
+        return np.sqrt((2.0 * self._body.side_m) ** 2 - height_m * height_m)

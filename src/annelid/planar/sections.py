@@ -14,12 +14,24 @@ if TYPE_CHECKING:
 
 
 class PlanarWorm(BodyKind):
-    """What every planar worm has: its segments are rhombi in a row."""
+    """What every planar worm has: its segments are rhombi in a row, of ``heights`` from one field to another."""
 
-    is_planar: ClassVar[bool] = True
+    is_planar = True
     n_segments: Annotated[int, Field(ge=3, le=200)] = Field(  # pyright: ignore[reportIncompatibleMethodOverride]
         default=3, description="actuated segments"
     )
+    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    heights: ClassVar[tuple[str, str]]
+
+    @model_validator(mode="after")
+    def _heights_fit_the_rhombus(self) -> Self:
+        low, high = self.heights
+        if not getattr(self, low) < getattr(self, high) < 2 * self.side_m:
+            raise ValueError(
+                f"body.{low} = {getattr(self, low):g} and body.{high} = {getattr(self, high):g} must satisfy "
+                f"{low} < {high} < 2 side_m = {2 * self.side_m:g}"
+            )
+        return self
 
     def check_with(self, config: RunConfig) -> None:
         """Checks that no arena is given."""
@@ -34,7 +46,7 @@ class DynamicPlanarWorm(PlanarWorm):
     balance near its contracted height, the damper gives its time constant of about 0.1 s.
     """
 
-    side_m: Positive = Field(default=0.073, description="side of a rhombus")
+    heights = ("height_shortest_m", "height_relaxed_m")
     height_relaxed_m: Positive = Field(default=0.11, description="height at which the return spring is slack")
     height_shortest_m: Positive = Field(default=0.055, description="height at which a muscle's force has fallen to 0")
     joint_mass_kg: Positive = Field(default=0.05, description="mass of a joint on the axis")
@@ -44,13 +56,3 @@ class DynamicPlanarWorm(PlanarWorm):
     height_damping_Ns_per_m: NonNegative = Field(
         default=35.0, description="viscous resistance to a change of a segment's height"
     )
-
-    @model_validator(mode="after")
-    def _heights_fit_the_rhombus(self) -> Self:
-        if not self.height_shortest_m < self.height_relaxed_m < 2 * self.side_m:
-            raise ValueError(
-                f"body.height_shortest_m = {self.height_shortest_m:g} and body.height_relaxed_m = "
-                f"{self.height_relaxed_m:g} must satisfy height_shortest_m < height_relaxed_m < 2 side_m = "
-                f"{2 * self.side_m:g}"
-            )
-        return self

@@ -1,6 +1,6 @@
 """The loop of plant, controller and clock, and the run file it writes.
 
-The 3D worm and the steps of the loop are loaded on first use, with the engine.
+The 3D worm and the lock of a folder are loaded on first use.
 """
 
 from __future__ import annotations
@@ -8,13 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from annelid.lazy import lazy
-from annelid.simulation.assemble import build_controller, build_plant
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run, open_run
+from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 
 if TYPE_CHECKING:
     from annelid.simulation.lock import locks
-    from annelid.simulation.stepping import Simulation, start
     from annelid.simulation.worm import WormPlant, compile_worm
 
 __all__ = [

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from annelid.arena.contact import set_friction
+from annelid.arena.geoms import set_friction
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import State, Stateful
-from annelid.simulation.assemble import build_controller, build_plant
-from annelid.simulation.stepping import Simulation
+from annelid.simulation.stepping import Simulation, build_controller, build_plant
 from annelid.simulation.worm import WormPlant
 
 Part = TypeVar("Part")
@@ -19,13 +18,8 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
     """Returns a simulation under another configuration, in the state of a running one that is not to be used any more.
 
     Friction is changed in the compiled model, which takes microseconds. For anything else in the body, its ground or
-    the clock the body is built anew and takes over the old one's state; so does the controller. Either way the worm
+    the clock the body is built anew and takes over the old one's state; so does the controller. In both cases the worm
     moves on as one does that was built with the new values and brought into this state.
-
-    Args:
-        running: Plant, controller and noise, whose plant and controller can be saved.
-        before: The configuration that it was built with, or last adjusted to.
-        after: Another, with as many coordinates, muscles and neurons.
 
     Raises:
         ConfigError: The new body or controller cannot be built, or has other states than the running one.

@@ -1,4 +1,4 @@
-"""The state of a whole simulation as bytes, and the two slots of a run file that hold it.
+"""The state of a whole simulation as bytes, and the two slots of a run file that carry it.
 
 The slots are written in turn. Each carries a sequence number and a checksum, so that a slot torn by a kill is
 noticed and the other one, at most one checkpoint older, is used.
@@ -22,24 +22,16 @@ from annelid.protocols import Sensation, State
 
 _HEADER = struct.Struct("<qqI")  # sequence number, length of the payload, CRC-32 of both and the payload
 _NUMBERS = struct.Struct("<qq")
-_WORD = (1 << 64) - 1
+_WORD = 1 << 64
 
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
-    """All that the next control step depends on.
+    """All that the next control step depends on."""
 
-    Attributes:
-        step: Control steps taken since time zero.
-        sensation: The plant's latest sensation, without noise.
-        noise: State of the generator of the sensor noise, as `generator_state` gives it.
-        plant: The plant's own state.
-        controller: The controller's own state.
-    """
-
-    step: int
-    sensation: Sensation
-    noise: NDArray[np.uint64]
+    step: int  # control steps taken since time zero
+    sensation: Sensation  # the plant's latest, without noise
+    noise: NDArray[np.uint64]  # state of the generator of the sensor noise, as `generator_state` gives it
     plant: State
     controller: State
 
@@ -57,15 +49,9 @@ class Checkpoint:
         return arrays | {f"controller/{name}": value for name, value in self.controller.items()}
 
     def misfit(self, fresh: Checkpoint, timestep_s: float, last_step: int) -> str | None:
-        """Tells why plant and controller cannot be in this state.
+        """Returns why plant and controller cannot be in this state, or None where they can.
 
-        Args:
-            fresh: The checkpoint of the same plant and controller at time zero.
-            timestep_s: Control step, s.
-            last_step: Control steps of the whole run that it is of.
-
-        Returns:
-            The reason, or None where they can.
+        Given are their checkpoint at time zero, the control step, and how many of these the whole run has.
         """
         if not 0 <= self.step <= last_step:
             return f"its step is {self.step}, not in 0 .. {last_step}"
@@ -105,14 +91,9 @@ class Checkpoint:
                     raise ValueError("its checkpoint is packed as no checkpoint is")
                 group, _, name = entry.filename.removesuffix(".npy").partition("/")
                 groups[group][name] = _array(archive.read(entry))
-        time_s = float(groups["sensation"].pop("time_s"))
-        return cls(
-            step=int(groups["loop"]["step"]),
-            sensation=Sensation(time_s=time_s, **groups["sensation"]),
-            noise=groups["loop"]["noise"],
-            plant=groups["plant"],
-            controller=groups["controller"],
-        )
+        sensed, loop = groups["sensation"], groups["loop"]
+        sensation = Sensation(time_s=float(sensed.pop("time_s")), **sensed)
+        return cls(int(loop["step"]), sensation, loop["noise"], groups["plant"], groups["controller"])
 
 
 def _array(packed: bytes) -> NDArray[Any]:
@@ -161,9 +142,8 @@ def slot_capacity(payload: bytes) -> int:
 def generator_state(generator: np.random.Generator) -> NDArray[np.uint64]:
     """Returns the state of a PCG64 generator as six 64-bit words, shape ``(6,)``."""
     state: Any = generator.bit_generator.state
-    words: list[int] = []
-    for value in (state["state"]["state"], state["state"]["inc"]):
-        words += [value >> 64, value & _WORD]
+    numbers = state["state"]["state"], state["state"]["inc"]
+    words = [word for number in numbers for word in divmod(number, _WORD)]
     return np.array([*words, state["has_uint32"], state["uinteger"]], dtype=np.uint64)
 
 
@@ -175,12 +155,9 @@ def restore_generator(words: NDArray[np.uint64]) -> np.random.Generator:
     """
     if words.shape != (6,) or words.dtype != np.uint64 or not words[3] & 1 or words[4] > 1 or words[5] >> 32:
         raise ValueError("no generator of noise has the state that it holds")
-    high, low, inc_high, inc_low, has_uint32, uinteger = (int(word) for word in words)
+    high, low, inc_high, inc_low, has_uint32, uinteger = words.tolist()
+    numbers = {"state": high * _WORD + low, "inc": inc_high * _WORD + inc_low}
+    state: Any = {"bit_generator": "PCG64", "state": numbers, "has_uint32": has_uint32, "uinteger": uinteger}
     bits = np.random.PCG64()
-    bits.state = {
-        "bit_generator": "PCG64",
-        "state": {"state": high << 64 | low, "inc": inc_high << 64 | inc_low},
-        "has_uint32": has_uint32,
-        "uinteger": uinteger,
-    }
+    bits.state = state
     return np.random.Generator(bits)

@@ -11,55 +11,43 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.errors import RunFileError
+from annelid.output import whole_file
 from annelid.simulation import digest
 from annelid.simulation.digest import Extent
 
-_MEGABYTE = 1e6
 _METADATA_BYTES = 262_144
 
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One variable of the file.
+    """One variable of the file."""
 
-    Attributes:
-        name: Its name; ``group/name`` puts it into a group.
-        dims: Names of its dimensions; a variable in a group may use the root's.
-        units: Unit in CF's form.
-        long_name: What it is, in words.
-        dtype: Little-endian numpy dtype, for example ``"<f8"``; ``"str"`` for labels.
-        data: Its content, or None for one that is filled (floats with NaN) and overwritten during the run.
-        attrs: Further attributes.
-    """
-
-    name: str
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    dtype: str = "<f8"
-    data: Any = None
-    attrs: Mapping[str, Any] = field(default_factory=dict)
+    name: str  # ``group/name`` puts it into a group
+    dims: tuple[str, ...]  # a variable in a group may use the root's
+    units: str  # in CF's form
+    long_name: str  # what it is, in words
+    dtype: str = "<f8"  # little-endian numpy dtype; "str" for labels
+    data: Any = None  # None for one that is filled (floats with NaN) and overwritten during the run
+    attrs: Mapping[str, Any] = field(default_factory=dict)  # further ones
 
 
 def needed_bytes(sizes: Mapping[str, int], variables: Sequence[Variable]) -> int:
     """Returns the size of the file, rounded up by a generous share for its metadata."""
-    total = _METADATA_BYTES
-    for variable in variables:
-        itemsize = 64 if variable.dtype == "str" else np.dtype(variable.dtype).itemsize
-        total += itemsize * prod(sizes[dim] for dim in variable.dims) + 2048
-    return total
+    itemsizes = (64 if variable.dtype == "str" else np.dtype(variable.dtype).itemsize for variable in variables)
+    counts = (prod(sizes[dim] for dim in variable.dims) for variable in variables)
+    numbers = sum(itemsize * count for itemsize, count in zip(itemsizes, counts, strict=True))
+    return _METADATA_BYTES + numbers + 2048 * len(variables)
 
 
 def create(
@@ -67,48 +55,36 @@ def create(
 ) -> dict[str, Extent]:
     """Lays out the file, making its folder if needed; it appears under its name only when it is complete.
 
-    Args:
-        path: The file; one that exists is replaced.
-        sizes: Size of every dimension.
-        variables: All variables.
-        attrs: Global attributes.
-
-    Returns:
-        Where each variable lies in the file.
+    One that exists is replaced. Returns where each variable lies in the file.
 
     Raises:
         RunFileError: The folder cannot be made or written, or the disk has no room. Nothing is left behind.
     """
-    draft = path.with_name(f".{path.name}.part")
-    made: list[Path] = []
+    needed, made = needed_bytes(sizes, variables), not path.parent.exists()
     try:
-        made += [folder for folder in (path.parent, *path.parent.parents) if not folder.exists()]
-        _check_room(path, made, needed_bytes(sizes, variables))
         path.parent.mkdir(parents=True, exist_ok=True)
-        _try_room(draft, needed_bytes(sizes, variables))
-        extents = _lay_out(draft, sizes, variables, attrs)
-        with open(draft, "r+b") as handle:
-            handle.write(digest.room(extents, handle.seek(0, os.SEEK_END)))
-            handle.flush()
-            os.fsync(handle.fileno())
-        os.replace(draft, path)
-    # HDF5 reports a failed write as an OSError or, while it closes the file, as a RuntimeError.
-    except (OSError, RuntimeError) as error:
-        _remove(draft, made)
-        raise RunFileError(f"cannot write the run file {path}: {_reason(error)}") from None
-    except BaseException:
-        _remove(draft, made)
+        free = shutil.disk_usage(path.parent).free
+        if free < needed:
+            raise RunFileError(
+                f"no room for the run file {path}: it needs {needed / 1e6:.1f} MB and {free / 1e6:.1f} MB are free; "
+                "free some, shorten duration_s or record less often"
+            )
+        with whole_file(path) as draft:
+            _try_room(draft, needed)
+            extents = _lay_out(draft, sizes, variables, attrs)
+            with open(draft, "r+b") as handle:
+                handle.write(digest.room(extents, handle.seek(0, os.SEEK_END)))
+                handle.flush()
+                os.fsync(handle.fileno())
+    except BaseException as error:
+        if made:
+            with suppress(OSError):
+                path.parent.rmdir()
+        # HDF5 reports a failed write as an OSError or, while it closes the file, as a RuntimeError.
+        if isinstance(error, OSError | RuntimeError):
+            raise RunFileError(f"cannot write the run file {path}: {_reason(error)}") from None
         raise
     return extents
-
-
-def _check_room(path: Path, made: Sequence[Path], needed: int) -> None:
-    free = shutil.disk_usage(made[-1].parent if made else path.parent).free
-    if free < needed:
-        raise RunFileError(
-            f"no room for the run file {path}: it needs {needed / _MEGABYTE:.1f} MB and "
-            f"{free / _MEGABYTE:.1f} MB are free; free some, shorten duration_s or record less often"
-        )
 
 
 def _try_room(draft: Path, needed: int) -> None:
@@ -122,13 +98,6 @@ def _try_room(draft: Path, needed: int) -> None:
             needed -= handle.write(chunk[: min(needed, len(chunk))])
 
 
-def _remove(draft: Path, made: Sequence[Path]) -> None:
-    with suppress(OSError):
-        draft.unlink(missing_ok=True)
-        for folder in made:
-            folder.rmdir()
-
-
 def _reason(error: BaseException) -> str:
     return getattr(error, "strerror", None) or str(error).splitlines()[0]
 
@@ -139,6 +108,10 @@ def _lay_out(
     import h5netcdf
     import h5py
 
+    allocated_at_once = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    allocated_at_once.set_layout(h5py.h5d.CONTIGUOUS)
+    allocated_at_once.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    allocated_at_once.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     # Offsets at multiples of 8 keep every number within one memory page, hence whole after a kill.
     alignment: dict[str, Any] = {"alignment_threshold": 0, "alignment_interval": 8}
     with h5netcdf.File(path, "w", libver="earliest", **alignment) as file:
@@ -154,7 +127,7 @@ def _lay_out(
                 # h5py passes no creation properties for a scalar; writing it allocates it.
                 options["data"] = np.zeros((), dtype=variable.dtype)
             else:
-                options["dcpl"] = _allocated_at_once()
+                options["dcpl"] = allocated_at_once.copy()
                 if np.dtype(variable.dtype).kind == "f":
                     options["fillvalue"] = np.nan
             created = file.create_variable(variable.name, variable.dims, **options)
@@ -162,16 +135,6 @@ def _lay_out(
     with h5py.File(path, "r") as file:
         stored = {variable.name: file[variable.name].id for variable in variables}
         return {name: (dataset.get_offset(), dataset.get_storage_size()) for name, dataset in stored.items()}
-
-
-def _allocated_at_once() -> Any:
-    import h5py
-
-    properties = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    properties.set_layout(h5py.h5d.CONTIGUOUS)
-    properties.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-    properties.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
-    return properties
 
 
 class RawWriter:
@@ -184,11 +147,17 @@ class RawWriter:
     def __init__(self, path: Path, extents: Mapping[str, Extent]) -> None:
         self._path = path
         self._extents = extents
-        try:
+        with self._named():
             # Unbuffered, so that what was written is the operating system's even if this process dies.
             self._file = open(path, "r+b", buffering=0)  # noqa: SIM115
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
         except OSError as error:
-            raise self._failure(error) from None
+            words = f"cannot write the run file {self._path}: {_reason(error)}; what was written before is kept"
+            raise RunFileError(words) from None
 
     @property
     def closed(self) -> bool:
@@ -197,40 +166,16 @@ class RawWriter:
 
     def write(self, name: str, content: NDArray[np.generic] | bytes, skip_bytes: int = 0) -> None:
         """Overwrites a variable's bytes, from ``skip_bytes`` after its start on."""
-        rest = memoryview(content if isinstance(content, bytes) else np.ascontiguousarray(content).tobytes())
-        try:
+        with self._named():
             self._file.seek(self._extents[name][0] + skip_bytes)
-            while rest:
-                rest = rest[self._file.write(rest) :]
-        except OSError as error:
-            raise self._failure(error) from None
+            digest.write_whole(self._file, content if isinstance(content, bytes) else content.tobytes())
 
-    def write_digest(self) -> None:
-        """Writes the digest of the file as it is, which is not to change any more."""
-        try:
+    def finish(self) -> None:
+        """Writes the digest of the file, which is not to change any more, and hands everything to the disk."""
+        with self._named():
             digest.write(self._file, self._extents)
-        except OSError as error:
-            raise self._failure(error) from None
+            os.fsync(self._file.fileno())
 
     def close(self) -> None:
-        """Hands everything to the disk and closes the file."""
-        try:
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            raise self._failure(error) from None
-        finally:
-            self._file.close()
-
-    def _failure(self, error: OSError) -> RunFileError:
-        return RunFileError(
-            f"cannot write the run file {self._path}: {_reason(error)}; what was written before is kept"
-        )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if not self._file.closed:
-            self._file.close()
+        """Closes the file."""
+        self._file.close()

@@ -2,7 +2,7 @@
 
 It lies behind the HDF5 data, where HDF5 does not look, in room that is there from the start: a table of SHA-256 sums,
 one line for each variable and one for all other bytes, and a footer with the sum of the table. So it covers every
-byte. The sum in the footer is written last and is zero until then: a run that was killed carries none. It tells damage,
+byte. The sum in the footer is written last and is zero until then: a run that was killed carries none. It shows damage,
 not forgery: whoever changes a file on purpose can write another digest.
 """
 
@@ -11,16 +11,13 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import BinaryIO, Literal, NamedTuple
 from urllib.parse import quote, unquote
 
 Extent = tuple[int, int]
 """Where a variable lies in the file: its offset and its length, bytes."""
-
 REST = "metadata and labels"
-
 _MAGIC = b"annelid digest 1"
 _FOOTER = struct.Struct("<16sQQ32s")  # magic, bytes before the table, bytes of the table, SHA-256 of the table
 _UNFINISHED = bytes(32)
@@ -28,17 +25,14 @@ _CHUNK = 1 << 20
 _LONGEST_TABLE = 1 << 24
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """What the digest says of a file.
-
-    Attributes:
-        state: ``"absent"`` where there is none, ``"unfinished"`` where there is room for one.
-        damaged: What differs from the digest: names of variables, `REST` or "the digest itself".
-    """
+class Finding(NamedTuple):
+    """What the digest says of a file: there is none ("absent"), or room for one ("unfinished"), or it was compared."""
 
     state: Literal["intact", "damaged", "unfinished", "absent"]
-    damaged: tuple[str, ...] = ()
+    damaged: tuple[str, ...] = ()  # what differs from it: names of variables, REST or "the digest itself"
+
+
+_DAMAGED = Finding("damaged", ("the digest itself",))
 
 
 def room(extents: Mapping[str, Extent], end: int) -> bytes:
@@ -48,30 +42,25 @@ def room(extents: Mapping[str, Extent], end: int) -> bytes:
 
 
 def write(file: BinaryIO, extents: Mapping[str, Extent]) -> None:
-    """Fills the room with the digest of a file that does not change any more.
-
-    Args:
-        file: The file, open for reading and writing.
-        extents: As given to `room`.
-    """
-    position = file.seek(0, 2) - _FOOTER.size
-    file.seek(position)
+    """Fills the room, made with the same extents, with the digest of an open file that does not change any more."""
+    file.seek(-_FOOTER.size, 2)
     _, end, _, _ = _FOOTER.unpack(file.read(_FOOTER.size))
     table = _table(_sums(file, extents, end), extents, end)
     file.seek(end)
-    rest = memoryview(table + _FOOTER.pack(_MAGIC, end, len(table), hashlib.sha256(table).digest()))
     # In two pieces, so that a kill can leave no half of a footer.
-    for piece in (rest[: len(table)], rest[len(table) :]):
-        while piece:
-            piece = piece[file.write(piece) :]
+    for content in (table, _FOOTER.pack(_MAGIC, end, len(table), hashlib.sha256(table).digest())):
+        write_whole(file, content)
+
+
+def write_whole(file: BinaryIO, content: bytes) -> None:
+    """Writes all of some bytes to an unbuffered file, which may take a part at a time."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[file.write(rest) :]
 
 
 def examine(path: Path, *, footer_only: bool = False) -> Finding:
-    """Compares a file with its digest.
-
-    Args:
-        path: The file.
-        footer_only: Tell only whether there is a digest, without reading the file: a finished one counts as intact.
+    """Compares a file with its digest, or only looks whether it has one: a finished one then counts as intact.
 
     Raises:
         OSError: The file cannot be read.
@@ -85,7 +74,7 @@ def examine(path: Path, *, footer_only: bool = False) -> Finding:
         if magic != _MAGIC:
             return Finding("absent")
         if end + length + _FOOTER.size != size or length > _LONGEST_TABLE:
-            return Finding("damaged", ("the digest itself",))
+            return _DAMAGED
         if total == _UNFINISHED:
             return Finding("unfinished")
         if footer_only:
@@ -95,26 +84,24 @@ def examine(path: Path, *, footer_only: bool = False) -> Finding:
         try:
             expected, extents = _read_table(table, end)
         except ValueError:
-            return Finding("damaged", ("the digest itself",))
+            return _DAMAGED
         sums = _sums(file, extents, end)
-        damaged = [name or REST for name, digest in expected.items() if sums[name] != digest]
-        if not damaged and hashlib.sha256(table).digest() != total:
-            damaged = ["the digest itself"]
-        return Finding("damaged" if damaged else "intact", tuple(damaged))
+        damaged = tuple(name or REST for name, digest in expected.items() if sums[name] != digest)
+        if damaged:
+            return Finding("damaged", damaged)
+        return Finding("intact") if hashlib.sha256(table).digest() == total else _DAMAGED
 
 
 def _sums(file: BinaryIO, extents: Mapping[str, Extent], end: int) -> dict[str, str]:
     """Returns the sum of each variable, and under an empty name that of all other bytes before ``end``."""
     rest, sums, position = hashlib.sha256(), {}, 0
-    for name, (offset, length) in sorted(extents.items(), key=lambda item: item[1]):
+    for name, (offset, length) in sorted([*extents.items(), ("", (end, 0))], key=lambda item: item[1]):
         for chunk in _read(file, position, offset):
             rest.update(chunk)
         own, position = hashlib.sha256(), offset + length
         for chunk in _read(file, offset, position):
             own.update(chunk)
         sums[name] = own.hexdigest()
-    for chunk in _read(file, position, end):
-        rest.update(chunk)
     return sums | {"": rest.hexdigest()}
 
 
@@ -147,13 +134,12 @@ def _read_table(table: bytes, end: int) -> tuple[dict[str, str], dict[str, Exten
     """
     sums: dict[str, str] = {}
     extents: dict[str, Extent] = {}
-    for line in table.decode("ascii").split("\n"):
-        if line:
-            digest, offset, length, name = line.split(" ")
-            name = unquote(name, errors="strict")
-            sums[name] = digest
-            if name:
-                extents[name] = int(offset), int(length)
+    for line in filter(None, table.decode("ascii").split("\n")):
+        digest, offset, length, name = line.split(" ")
+        name = unquote(name, errors="strict")
+        sums[name] = digest
+        if name:
+            extents[name] = int(offset), int(length)
     position = 0
     for offset, length in sorted(extents.values()):
         if offset < position or length < 0:

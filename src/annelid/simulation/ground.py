@@ -1,17 +1,16 @@
-"""The ground under a moving worm: tangent planes laid under its skin, and friction that feels which way it slides."""
+"""The ground under a moving worm: tangent planes laid under its skin, and friction by the direction of sliding."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
 
 
 class MovingGround:
-    """Lays the planes of `annelid.arena.contact.add_moving_planes` before every step.
+    """Lays the planes of `annelid.arena.geoms.add_moving_planes` before every step.
 
     What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
     the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions
@@ -22,26 +21,29 @@ class MovingGround:
     """
 
     def __init__(self, model: mujoco.MjModel, geometry: MeshGeometry, arena: ArenaKind) -> None:
-        """Finds the planes.
-
-        Args:
-            model: The compiled worm; of one with setae nobody else may use it, since friction is set in it.
-            geometry: The mesh at rest.
-            arena: The ground.
-        """
+        """Finds the planes; the compiled model of a worm with setae is its own, since friction is set in it."""
         self._model = model
         self.depth_m = -np.inf
         self._surface = arena.ground()
-        self._skin, self._planes = _skin_and_planes(model)
+        # The engine may have swapped the two geoms of a pair, the skin's and that of the plane on a mocap body.
+        geoms = np.stack([model.pair_geom1, model.pair_geom2])
+        mocap = model.body_mocapid[model.geom_bodyid[geoms]]
+        plane, pair = (mocap[1] >= 0).astype(int), np.arange(model.npair)
+        self._skin, self._planes = geoms[1 - plane, pair], mocap[plane, pair]
         self._bodies = model.geom_bodyid[self._skin]
         self._roots = model.body_rootid[self._bodies]
-        self._setae = _Setae(model, geometry, arena, self._skin) if arena.has_setae else None
+        self._arena = arena
+        n_planes, data = len(geometry.plane_x_m), mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        # What friction by the direction of sliding needs: means over crossing planes, and the one nearest at rest.
+        self._crossing_site = np.array([model.site(f"crossing_{i}").id for i in range(geometry.n_crossings)])
+        self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
+        self._plane = np.abs(data.geom_xpos[self._skin, :1] - geometry.plane_x_m).argmin(axis=1)
 
     def lay(self, data: mujoco.MjData) -> None:
         """Lays every plane where the ground is nearest to its part of the skin, and sets friction.
 
-        Args:
-            data: Positions and velocities; its kinematics are brought up to date.
+        Of the data, positions and velocities are read, and its kinematics are brought up to date.
         """
         model = self._model
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
@@ -55,58 +57,26 @@ class MovingGround:
             ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
             data.mocap_pos[self._planes] = places - (distance - ahead)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
-            if self._setae is not None:
-                model.pair_friction[:, :2] = self._setae.friction(data, velocity)[:, np.newaxis]
+            if self._arena.has_setae:
+                model.pair_friction[:, :2] = self._friction(data, velocity)[:, np.newaxis]
 
+    def _friction(self, data: mujoco.MjData, velocity: Array) -> Array:
+        """The coefficient of every part of the skin by the sign of its velocity along the worm's axis there, as setae.
 
-def _skin_and_planes(model: mujoco.MjModel) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Returns the geom of the skin and the mocap body of the plane of every pair, which the engine may have swapped."""
-    geoms = np.stack([model.pair_geom1, model.pair_geom2])
-    mocap = model.body_mocapid[model.geom_bodyid[geoms]]
-    plane, pair = (mocap[1] >= 0).astype(int), np.arange(model.npair)
-    return geoms[1 - plane, pair], mocap[plane, pair]
-
-
-def facing(normal: Array) -> Array:
-    """Returns quaternions that turn the z axis to unit normals by the shortest way.
-
-    Args:
-        normal: Unit vectors, ``(n, 3)``.
-
-    Returns:
-        Unit quaternions, scalar first, ``(n, 4)``.
-    """
-    x, y, z = normal.T
-    turn = np.stack([1.0 + z, -y, x, np.zeros(len(z))], axis=-1)
-    # Straight down any half turn about a level axis will do.
-    turn[z < -1.0 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
-    return turn / np.sqrt((turn * turn).sum(axis=-1))[:, np.newaxis]
-
-
-class _Setae:
-    """Friction of each part of the skin by the sign of its velocity along the worm's axis there.
-
-    A part that sticks creeps the way it is pushed, since contacts are soft, so the sign tells at rest too.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, geometry: MeshGeometry, arena: ArenaKind, skin: NDArray[np.int32]
-    ) -> None:
-        assert arena.backward_friction is not None
-        self._forwards, self._backwards = arena.friction, arena.backward_friction
-        n_planes = len(geometry.plane_x_m)
-        self._crossing_site = np.array([model.site(f"crossing_{i}").id for i in range(geometry.n_crossings)])
-        self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        x = data.geom_xpos[skin, :1]
-        self._plane = np.abs(x - geometry.plane_x_m).argmin(axis=1)
-
-    def friction(self, data: mujoco.MjData, velocity: Array) -> Array:
-        """Returns the coefficient of every part of the skin by its velocity, m/s, ``(n_skin, 3)``; ``(n_skin,)``."""
+        A part that sticks creeps towards where it is pushed, since contacts are soft, so the sign holds at rest too.
+        """
         centres = self._mean @ data.site_xpos[self._crossing_site]
         along = np.empty_like(centres)
         along[1:-1] = centres[:-2] - centres[2:]
         along[0], along[-1] = centres[0] - centres[1], centres[-2] - centres[-1]
         forwards = (velocity * along[self._plane]).sum(axis=-1)
-        return np.where(forwards < 0.0, self._backwards, self._forwards)
+        return np.where(forwards < 0.0, self._arena.backward_friction or 0.0, self._arena.friction)
+
+
+def facing(normal: Array) -> Array:
+    """Returns unit quaternions, ``(n, 4)``, that turn the z axis to unit normals, ``(n, 3)``, by the least angle."""
+    x, y, z = normal.T
+    turn = np.stack([1.0 + z, -y, x, np.zeros(len(z))], axis=-1)
+    # Straight down any half turn about a level axis will do.
+    turn[z < -1.0 + 1e-12] = [0.0, 1.0, 0.0, 0.0]
+    return turn / np.sqrt((turn * turn).sum(axis=-1))[:, np.newaxis]

@@ -12,24 +12,12 @@ from numpy.typing import ArrayLike
 
 from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
-from annelid.protocols import Controller, Plant, Records, Sensation
-from annelid.simulation.assemble import as_controller, build_plant
-from annelid.simulation.interruption import Interruption
+from annelid.protocols import Controller, Plant, Records, Sensation, Values
 from annelid.simulation.lock import locks
-from annelid.simulation.progress import ProgressCallback, reporting
-from annelid.simulation.recorder import (
-    Recorder,
-    Values,
-    global_attributes,
-    layout,
-    loop_signals,
-    recordable_of,
-    sensation_signals,
-    sensation_values,
-)
-from annelid.simulation.resume import Origin, continued_config, origin_of
-from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
-from annelid.simulation.stepping import Simulation, start
+from annelid.simulation.progress import Interruption, ProgressCallback, reporting
+from annelid.simulation.recorder import Recorder, Senses, global_attributes, loop_signals
+from annelid.simulation.runfile import FILE_NAME, Origin, Run, continued_config, open_run, origin_of, refuse_used_folder
+from annelid.simulation.stepping import Simulation, as_controller, build_plant, start
 
 PROGRESS_INTERVAL_S = 0.2
 
@@ -100,63 +88,44 @@ def simulate(
 class RecordedRun:
     """A worm with its controller and its run file, which says how the run ended, however it ends.
 
-    Attributes:
-        simulation: Plant and controller.
-        status: How it ended, one of `annelid.simulation.runfile.STATUSES`.
-        message: Why it ended before its time; empty if it did not.
-        error: What ended it; None if nothing did.
+    Its status is one of `annelid.simulation.runfile.STATUSES`, its message says why it ended before its time, and its
+    error is what ended it.
     """
 
     def __init__(self, config: RunConfig, simulation: Simulation, path: Path, origin: Origin | None = None) -> None:
-        """Lays out the run file of a simulation that is about to begin.
-
-        Args:
-            config: The configuration, which the file carries whole.
-            simulation: Plant and controller at their start.
-            path: The run file.
-            origin: The run that it continues, or None.
-
-        Raises:
-            RunFileError: The file cannot be made.
-        """
+        """Lays out the run file of a simulation that is about to begin, or to continue another run."""
         self.simulation = simulation
         self.status = "running_or_killed"
         self.message = ""
         self.error: BaseException | None = None
         plant, controller = simulation.plant, simulation.controller
-        of_plant = recordable_of(plant) if isinstance(plant, Records) else sensation_signals(simulation.sensation)
-        parts = [of_plant, recordable_of(controller), loop_signals(plant.n_muscles)]
+        sources = [plant if isinstance(plant, Records) else Senses(lambda: simulation.sensation)]
+        sources += [controller] if isinstance(controller, Records) else []
+        self._readers = [source.read for source in sources]
+        parts = [*(source.recordable() for source in sources), loop_signals(plant.n_muscles)]
         first = simulation.checkpoint()
         packed = None if first is None else first.to_bytes()
-        plan = layout(simulation.schedule, parts, simulation.sensation.rest_stretch_m, packed)
         # The configured controller overrides this with its own attribute; without it the file would name that one.
         attrs: dict[str, Any] = {"controller": getattr(controller, "name", type(controller).__name__)}
         attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
-        self._recorder = Recorder(path, plan, attrs)
-        if packed is not None:
-            self._recorder.checkpoint(packed)
-        self._read_plant = plant.read if isinstance(plant, Records) else self._read_sensation
-        self._read_controller = controller.read if isinstance(controller, Records) else _nothing
+        rest_stretch_m = simulation.sensation.rest_stretch_m
+        self.recorder = Recorder(path, simulation.schedule, parts, rest_stretch_m, packed, attrs)
 
     def record(self, wall_time_s: float) -> None:
         """Records a sample and a frame, where one is due."""
         simulation, schedule = self.simulation, self.simulation.schedule
         if simulation.step % schedule.sample_every == 0:
             own: Values = {"activation": simulation.activation, "wall_time": wall_time_s}
-            self._recorder.sample(self._read_plant(False), self._read_controller(False), own)
+            self.recorder.sample(*(read(False) for read in self._readers), own)
         if simulation.step % schedule.frame_every == 0:
-            self._recorder.frame(self._read_plant(True), self._read_controller(True))
-
-    def flush(self) -> None:
-        """Writes what was recorded so far."""
-        self._recorder.flush()
+            self.recorder.frame(*(read(True) for read in self._readers))
 
     def checkpoint(self) -> None:
         """Writes the state, so that the run can be continued from here, and what is doubtful so far."""
         state = self.simulation.checkpoint()
         if state is not None:
-            self._recorder.checkpoint(state.to_bytes())
-        self._recorder.warn(self.simulation.doubts())
+            self.recorder.checkpoint(state.to_bytes())
+        self.recorder.warn(self.simulation.doubts())
 
     def finish(self, interrupted_by: str | None) -> None:
         """Writes all that is left and closes the file: the run is complete, or a signal of that name ended it."""
@@ -169,11 +138,11 @@ class RecordedRun:
     def end_with(self, error: BaseException) -> None:
         """Ends the run because of an error; a file that is closed stays as it is."""
         self.error = self.error or error
-        if self._recorder.closed:
+        if self.recorder.closed:
             return
         with suppress(RunFileError):
             if isinstance(error, SimulationStopped):
-                self._recorder.warn(self.simulation.doubts())
+                self.recorder.warn(self.simulation.doubts())
                 self._end("stopped_by_guard", str(error))
             elif isinstance(error, RunFileError):
                 self._end("disk_failure", str(error), whole=False)
@@ -185,23 +154,11 @@ class RecordedRun:
 
     def _end(self, status: str, message: str = "", whole: bool = True) -> None:
         self.status, self.message = status, message
-        (self._recorder.finish if whole else self._recorder.close)(status, message)
-
-    def _read_sensation(self, frame: bool) -> Values:
-        return {} if frame else sensation_values(self.simulation.sensation)
-
-
-def _nothing(frame: bool) -> Values:
-    return {}
+        self.recorder.finish(status, message, whole=whole)
 
 
 class Loop:
-    """The loop of a run, or of runs that go on together in one thread: they advance, and each is recorded.
-
-    Attributes:
-        runs: All of them.
-        going: Those that have not ended, by their number.
-    """
+    """The loop of a run, or of runs that go on together in one thread; those that have not ended are ``going``."""
 
     flush_interval_s = 0.5
     checkpoint_interval_s = 1.0
@@ -218,28 +175,24 @@ class Loop:
         return self._step() * self._schedule.timestep_s
 
     def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
-        """Runs to the end; a run that fails ends with that error, and the others go on.
-
-        Args:
-            interruption: Asks to end all of them early.
-            report: Called at most 5 times a second.
-        """
+        """Runs to the end, unless interrupted; a run that fails ends with that error, and the others go on."""
         began = now = perf_counter()
         due = {"flush": began + self.flush_interval_s, "checkpoint": began + self.checkpoint_interval_s}
         due["report"] = began
         try:
             if self._schedule.start == 0:
-                self.each(lambda run: run.record(0.0))
+                self.each(lambda _, run: run.record(0.0))
             while (step := self._step()) < self._schedule.end and interruption.requested is None:
                 self.advance(step)
                 now = perf_counter()
-                self.record(now - began)
+                wall_time_s = now - began
+                self.each(lambda _, run, wall_time_s=wall_time_s: run.record(wall_time_s))
                 if now >= due["flush"]:
-                    self.each(RecordedRun.flush)
+                    self.each(lambda _, run: run.recorder.flush())
                     due["flush"] = now + self.flush_interval_s
                 if now >= due["checkpoint"]:
                     self.settle()
-                    self.each(RecordedRun.checkpoint)
+                    self.each(lambda _, run: run.checkpoint())
                     cost_s = perf_counter() - now
                     due["checkpoint"] = now + max(self.checkpoint_interval_s, cost_s / _CHECKPOINT_SHARE)
                 if report is not None and now >= due["report"]:
@@ -247,7 +200,7 @@ class Loop:
                     due["report"] = now + PROGRESS_INTERVAL_S
             self.settle()
             by = interruption.requested if self._step() < self._schedule.end else None
-            self.each(lambda run: run.finish(by))
+            self.each(lambda _, run: run.finish(by))
             if report is not None:
                 report(self.simulated_s, now - began)
         except BaseException as error:
@@ -257,21 +210,13 @@ class Loop:
 
     def advance(self, step: int) -> None:
         """Takes control steps up to the next event, from ``step`` on."""
-        self.each(lambda run: run.simulation.advance())
+        self.each(lambda _, run: run.simulation.advance())
 
     def settle(self) -> None:
         """Brings all controllers up to the step that was reached, where something of them is read."""
 
-    def record(self, wall_time_s: float) -> None:
-        """Records every run that is due."""
-        self.each(lambda run: run.record(wall_time_s))
-
-    def each(self, action: Callable[[RecordedRun], None]) -> None:
-        """Does something with every run that is going on; one that fails ends, and the others go on."""
-        self.each_numbered(lambda _, run: action(run))
-
-    def each_numbered(self, action: Callable[[int, RecordedRun], None]) -> None:
-        """Does as `each` with every run and its number."""
+    def each(self, action: Callable[[int, RecordedRun], object]) -> None:
+        """Does something with every run that is going on and its number; one that fails ends, and the others go on."""
         for number, run in tuple(self.going.items()):
             try:
                 action(number, run)

@@ -1,9 +1,10 @@
-"""The run file: its fixed names, and opening one into a `Run`."""
+"""The run file: its fixed names, opening one into a `Run`, and continuing it."""
 
 from __future__ import annotations
 
-import errno
+import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from annelid.config import RunConfig
-from annelid.errors import ConfigError, RunFileError, listed
+from annelid.config import RunConfig, field_value, fields_of
+from annelid.errors import ConfigError, RunFileError, UnreadableText, listed
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
 from annelid.simulation.digest import Finding, examine
 from annelid.simulation.lock import LOCK_NAME
+from annelid.textfiles import parse_json
 
 if TYPE_CHECKING:
     import h5py
@@ -28,20 +30,13 @@ MESSAGE_BYTES = 512
 WARNINGS = "warnings"
 WARNING_BYTES = 8192
 SCHEMA = "schema_version"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Of the file's names and their meanings; a change that an older reader would take for something else raises it, and
 `migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
 """Files up to this size are compared with their digests whenever they are opened; larger ones by `verify_run` only."""
 SLOTS = ("checkpoint/slot_0", "checkpoint/slot_1")
-STATUSES = (
-    "running_or_killed",
-    "complete",
-    "interrupted",
-    "stopped_by_guard",
-    "disk_failure",
-    "failed",
-)
+STATUSES = ("running_or_killed", "complete", "interrupted", "stopped_by_guard", "disk_failure", "failed")
 """How a run ended, in the order of the file's ``status_code``; ``failed``: its plant or controller raised."""
 
 CPU_TIME = "cpu_time"
@@ -50,7 +45,7 @@ _BOOKKEEPING = ("samples_written", "frames_written", "status_code", "status_mess
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A run as its file holds it.
+    """A run as its file has it.
 
     Attributes:
         path: The run file.
@@ -107,7 +102,7 @@ def open_run(path: str | Path) -> Run:
     Raises:
         RunFileError: There is no such file, it is no annelid run, or it is truncated or damaged.
     """
-    file = _checked_file(path)
+    file = _examined_file(path)[0]
     with _dataset(file) as dataset:
         marks = dataset[[*_BOOKKEEPING, WARNINGS, CPU_TIME]].load()
         n_samples = _count(marks, "samples_written", dataset.sizes["time"])
@@ -128,18 +123,51 @@ def open_run(path: str | Path) -> Run:
 
 
 def migrated(data: xarray.Dataset) -> xarray.Dataset:
-    """Returns the content of a run file of any schema up to the present one in the present one.
+    """Returns all variables and attributes of a run file of any schema up to the present one in the present one.
 
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
-
-    Args:
-        data: All variables and attributes of a run file.
+    Up to schema 1 the name of a configuration decided which published numbers its runs were compared with.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
         data = data.assign({name: value for name, value in added.items() if name not in data})
+    if data.attrs.get(SCHEMA, 0) < 2:
+        data = data.assign_attrs(config=_with_published(data.attrs["config"]))
     return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
+
+
+def _with_published(config: str) -> str:
+    try:
+        tree = parse_json(config, "the configuration")
+        if named := re.match(r"riddle2022|riddle2023|wang\Z", tree["name"]):
+            return json.dumps(tree | {"published": named[0]})
+    except (UnreadableText, KeyError, TypeError):
+        pass  # What is wrong with it, its reader says.
+    return config
+
+
+@contextmanager
+def _reading(file: Path) -> Iterator[None]:
+    """Makes one error of all that reading a file may raise, which depends on where its damage is."""
+    try:
+        yield
+    except RunFileError:
+        raise
+    except Exception as error:
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        if isinstance(error, FileNotFoundError | NotADirectoryError):
+            hint = f": {file.parent} holds no {FILE_NAME}" if file.parent.is_dir() else ""
+            sentence = f"there is no run file {file}{hint}"
+        elif not isinstance(error, OSError):
+            sentence = f"{file} is damaged: {reason}"
+        elif "truncated" in reason:
+            sentence = f"{file} is truncated: only {file.stat().st_size} bytes of it are left"
+        elif error.strerror:
+            sentence = f"cannot open {file}: {error.strerror}"
+        else:
+            sentence = f"{file} is truncated or damaged: {reason}"
+        raise RunFileError(sentence) from None
 
 
 @contextmanager
@@ -147,106 +175,69 @@ def _dataset(file: Path) -> Iterator[xarray.Dataset]:
     """Opens a checked run file in the present schema."""
     import xarray
 
-    try:
-        with xarray.open_dataset(file, engine="h5netcdf") as dataset:
-            yield migrated(dataset)
-    # What a damaged file raises depends on where the damage is.
-    except Exception as error:
-        raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
+    with _reading(file), xarray.open_dataset(file, engine="h5netcdf") as dataset:
+        yield migrated(dataset)
 
 
 def read_config(path: str | Path) -> RunConfig:
-    """Reads the configuration of a run.
-
-    Raises:
-        RunFileError: As `open_run`.
-    """
-    file = _checked_file(path)
+    """Reads the configuration of a run, from its folder or its file; raises as `open_run`."""
+    file = _examined_file(path)[0]
     with _dataset(file) as dataset:
-        attrs = dataset.attrs
-    return _config(file, attrs)
+        return _config(file, dataset.attrs)
 
 
 def read_checkpoint(path: str | Path) -> Checkpoint:
-    """Reads the last checkpoint of a run.
-
-    Raises:
-        RunFileError: As `open_run`, or the run has no checkpoint.
-    """
+    """Reads the last checkpoint of a run; raises as `open_run`, or where the run has no checkpoint."""
     import h5py
 
-    file = _checked_file(path)
-    try:
+    file = _examined_file(path)[0]
+    with _reading(file):
         with h5py.File(file, "r") as content:
             slots = [content[name][()].tobytes() for name in SLOTS if name in content]  # type: ignore[index]
         payload = newest_payload(slots)
-        checkpoint = None if payload is None else Checkpoint.from_bytes(payload)
-    except Exception as error:
-        raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
-    if checkpoint is None:
-        reason = "it was killed before the first" if slots else "its plant or controller cannot be saved"
-        raise RunFileError(f"{file} holds no checkpoint to continue from: {reason}")
-    return checkpoint
+        if payload is not None:
+            return Checkpoint.from_bytes(payload)
+    reason = "it was killed before the first" if slots else "its plant or controller cannot be saved"
+    raise RunFileError(f"{file} holds no checkpoint to continue from: {reason}")
 
 
 def verify_run(path: str | Path) -> str:
     """Compares a whole run file, of any size, with the digest that was written when the run ended.
 
-    Args:
-        path: The run's folder or its file.
-
-    Returns:
-        A sentence: that it is intact, or that and why it carries no digest.
-
-    Raises:
-        RunFileError: As `open_run`; for a damaged file it names the variables that differ.
+    Returns a sentence: that it is intact, or that and why it carries no digest. Raises as `open_run`; for a damaged
+    file the error names the variables that differ.
     """
     file, finding = _examined_file(path, whole=True)
     if finding.state == "intact":
         return f"{file} is intact: every byte is as it was when the run ended"
+    reason = "an older version of annelid wrote it"
     if finding.state == "unfinished":
         reason = "it has not ended, was killed, or its digest could not be written"
-    else:
-        reason = "an older version of annelid wrote it"
     return f"{file} carries no digest, so damage would not show: {reason}"
 
 
 def refuse_used_folder(out: Path, overwrite: bool) -> None:
-    """Checks that a run may go into a folder, which is to be locked first.
-
-    Raises:
-        ConfigError: It holds something and ``overwrite`` is false.
-        RunFileError: It cannot be read.
-    """
+    """Raises `ConfigError` where a folder, which is to be locked first, is not empty and must not be overwritten."""
     try:
         # A draft is left where a process was killed while it laid out its file.
-        ours = {f".{FILE_NAME}.part", LOCK_NAME}
-        if out.is_dir() and not overwrite and any(entry.name not in ours for entry in out.iterdir()):
+        ours = LOCK_NAME, ".run.*.part.nc"
+        if out.is_dir() and not overwrite and not all(any(map(entry.match, ours)) for entry in out.iterdir()):
             raise ConfigError(f"the output folder {out} is not empty: name another, or allow overwriting")
     except OSError as error:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
 
 
-def _checked_file(path: str | Path) -> Path:
-    """Returns the run file behind a path, once it is clear that it is one, whole, and safe to read."""
-    return _examined_file(path)[0]
-
-
 def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Finding]:
     """Returns the run file behind a path and what its digest says, once it is clear that it is safe to read.
 
-    Args:
-        path: The run's folder or its file.
-        whole: Compare the file with its digest also where it is large.
+    The whole of a large file is compared with its digest only if asked for.
     """
     import h5py
 
     from annelid.simulation.content_check import check_content
 
-    path = Path(path)
-    file = path / FILE_NAME if path.is_dir() else path
-    size = 0
-    try:
+    file = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
+    with _reading(file):
         size = os.stat(file).st_size
         # To open a pipe would be to wait for its writer.
         if not file.is_file():
@@ -271,22 +262,8 @@ def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Find
             if schema > 0 and finding.state == "absent":
                 raise RunFileError(f"{file} is truncated or damaged: the digest at its end is missing")
             ours = "config" in content.attrs and "annelid_version" in content.attrs
-            missing = [name for name in _BOOKKEEPING if name not in content]
-    except OSError as error:
-        if isinstance(error, FileNotFoundError) or error.errno in (errno.ENOENT, errno.ENOTDIR):
-            hint = f": {path} holds no {FILE_NAME}" if path.is_dir() else ""
-            raise RunFileError(f"there is no run file {file}{hint}") from None
-        if "truncated" in str(error):
-            raise RunFileError(f"{file} is truncated: only {size} bytes of it are left") from None
-        if error.strerror:
-            raise RunFileError(f"cannot open {file}: {error.strerror}") from None
-        raise RunFileError(f"{file} is truncated or damaged: {_first_line(error)}") from None
-    except RunFileError:
-        raise
-    except Exception as error:
-        raise RunFileError(f"{file} is damaged: {_first_line(error)}") from None
-    if not ours or missing:
-        raise RunFileError(f"{file} is not an annelid run: another program wrote it")
+            if not ours or any(name not in content for name in _BOOKKEEPING):
+                raise RunFileError(f"{file} is not an annelid run: another program wrote it")
     return file, finding
 
 
@@ -319,5 +296,59 @@ def _config(file: Path, attrs: dict[Any, Any]) -> RunConfig:
         ) from None
 
 
-def _first_line(error: Exception) -> str:
-    return (str(error) or type(error).__name__).splitlines()[0]
+_FREE = frozenset({"duration_s", "record", "name", "summary", "published"})
+"""Fields in which a continued run may differ from the one before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """The run that is continued: its file, its configuration, and its last checkpoint."""
+
+    path: Path
+    config: RunConfig
+    checkpoint: Checkpoint
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time of the checkpoint, s."""
+        return self.checkpoint.step * self.config.clock.control_timestep_s
+
+    def attrs(self) -> dict[str, Any]:
+        """Returns the global attributes that name it in the file of the run that goes on."""
+        return {"resumed_from": f"{self.path.resolve().parent.name}/{self.path.name}", "resumed_at_s": self.time_s}
+
+
+def origin_of(run: Run | str | Path) -> Origin:
+    """Reads what is needed to continue a run; raises as `read_checkpoint`."""
+    path = _examined_file(run.path if isinstance(run, Run) else run)[0]
+    return Origin(path, read_config(path), read_checkpoint(path))
+
+
+def continued_config(config: RunConfig | None, origin: Origin, out: Path) -> RunConfig:
+    """Checks that a configuration continues a run, and returns it (that run's own if there is none).
+
+    ``duration_s`` counts from time zero of the first run, so it must lie beyond the checkpoint.
+
+    Raises:
+        ConfigError: It differs in more than the duration, the recording and the name, ends before the
+            checkpoint, or ``out`` is the folder of the run that is continued.
+    """
+    if out.resolve() == origin.path.resolve().parent:
+        raise ConfigError(f"the output folder {out} holds the run to continue: name another")
+    config = config or origin.config
+    ours, theirs = (
+        {path: field_value(each, path) for path in fields_of(each) if path.partition(".")[0] not in _FREE}
+        for each in (config, origin.config)
+    )
+    changed = sorted(path for path in ours.keys() | theirs.keys() if ours.get(path) != theirs.get(path))
+    if changed:
+        raise ConfigError(
+            f"a continued run may differ in duration_s, record and name only, but {', '.join(changed)} "
+            f"differs from {origin.path}"
+        )
+    if round(config.duration_s / config.clock.control_timestep_s) <= origin.checkpoint.step:
+        raise ConfigError(
+            f"duration_s = {config.duration_s:g} does not go beyond the {origin.time_s:g} s that {origin.path} "
+            "holds already; it counts from time zero of the first run"
+        )
+    return config

@@ -1,8 +1,9 @@
-"""What the skin feels of the ground, and how it slides: touch on four sides of every segment, slip and its loss.
+"""What the skin senses of the ground, and how it slides: touch on four sides of every segment, slip and its loss.
 
-The skin is the geoms that can touch: one sphere a vertex for rods, one capsule an element for chains. A geom belongs to
-the segment and the side that it is nearest to at rest, and slides by what its centre is displaced between two movements
-of the body. For rods that is the displacement of the point that touches; a chain's capsules also turn a little.
+The skin is the geoms that can touch: one sphere per vertex for rods, one capsule per element for chains. A geom belongs
+to the segment and the side that it is nearest to at rest, and slides by what its centre is displaced between two
+movements of the body. For rods that is the displacement of the point that touches; a chain's capsules also turn a
+little.
 """
 
 from __future__ import annotations
@@ -16,34 +17,25 @@ from annelid.arena.surface import Surface
 from annelid.morphology import Array
 from annelid.protocols import SIDES, State
 
-_QUARTER_RAD = 2.0 * np.pi / len(SIDES)
-
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What every segment feels of the ground, and how far it has slid.
+    """What every segment senses of the ground, and how far it has slid; ``(n_segments,)`` unless said otherwise."""
 
-    Attributes:
-        normal: Normal force on each side during the last physics step, N, ``(n_segments, 4)`` in the order of `SIDES`.
-        count: Number of geoms that touched then, ``(n_segments,)``.
-        slip_speed: Mean velocity of these along the body towards its front and along the ground, weighted by their
-            normal forces, over the last movement, m/s, ``(n_segments,)``; 0 in the air.
-        slip_distance: Way that the segment has slid so far, m, ``(n_segments,)``: the sum of the mean lengths of its
-            geoms' displacements along the ground, in any direction, weighted as above.
-        slip_loss: Work lost to friction so far, J, ``(n_segments,)``.
-    """
-
-    normal: Array
-    count: Array
+    normal: Array  # normal force on each side during the last physics step, N, (n_segments, 4) in the order of SIDES
+    count: Array  # number of geoms that touched then
     slip_speed: Array
+    """Mean velocity of these along the body towards its front and along the ground, weighted by their normal forces,
+    over the last movement, m/s; 0 in the air."""
     slip_distance: Array
-    slip_loss: Array
+    """Path that the segment has slid so far, m: the sum of the mean lengths of its geoms' displacements along the
+    ground, in any direction, weighted as above."""
+    slip_loss: Array  # work lost to friction so far, J
 
     @classmethod
     def none(cls, n_segments: int) -> Touch:
         """Returns that of a worm that has touched nothing yet."""
-        normal = np.zeros((n_segments, len(SIDES)))
-        return cls(normal, *(np.zeros(n_segments) for _ in range(4)))
+        return cls(np.zeros((n_segments, len(SIDES))), *np.zeros((4, n_segments)))
 
     def state(self) -> State:
         """Returns copies of all numbers, for a checkpoint."""
@@ -56,25 +48,12 @@ class Touch:
 
 
 class Skin:
-    """The geoms of one worm that can touch, and the surface that they touch.
-
-    Attributes:
-        segment: Segment of each geom, counted from 0, ``(n_geoms,)``.
-        side: Side of each geom, an index of `SIDES`, ``(n_geoms,)``.
-    """
+    """The geoms of one worm that can touch, each with its segment and its side, ``(n_geoms,)``, and what they touch."""
 
     def __init__(
         self, rest_m: Array, segment: NDArray[np.int64], n_segments: int, radius_m: float, surface: Surface
     ) -> None:
-        """Sorts the geoms.
-
-        Args:
-            rest_m: Centres of the geoms at rest, m, ``(n_geoms, 3)``; the tube's axis is parallel to x at y = 0.
-            segment: Segment of each geom, counted from 0.
-            n_segments: Number of segments.
-            radius_m: Radius of the tube at rest, the height of its axis above z = 0, m.
-            surface: What they touch.
-        """
+        """Sorts the geoms by their centres at rest, m, ``(n_geoms, 3)``; the tube's lowest line is the x axis."""
         self.segment = segment
         self.side = sides_of(rest_m[:, 1], rest_m[:, 2] - radius_m)
         self._n_segments = n_segments
@@ -109,14 +88,14 @@ class Skin:
         of_each[2] = pressure * np.sqrt(_dot(along, along))
         of_each[3] = _dot(force, along)
         of_each[4] = 1.0
-        weight, forwards, way, work, count = of_each @ self._member.take(touching, axis=0)
+        weight, forwards, path, work, count = of_each @ self._member.take(touching, axis=0)
         carried = np.where(weight > 0.0, weight, 1.0)
         quarter = np.bincount(self._quarter.take(touching), pressure, self._n_segments * len(SIDES))
         return Touch(
             normal=quarter.reshape(-1, len(SIDES)).astype(float, copy=False),
             count=count,
             slip_speed=forwards / (carried * time_s),
-            slip_distance=so_far.slip_distance + way / carried,
+            slip_distance=so_far.slip_distance + path / carried,
             slip_loss=so_far.slip_loss - work,
         )
 
@@ -127,14 +106,11 @@ def _dot(first: Array, second: Array) -> Array:
 
 
 def sides_of(left_right_m: Array, up_m: Array) -> NDArray[np.int64]:
-    """Returns the side that points of a cross-section lie on, as indices of `SIDES`: the quarter that holds them.
+    """Returns the side that points of a cross-section lie on, as indices of `SIDES`: the quarter that they are in.
 
-    A point between two quarters counts to belly or back, the same on the left and the right.
-
-    Args:
-        left_right_m: How far right of the axis each point is (left is negative), m.
-        up_m: How far above the axis, m.
+    Points are so far right of the axis (left is negative) and above it, m. One between two quarters counts to belly or
+    back, the same on the left and the right.
     """
-    turn = np.arctan2(-left_right_m, -up_m) / _QUARTER_RAD
+    turn = np.arctan2(-left_right_m, -up_m) / (2.0 * np.pi / len(SIDES))
     # Half-way numbers are rounded to even ones, which are belly and back.
     return np.rint(np.round(turn, 9)).astype(np.int64) % len(SIDES)

@@ -1,11 +1,14 @@
-"""Plant, controller and sensor noise, advanced together by control steps."""
+"""Plant, controller and sensor noise: built from a configuration, and advanced together by control steps."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from annelid.clock import StepRatio
 from annelid.config import RunConfig
@@ -23,10 +26,60 @@ from annelid.protocols import (
 )
 from annelid.simulation.checkpoint import Checkpoint, generator_state, restore_generator
 from annelid.simulation.recorder import Schedule
-from annelid.simulation.resume import Origin
+from annelid.simulation.runfile import Origin
 
 _ACTIVATION_SLACK = 1e-9
 _OPTIONAL_FIELDS = ("ring_length_m", "muscle_force_N", "contact_force_N", "center_of_mass_m")
+
+
+def build_plant(config: RunConfig) -> Plant:
+    """Builds the worm's body; a planar one without importing the 3D engine.
+
+    Args:
+        config: The run's configuration.
+
+    Returns:
+        The body at rest.
+
+    Raises:
+        ConfigError: The body cannot be built with these values.
+    """
+    return config.body.build(config)
+
+
+def build_controller(config: RunConfig, plant: Plant) -> Controller:
+    """Builds the controller of a configuration, turning included.
+
+    Args:
+        config: The run's configuration.
+        plant: The body that it drives, which gives the numbers of segments and muscles.
+
+    Returns:
+        The controller in its initial state.
+
+    Raises:
+        ConfigError: The controller cannot be built with these values.
+    """
+    pattern = config.controller.build(config, plant)
+    if config.turning is None:
+        return pattern
+    from annelid.control.turning import TurningController
+
+    step_s = config.clock.control_timestep_s
+    return TurningController(pattern, config.turning, plant.n_segments, plant.n_muscles, step_s)
+
+
+def as_controller(
+    controller: Controller | Callable[[Sensation], ArrayLike] | None, config: RunConfig, plant: Plant
+) -> Controller:
+    """Takes a controller as it is, wraps a plain function, or builds the configured controller for None."""
+    if controller is None:
+        return build_controller(config, plant)
+    if hasattr(controller, "step"):
+        return cast(Controller, controller)
+    from annelid.control.callable import CallableController
+
+    return CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)
 
 
 class Simulation:
@@ -40,6 +93,7 @@ class Simulation:
         sensation: The plant's latest sensation, without noise.
         activation: The latest activation.
         noise: Generator of the sensor noise.
+        is_noisy: Whether noise is drawn at every control step.
     """
 
     def __init__(
@@ -51,24 +105,20 @@ class Simulation:
         noise: np.random.Generator,
         step: int = 0,
     ) -> None:
-        self.plant = plant
-        self.controller = controller
+        self.plant, self.controller = plant, controller
         self.schedule = Schedule.of(config, step)
-        self.step = step
-        self.sensation = sensation
+        self.step, self.sensation = step, sensation
         self.activation: Array = np.zeros(plant.n_muscles)
-        self.noise = noise
-        self._noise_m = config.sensor.noise_m
+        self.noise, self._noise_m = noise, config.sensor.noise_m
+        self.is_noisy = self._noise_m > 0
         # A quantity that a body does not have is NaN from the start and means nothing later.
-        self._watched = ["stretch_m"]
-        self._watched += [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]
+        has = [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]
+        self._watched = ["stretch_m", *has]
         # Nothing new can run away between two steps of a slower body.
-        self._watch_every = StepRatio(
-            config.clock.control_timestep_s, config.clock.physics_timestep_s
-        ).control_steps_per_move
-        # Noise is drawn at every control step.
+        ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
+        self._watch_every = ratio.control_steps_per_move
         self._striders = None
-        if not self._noise_m and isinstance(plant, MultiRatePlant) and isinstance(controller, StridingController):
+        if not self.is_noisy and isinstance(plant, MultiRatePlant) and isinstance(controller, StridingController):
             self._striders = plant, controller
         self._alarms = [part.alarm for part in (plant, controller) if isinstance(part, Watched)]
 
@@ -76,7 +126,7 @@ class Simulation:
         """Takes one control step, or all up to the next movement, sample or frame where plant and controller can.
 
         Raises:
-            SimulationStopped: A value is not finite, the activation is out of range, or plant or controller is alarmed.
+            SimulationStopped: As `advanced`, or the activation is out of range.
         """
         if self._striders is None:
             n_steps = 1
@@ -92,27 +142,18 @@ class Simulation:
         step = self.step + n_steps
         self.advanced(self.sensation, activation, step, step % self._watch_every < n_steps)
 
-    def advanced(self, sensation: Sensation, activation: Array, step: int, watch: bool) -> None:
-        """Takes note of control steps, whoever has taken them.
-
-        Args:
-            sensation: What the body feels after them.
-            activation: What the controller gave at last.
-            step: How many have been taken since time zero.
-            watch: The body has moved, so that its numbers may have run away.
+    def advanced(self, sensation: Sensation, activation: Array, step: int, moved: bool) -> None:
+        """Takes note of control steps up to a number since time zero, whoever has taken them.
 
         Raises:
-            SimulationStopped: A value is not finite, or plant or controller is alarmed.
+            SimulationStopped: The body has moved and its numbers have run away, or plant or controller is alarmed.
         """
         self.sensation, self.activation, self.step = sensation, activation, step
-        if watch:
-            self._watch()
-
-    def _watch(self) -> None:
-        """Stops a run whose numbers have run away."""
+        if not moved:
+            return
         total = 0.0
         for name in self._watched:
-            total += np.add.reduce(getattr(self.sensation, name), axis=None)
+            total += np.add.reduce(getattr(sensation, name), axis=None)
         if not math.isfinite(total):
             self._explain_runaway()
         for alarm in self._alarms:
@@ -126,7 +167,7 @@ class Simulation:
         return tuple(doubt for part in parts if isinstance(part, Doubtful) for doubt in part.doubts())
 
     def observed(self) -> Sensation:
-        """Returns what the controller is told: the sensation with noise on the stretch sensors."""
+        """Returns what the controller observes: the sensation with noise on the stretch sensors."""
         true = self.sensation
         if not self._noise_m:
             return true
@@ -135,31 +176,24 @@ class Simulation:
 
     def check_activation(self, activation: Array) -> None:
         """Stops a controller that breaks its promise before its numbers reach the engine."""
+        reason = ""
         if activation.shape != self.activation.shape:
-            raise SimulationStopped(
-                self.at(f"the controller gave activation of shape {activation.shape}, not {self.activation.shape}")
-            )
+            reason = f"activation of shape {activation.shape}, not {self.activation.shape}"
         # Written so that NaN fails it; for a few muscles faster than numpy.
-        if not all(-_ACTIVATION_SLACK <= value <= 1 + _ACTIVATION_SLACK for value in activation.tolist()):
+        elif not all(-_ACTIVATION_SLACK <= value <= 1 + _ACTIVATION_SLACK for value in activation.tolist()):
             bad = ~((activation >= -_ACTIVATION_SLACK) & (activation <= 1 + _ACTIVATION_SLACK))
             muscle = int(np.argmax(bad))
-            raise SimulationStopped(
-                self.at(
-                    f"the controller gave muscle {muscle + 1} an activation of {activation[muscle]:g}, not in 0 .. 1"
-                )
-            )
+            reason = f"muscle {muscle + 1} an activation of {activation[muscle]:g}, not in 0 .. 1"
+        if reason:
+            raise SimulationStopped(self.at(f"the controller gave {reason}"))
 
     def checkpoint(self) -> Checkpoint | None:
         """Returns all that the next step depends on, or None if plant or controller cannot be saved."""
-        if not (isinstance(self.plant, Stateful) and isinstance(self.controller, Stateful)):
+        plant, controller = self.plant, self.controller
+        if not (isinstance(plant, Stateful) and isinstance(controller, Stateful)):
             return None
-        return Checkpoint(
-            step=self.step,
-            sensation=self.sensation,
-            noise=generator_state(self.noise),
-            plant=self.plant.get_state(),
-            controller=self.controller.get_state(),
-        )
+        noise = generator_state(self.noise)
+        return Checkpoint(self.step, self.sensation, noise, plant.get_state(), controller.get_state())
 
     def _explain_runaway(self) -> None:
         for name in self._watched:
@@ -176,13 +210,7 @@ class Simulation:
 
 
 def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origin | None) -> Simulation:
-    """Resets plant and controller, each with a seed of its own, or takes up a checkpoint.
-
-    Args:
-        config: The configuration.
-        plant: The body.
-        controller: The controller.
-        origin: The run to continue, or None.
+    """Resets plant and controller, each with a seed of its own, or takes up the checkpoint of a run to continue.
 
     Raises:
         RunFileError: There is a run to continue, but plant or controller cannot be restored, or not to its state.

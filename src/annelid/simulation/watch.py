@@ -8,7 +8,7 @@ where actuators pull nothing or the integrator takes too much, the run goes on a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +36,11 @@ LEAST_WORK_J = 0.01
 """Work of the muscles below which the integrator's share of it means nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Energies:
-    """Energies of a run so far, J.
+class Energies(NamedTuple):
+    """Energies of a run so far, J."""
 
-    Attributes:
-        work: Work of the muscles, and what the weight has given.
-        numerical: What the integrator has taken of it; negative where it has given.
-    """
-
-    work: float
-    numerical: float
+    work: float  # of the muscles, and what the weight has given
+    numerical: float  # what the integrator has taken of it; negative where it has given
 
 
 class _Extreme:
@@ -56,7 +50,7 @@ class _Extreme:
         self.value, self.time_s, self.place = -math.inf, 0.0, 0
 
     def take(self, value: float, time_s: float) -> bool:
-        """Tells whether a value is a new extreme, and keeps it then."""
+        """Keeps a value if it is a new extreme, and returns whether it is."""
         if not value > self.value:
             return False
         self.value, self.time_s = value, time_s
@@ -70,25 +64,21 @@ class Watch:
         """Derives the limits from the mesh at rest."""
         shape, rings, n = rhombus_of(body), body.rings, body.mesh.n_segments
         self._guard = guard
-        self._n_segments, self._halves = n, rings.layout == "halves"
-        self._ring_rest_m = shape.ring_length_m
-        self._ring_least_m = touching_ring_m(body)
-        self._spring_most_m = shape.longest_m
-        self._deep_m = DEEP * body.mesh.radius_m
-        self._gap_m = WIDE_GAP * shape.side_m
-        forces = rings.forces(n)
-        self._idle_N = IDLE_SHARE * np.repeat(forces, 2 if self._halves else 1)
+        self._per_segment = 2 if rings.layout == "halves" else 1
+        self._ring_rest_m, self._ring_least_m = shape.ring_length_m, touching_ring_m(body)
+        self._spring_rest_m, self._spring_most_m = shape.along_m, shape.longest_m
+        self._deep_m, self._gap_m = DEEP * body.mesh.radius_m, WIDE_GAP * shape.side_m
+        self._idle_N = IDLE_SHARE * np.repeat(rings.forces(n), self._per_segment)
         self._force_field = rings.force_field
-        self._spring_rest_m = shape.along_m
-        self._closing, self._depth, self._gap, self._spring = _Extreme(), _Extreme(), _Extreme(), _Extreme()
-        muscles = len(self._idle_N)
-        self._active: NDArray[np.bool_] = np.zeros(muscles, dtype=bool)
+        self._closing, self._depth, self._gap, self._spring = self._extremes = [_Extreme() for _ in range(4)]
+        # Of every muscle: whether it is active; since when, s; its longest contraction, s; its largest force since it
+        # is active, N; in how many contractions it has pulled nothing; and when the first of these began, s.
+        self._muscles = np.zeros((6, len(self._idle_N)))
         self._active_bytes = self._active.tobytes()
-        self._since_s = np.zeros(muscles)
-        self._longest_s = np.zeros(muscles)
-        self._most_N = np.zeros(muscles)
-        self._idle: NDArray[np.int64] = np.zeros(muscles, dtype=np.int64)
-        self._first_idle_s = np.zeros(muscles)
+
+    @property
+    def _active(self) -> NDArray[np.bool_]:
+        return self._muscles[0] > 0.0
 
     def look(
         self,
@@ -100,7 +90,7 @@ class Watch:
         activation: Array,
         force_N: Array,
     ) -> str | None:
-        """Takes note of one movement.
+        """Takes note of one movement; returns why the run cannot go on, in a sentence, or None.
 
         Args:
             time_s: Simulated time, s.
@@ -110,15 +100,13 @@ class Watch:
             gap_m: Largest gap between two pinned strands, m.
             activation: Of the movement, ``(n_muscles,)``.
             force_N: Of the actuators in its last physics step, N, ``(n_muscles,)``.
-
-        Returns:
-            Why the run cannot go on, in a sentence, or None.
         """
         active = activation > ACTIVATED
         if active.tobytes() != self._active_bytes:
             self._switch(time_s, active)
-        np.maximum(self._most_N, force_N, out=self._most_N)
-        rings = ring_length_m.reshape(-1, 2).sum(axis=1) if self._halves else ring_length_m
+        most_N = self._muscles[3]
+        np.maximum(most_N, force_N, out=most_N)
+        rings = ring_length_m.reshape(-1, 2).sum(axis=1) if self._per_segment == 2 else ring_length_m
         ring_m, spring_m = float(np.minimum.reduce(rings)), float(np.maximum.reduce(spring_length_m))
         if self._closing.take(-ring_m, time_s):
             self._closing.place = int(rings.argmin()) + 1
@@ -144,27 +132,29 @@ class Watch:
 
     def _switch(self, time_s: float, active: NDArray[np.bool_]) -> None:
         """Takes note of contractions that begin or end."""
-        ended = self._active & ~active
-        self._judge(ended, time_s)
-        self._longest_s = np.where(ended, np.maximum(self._longest_s, time_s - self._since_s), self._longest_s)
-        began = active & ~self._active
-        self._since_s[began], self._most_N[began] = time_s, 0.0
-        self._active, self._active_bytes = active, active.tobytes()
+        before = self._active
+        self._muscles[2:] = self._judged(before & ~active, time_s)
+        began = active & ~before
+        self._muscles[1, began], self._muscles[3, began] = time_s, 0.0
+        self._muscles[0], self._active_bytes = active, active.tobytes()
 
-    def _judge(self, muscles: NDArray[np.bool_], time_s: float) -> None:
-        """Counts the contractions of some muscles, up to now, in which they have pulled nothing."""
-        idle = muscles & (self._most_N < self._idle_N) & (time_s - self._since_s >= LEAST_CONTRACTION_S)
-        self._first_idle_s = np.where(idle & (self._idle == 0), self._since_s, self._first_idle_s)
-        self._idle = self._idle + idle
+    def _judged(self, ended: NDArray[np.bool_], time_s: float) -> Array:
+        """Returns what is kept of the muscles from their longest contraction on, were some of them to end now."""
+        _, since_s, longest_s, most_N, idle, first_idle_s = self._muscles
+        lasted_s = time_s - since_s
+        pulled_nothing = ended & (most_N < self._idle_N) & (lasted_s >= LEAST_CONTRACTION_S)
+        longest_s = np.where(ended, np.maximum(longest_s, lasted_s), longest_s)
+        first_idle_s = np.where(pulled_nothing & (idle == 0), since_s, first_idle_s)
+        return np.stack([longest_s, most_N, idle + pulled_nothing, first_idle_s])
 
     def warnings(self, time_s: float, energies: Energies) -> tuple[str, ...]:
         """Returns a sentence for everything doubtful up to a time, s."""
         found: list[str] = []
-        ring_m = -self._closing.value
-        if ring_m < COLLAPSED * self._ring_rest_m:
+        ring_m, rest_m = -self._closing.value, self._ring_rest_m
+        if ring_m < COLLAPSED * rest_m:
             found.append(
                 f"ring {self._closing.place} was {ring_m:.3g} m long at {self._closing.time_s:.4g} s, "
-                f"{100 * ring_m / self._ring_rest_m:.0f} % of its length at rest: the mesh has collapsed under "
+                f"{100 * ring_m / rest_m:.0f} % of its length at rest: the mesh has collapsed under "
                 f"body.rings.{self._force_field}, or by itself"
             )
         if self._spring.value > LONG * self._spring_rest_m:
@@ -182,15 +172,20 @@ class Watch:
                 f"the strands of a crossing were {self._gap.value:.3g} m apart at {self._gap.time_s:.4g} s, over half "
                 "the side of a rhombus: the pins are too soft for what pulls at them"
             )
-        idle = self._idle_muscles(time_s)
-        longest_s = np.where(self._active, np.maximum(self._longest_s, time_s - self._since_s), self._longest_s)
-        if not idle and ring_m > (1.0 - HARDLY) * self._ring_rest_m and longest_s.max() >= LONG_CONTRACTION_S:
+        longest_s, _, idle, first_idle_s = self._judged(self._active, time_s)
+        if idle.any():
+            segments = sorted({int(muscle) // self._per_segment + 1 for muscle in np.flatnonzero(idle)})
             found.append(
-                f"no ring was shortened by more than {100 * max(0.0, 1 - ring_m / self._ring_rest_m):.2g} %, although "
-                f"muscles were active for up to {longest_s.max():.2g} s: see body.rings.{self._force_field} and the "
-                "mesh's stiffness"
+                f"the actuators of segment{'s' * (len(segments) > 1)} {', '.join(map(str, segments))} pulled nothing "
+                f"in {idle.sum():.0f} of their contractions, first from {first_idle_s[idle > 0].min():.4g} s on: see "
+                f"body.rings.length_range_m, with rings of {rest_m:.3g} m at rest"
             )
-        found += idle
+        elif ring_m > (1.0 - HARDLY) * rest_m and longest_s.max() >= LONG_CONTRACTION_S:
+            found.append(
+                f"no ring was shortened by more than {100 * max(0.0, 1 - ring_m / rest_m):.2g} %, although muscles "
+                f"were active for up to {longest_s.max():.2g} s: see body.rings.{self._force_field} and the mesh's "
+                "stiffness"
+            )
         share = energies.numerical / energies.work if energies.work > LEAST_WORK_J else 0.0
         if abs(share) > NUMERICAL_SHARE:
             found.append(
@@ -200,39 +195,15 @@ class Watch:
             )
         return tuple(found)
 
-    def _idle_muscles(self, time_s: float) -> list[str]:
-        before = self._idle, self._first_idle_s
-        self._judge(self._active, time_s)
-        idle, first_s = self._idle, self._first_idle_s
-        self._idle, self._first_idle_s = before
-        if not idle.any():
-            return []
-        per_segment = 2 if self._halves else 1
-        segments = sorted({int(muscle) // per_segment + 1 for muscle in np.flatnonzero(idle)})
-        named = "segment " + str(segments[0]) if len(segments) == 1 else "segments " + ", ".join(map(str, segments))
-        return [
-            f"the actuators of {named} pulled nothing in {idle.sum()} of their contractions, first from "
-            f"{first_s[idle > 0].min():.4g} s on: see body.rings.length_range_m, with rings of "
-            f"{self._ring_rest_m:.3g} m at rest"
-        ]
-
-    @property
-    def _extremes(self) -> tuple[_Extreme, ...]:
-        return self._closing, self._depth, self._gap, self._spring
-
     def get_state(self) -> State:
         """Returns what has been kept so far."""
         extremes = [(each.value, each.time_s, each.place) for each in self._extremes]
-        contractions = (self._active, self._since_s, self._longest_s, self._most_N, self._idle, self._first_idle_s)
-        return {"watch_extremes": np.array(extremes), "watch_contractions": np.array(contractions, dtype=np.float64)}
+        return {"watch_extremes": np.array(extremes), "watch_contractions": self._muscles.copy()}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
-        for each, (value, time_s, place) in zip(
-            self._extremes, np.asarray(state["watch_extremes"], dtype=float), strict=True
-        ):
-            each.value, each.time_s, each.place = float(value), float(time_s), int(place)
-        contractions = np.array(state["watch_contractions"], dtype=float)
-        active, self._since_s, self._longest_s, self._most_N, idle, self._first_idle_s = contractions
-        self._active, self._idle = active.astype(bool), idle.astype(np.int64)
+        extremes = np.asarray(state["watch_extremes"], dtype=float).tolist()
+        for each, (value, time_s, place) in zip(self._extremes, extremes, strict=True):
+            each.value, each.time_s, each.place = value, time_s, int(place)
+        self._muscles[:] = state["watch_contractions"]
         self._active_bytes = self._active.tobytes()

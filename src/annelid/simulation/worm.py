@@ -1,11 +1,10 @@
-"""The 3D worm as a Plant: MuJoCo steps the body, annelid reads what it feels."""
+"""The 3D worm as a Plant: MuJoCo steps the body, annelid reads what it senses."""
 
 from __future__ import annotations
 
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import asdict, fields, replace
+from operator import attrgetter
 from typing import Any, cast
 
 import mujoco
@@ -14,27 +13,23 @@ from numpy.typing import NDArray
 
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
+from annelid.body.damping import MaterialDamping, add_damper_rows
 from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
-from annelid.config import RunConfig
+from annelid.config import ArenaKind, RunConfig
 from annelid.errors import SimulationStopped
-from annelid.morphology import Array, MeshGeometry, heading_turn
+from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
-from annelid.protocols import SIDES, Recordable, Sensation, State
-from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors
-from annelid.simulation.damping import MaterialDamping, add_damper_rows
+from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
+from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, at_rest, turned
 from annelid.simulation.energies import EnergyTotals, Engine
 from annelid.simulation.ground import MovingGround
-from annelid.simulation.placing import at_rest, turned
-from annelid.simulation.signals import worm_signals
 from annelid.simulation.skin import Touch
 from annelid.simulation.watch import Energies, Watch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on: positions, velocities, activations, warm start, and the rods' frames
 (which the engine keeps as "plastic" state)."""
-
-AXES = ("x", "y", "z")
 _log = logging.getLogger(__name__)
 # Otherwise the engine prints its warnings and writes them to a file in the user's folder; `alarm` reports them.
 mujoco.set_mju_user_warning(lambda message: _log.info("%s", message))
@@ -47,12 +42,59 @@ ENGINE_WARNINGS = {
     mujoco.mjtWarning.mjWARN_BADQACC: "an acceleration became unbounded or NaN",
 }
 ALARM_EVERY = 10
-"""Movements of the body between two looks at what is costly to tell: kinetic energy, and the height above a relief."""
+"""Movements of the body between two looks at what is costly to read: kinetic energy, and the height above a relief."""
+
+
+_FORCE = "contractile force of a ring muscle over the last physics step; with RK4 that of its last stage"
+_SIGNALS = {
+    "stretch_length": ("posture.stretch", ("segment", "sensor"), "m", "length of the springs that span a ring"),
+    "spring_length": ("posture.spring_length", ("spring",), "m", "length of an axial spring"),
+    "ring_length": ("posture.ring_length", ("muscle",), "m", "length of a ring muscle"),
+    "muscle_force": ("_tension_N", ("muscle",), "N", _FORCE),
+    "contact_force": ("_forces.contact", ("segment", "axis"), "N", "force of the arena on a segment"),
+    "touch": ("touch.normal", ("segment", "side"), "N", "normal force of the ground on a side"),
+    "contact_count": ("touch.count", ("segment",), "1", "number of vertices that touch the ground"),
+    "slip_speed": ("touch.slip_speed", ("segment",), "m/s", "forward speed along the ground of what touches it"),
+    "slip_distance": ("touch.slip_distance", ("segment",), "m", "path that what touches the ground has slid so far"),
+    "slip_loss": ("touch.slip_loss", ("segment",), "J", "work of a segment lost to friction so far"),
+    "center_of_mass": ("posture.center_of_mass", ("axis",), "m", "centre of mass in world axes"),
+    "kinetic_energy": ("kinetic_energy_J", (), "J", "kinetic energy"),
+    "elastic_energy": ("elastic_energy_J", (), "J", "energy of strands and springs"),
+    "potential_energy": ("potential_energy_J", (), "J", "energy of the weight"),
+    "muscle_work": ("energies.muscle_work", ("muscle",), "J", "net work done by a ring muscle so far"),
+    "positive_work": (
+        "energies.positive_work",
+        ("muscle",),
+        "J",
+        "positive work of a ring muscle so far, none regained",
+    ),
+    "damping_loss": ("energies.damping_loss", (), "J", "energy lost to dampers so far"),
+    "constraint_loss": (
+        "energies.constraint_loss",
+        (),
+        "J",
+        "energy lost to contacts, friction and inextensible edges so far",
+    ),
+    "edge_strain": ("_forces.edge_strain", (), "1", "largest strain of a rod's edge"),
+    "pin_gap": ("_forces.pin_gap", (), "m", "largest gap between two pinned strands"),
+}
+"""What is recorded: where a worm has it, its dimensions, its unit and what it is."""
+_FRAME_SIGNALS = {
+    "crossing_position": ("posture.crossing", ("crossing", "axis"), "m", "position of a crossing"),
+    "qpos": ("qpos", ("coordinate",), "1", "generalised position"),
+}
 
 
 def engine_stopped(time_s: float, error: object) -> str:
     """Returns the sentence for an engine that gave up at a simulated time, s."""
     return f"the engine stopped at {time_s:.3f} s: {error}"
+
+
+def body_and_arena(config: RunConfig) -> tuple[WormBody, ArenaKind]:
+    """Returns body and arena of a configuration that is of a 3D worm."""
+    assert isinstance(config.body, WormBody)
+    assert config.arena is not None
+    return config.body, config.arena
 
 
 def compile_worm(config: RunConfig) -> Anatomy:
@@ -63,20 +105,16 @@ def compile_worm(config: RunConfig) -> Anatomy:
     """
     refuse_nonsense(config)
     spec = build_spec(config, for_plant=True)
-    assert isinstance(config.body, WormBody)
-    assert config.arena is not None
+    body, arena = body_and_arena(config)
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     add_contact_sensors(spec)
     add_damper_rows(spec)
-    model = compile_spec(spec)
-    return Anatomy(model, config.body, surface_of(config.arena))
+    return Anatomy(compile_spec(spec), body, surface_of(arena))
 
 
 def owns_model(config: RunConfig) -> bool:
-    """Tells whether a worm sets numbers in its compiled model as it moves, which no other worm may use then."""
-    body, arena = config.body, config.arena
-    assert isinstance(body, WormBody)
-    assert arena is not None
+    """Whether a worm sets numbers in its compiled model as it moves, which no other worm may use then."""
+    body, arena = body_and_arena(config)
     return arena.has_setae or _has_damper_rows(body)
 
 
@@ -85,181 +123,120 @@ def _has_damper_rows(body: WormBody) -> bool:
 
 
 class Worm(ABC):
-    """What a 3D worm feels, records and is alarmed by, whoever steps it.
+    """What a 3D worm senses, records and is alarmed by, whoever steps it.
 
     Lengths and positions are those at the end of the step; forces and edge strains are those that acted during
-    the last physics step, since the engine computes them on the way.
+    the last physics step, since the engine computes them before it moves the body.
 
     Attributes:
+        anatomy: The compiled body; the worm's own where `owns_model` says so.
+        model: The compiled body in the engine.
+        geometry: The mesh.
+        n_segments: Number of actuated segments.
+        n_muscles: Number of ring muscles.
+        total_mass_kg: Mass of strands and pins.
         start: Where it starts; None for the model's own rest, which leads towards -x.
     """
 
-    def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
-        """Makes a worm that has sensed nothing yet.
+    qpos: Array  # the engine's generalised positions, (nq,)
+    plastic: Array  # what the engine keeps of the rods' frames, (nplastic,)
+    act: Array  # the engine's actuator states, (n_states,)
+    engine: Engine  # the engine's arrays that a step is read from
+    warned: NDArray[np.int32]  # how often the engine has given each of its warnings
+    posture: Posture  # where the body is
+    touch: Touch  # what the skin senses of the ground, and how far it has slid
+    energies: EnergyTotals  # what the muscles have done so far, and where it went
 
-        Args:
-            config: The run's configuration.
-            anatomy: The compiled body; the worm's own where `owns_model` says so.
-        """
-        self.anatomy = anatomy
+    def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
+        """Makes a worm that has sensed nothing yet."""
+        self.anatomy, self.model, self.geometry = anatomy, anatomy.model, anatomy.geometry
+        self.n_segments, self.n_muscles = anatomy.n_segments, anatomy.n_muscles
+        self.total_mass_kg = float(anatomy.model.body_mass.sum())
         self._config = config
-        assert config.arena is not None
-        self._surface = surface_of(config.arena)
-        in_pipe = config.arena.is_closed
-        self._height_words = "distance of a crossing from the pipe's wall" if in_pipe else "height of a crossing"
-        moving = config.arena.has_moving_planes
-        self.ground = MovingGround(anatomy.model, anatomy.geometry, config.arena) if moving else None
-        body = config.body
-        assert isinstance(body, WormBody)
+        body, arena = body_and_arena(config)
+        self._body = body
+        self._surface = surface_of(arena)
+        self._height_words = (
+            "distance of a crossing from the pipe's wall" if arena.is_closed else "height of a crossing"
+        )
+        moving = arena.has_moving_planes
+        self.ground = MovingGround(anatomy.model, anatomy.geometry, arena) if moving else None
         self.damping = MaterialDamping(anatomy.model, body.strands) if _has_damper_rows(body) else None
         # What needs no moving planes is level.
-        self._floor = cast(Plane, config.arena.ground())
+        self._floor = cast(Plane, arena.ground())
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
-        self._control_step = 0
-        self._posture: Posture
-        self._forces: Forces = anatomy.no_forces()
-        self._energies: EnergyTotals = anatomy.energy_meter.opened()
-        self._tension_N = np.zeros(anatomy.n_muscles)
-        self._touch = Touch.none(anatomy.n_segments)
         self._activation: Array = np.zeros(anatomy.n_muscles)
-        self._watch = self._new_watch()
-        self._elastic_at_start_J = self._potential_at_start_J = 0.0
         heading = body.heading_deg
         self.start = turned(anatomy.model, at_rest(anatomy.model), heading_turn(heading)) if heading else None
 
-    def _new_watch(self) -> Watch:
-        assert isinstance(self._config.body, WormBody)
-        return Watch(self._config.body, self._config.guard)
-
     @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled body."""
-        return self.anatomy.model
-
-    @property
-    def geometry(self) -> MeshGeometry:
-        """The mesh."""
-        return self.anatomy.geometry
-
-    @property
-    def n_segments(self) -> int:
-        """Number of actuated segments."""
-        return self.anatomy.n_segments
-
-    @property
-    def n_muscles(self) -> int:
-        """Number of ring muscles."""
-        return self.anatomy.n_muscles
-
-    @property
-    def posture(self) -> Posture:
-        """Where the body is."""
-        return self._posture
-
-    @property
-    def touch(self) -> Touch:
-        """What the skin feels of the ground, and how far it has slid."""
-        return self._touch
-
-    @property
-    def energies(self) -> EnergyTotals:
-        """What the muscles have done so far, and where it went."""
-        return self._energies
-
-    @property
-    def total_mass_kg(self) -> float:
-        """Mass of strands and pins."""
-        return float(self.model.body_mass.sum())
-
-    @abstractmethod
-    def reset_engine(self, state: Array | None = None) -> None:
-        """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
+    def _time_s(self) -> float:
+        return self._control_step * self._config.clock.control_timestep_s
 
     @abstractmethod
     def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps under an activation, ``(n_muscles,)``.
-
-        Raises:
-            SimulationStopped: The engine gave up.
-        """
-
-    @abstractmethod
-    def actuator_state(self) -> Array:
-        """Returns the engine's actuator states, ``(n_states,)``."""
-
-    @abstractmethod
-    def locate(self) -> Posture:
-        """Reads the posture from the engine's coordinates."""
-
-    @abstractmethod
-    def qpos(self) -> Array:
-        """Returns the generalised positions, ``(nq,)``."""
-
-    @abstractmethod
-    def plastic(self) -> Array:
-        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
-
-    @abstractmethod
-    def engine_state(self) -> Array:
-        """Returns a copy of all that the engine's next step depends on, as `STATE_PARTS` names it."""
-
-    @abstractmethod
-    def warnings(self) -> NDArray[np.int32]:
-        """Returns how often the engine has given each of its warnings."""
+        """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
 
     @abstractmethod
     def kinetic_energy_J(self) -> float:
         """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
 
+    @abstractmethod
+    def _reset_engine(self, state: Array | None = None) -> None:
+        """Resets the engine, and gives it a state that `_engine_state` returned if there is one."""
+
+    @abstractmethod
+    def _engine_state(self) -> Array:
+        """Returns a copy of all that the engine's next step depends on, as `STATE_PARTS` names it."""
+
+    @abstractmethod
+    def _locate(self) -> Posture:
+        """Reads the posture from the engine's coordinates."""
+
     def elastic_energy_J(self) -> float:
-        """Energy that strands, joints and springs hold, J."""
-        return self.anatomy.elasticity.energy_J(self.qpos(), self.plastic(), self._posture.spring_length)
+        """Energy that strands, joints and springs store, J."""
+        return self.anatomy.elasticity.energy_J(self.qpos, self.plastic, self.posture.spring_length)
 
     def potential_energy_J(self) -> float:
         """Energy of the weight, J, zero with the centre of mass at the origin."""
-        return -self.total_mass_kg * float(self.model.opt.gravity @ self._posture.center_of_mass)
+        return -self.total_mass_kg * float(self.model.opt.gravity @ self.posture.center_of_mass)
 
-    def drive(self, activation: Array, actuator_state: Array) -> Array:
-        """Tells what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
-        return actuator_state.copy() if self.model.na else activation
+    def control(self, activation: Array, n_steps: int) -> Array:
+        """Returns the engine's control during the next physics steps under an activation, ``(n_muscles,)``."""
+        self._activation = activation
+        time_s = n_steps * self._config.clock.physics_timestep_s
+        return self.anatomy.rings.drive(self.model, activation, self.act, self.posture.ring_length, time_s)
 
-    def book(self, engine: Engine, drive: Array) -> None:
-        """Adds one physics step to the energy totals, and notes what the actuators pulled with.
+    def drive(self, activation: Array) -> Array:
+        """Returns what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
+        return self.act.copy() if self.model.na else activation
 
-        Args:
-            engine: The engine's arrays named in the energy_meter's `outputs`, after the step.
-            drive: What `drive` returned before it.
-        """
-        self._tension_N, entries = self.anatomy.energy_meter.step(engine, drive)
+    def add_step(self, drive: Array) -> None:
+        """Adds the physics step that was taken to the energy totals, with what `drive` returned before it."""
+        self._tension_N, entries = self.anatomy.energy_meter.step(self.engine, drive)
         if self.damping is not None:
             # The engine counts the rows among its constraints.
-            loss = self._config.clock.physics_timestep_s * self.damping.loss_W(engine["qvel"])
-            entries = replace(
-                entries, damping_loss=entries.damping_loss + loss, constraint_loss=entries.constraint_loss - loss
-            )
-        self._energies += entries
+            loss = self._config.clock.physics_timestep_s * self.damping.loss_W(self.engine["qvel"])
+            damped, constrained = entries.damping_loss + loss, entries.constraint_loss - loss
+            entries = entries._replace(damping_loss=damped, constraint_loss=constrained)
+        self.energies = self.energies.plus(entries)
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
-        self.reset_engine()
+        n = self.n_segments
+        self._reset_engine()
         self._control_step = 0
-        self._forces = self.anatomy.no_forces()
-        self._energies = self.anatomy.energy_meter.opened()
+        self._forces = Forces(np.zeros((n, 3)), np.zeros(()), np.zeros(()))
+        self.energies = EnergyTotals.zero(self.n_muscles)
         self._tension_N = np.zeros(self.n_muscles)
-        self._touch = Touch.none(self.n_segments)
-        self._posture = self.locate()
-        self._watch = self._new_watch()
+        self.touch = Touch.none(n)
+        self.posture = self._locate()
+        self._watch = Watch(self._body, self._config.guard)
         self._elastic_at_start_J, self._potential_at_start_J = self.elastic_energy_J(), self.potential_energy_J()
         return self.observe()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step.
-
-        Args:
-            activation: Muscle activation in [0, 1], shape ``(n_muscles,)``.
-
-        Returns:
-            What the body feels at the end of the step.
+        """Advances by one control step under an activation in [0, 1], ``(n_muscles,)``; returns what the body senses.
 
         Raises:
             SimulationStopped: The engine gave up on the step.
@@ -272,18 +249,7 @@ class Worm(ABC):
         return every - self._control_step % every
 
     def stride(self, activation: Array, n_steps: int) -> Sensation:
-        """Advances by several control steps, of which at most the last one moves the body.
-
-        Args:
-            activation: Muscle activation in the last of them, in [0, 1], shape ``(n_muscles,)``.
-            n_steps: How many, from 1 to `steps_to_move`.
-
-        Returns:
-            What the body feels at their end.
-
-        Raises:
-            SimulationStopped: The engine gave up on the step.
-        """
+        """Advances by 1 to `steps_to_move` control steps, of which at most the last one moves the body, as `step`."""
         due = self.moves_due(n_steps)
         return self.strode(n_steps, self.move(activation, due) if due else None)
 
@@ -291,64 +257,39 @@ class Worm(ABC):
         """Number of physics steps at the end of the next ``n_steps`` control steps, at most `steps_to_move` of them."""
         return self._ratio.physics_steps_due(self._control_step + n_steps)
 
-    def control(self, activation: Array, n_steps: int) -> Array:
-        """Tells what the engine's actuators get during the next physics steps under an activation, ``(n_muscles,)``."""
-        self._activation = activation
-        time_s = n_steps * self._config.clock.physics_timestep_s
-        return self.anatomy.control(activation, self.actuator_state(), self._posture.ring_length, time_s)
-
     def strode(self, n_steps: int, moved: Movement | None) -> Sensation:
-        """Takes note of control steps, whoever has moved the body.
-
-        Args:
-            n_steps: How many.
-            moved: What the body has come to, or None if it has not moved.
-
-        Returns:
-            What the body feels at their end.
-        """
-        due = self.moves_due(n_steps)
+        """Takes note of control steps and of a movement of the body, if any, whoever has moved it; then observes."""
+        time_s = self.moves_due(n_steps) * self._config.clock.physics_timestep_s
         self._control_step += n_steps
         if moved is not None:
-            before, (self._posture, self._forces, ground) = self._posture, moved
-            self._touch = self.anatomy.skin.touch(
-                self._touch,
-                ground,
-                before.skin,
-                self._posture.skin,
-                self._posture.axis,
-                due * self._config.clock.physics_timestep_s,
-            )
+            before, (self.posture, self._forces, ground) = self.posture, moved
+            after = self.posture
+            self.touch = self.anatomy.skin.touch(self.touch, ground, before.skin, after.skin, after.axis, time_s)
         return self.observe()
 
     def observe(self) -> Sensation:
-        """Tells the present lengths and forces, in arrays that nobody writes to again."""
-        posture, forces = self._posture, self._forces
+        """Returns the present lengths and forces, in arrays that nobody writes to again."""
+        posture = self.posture
         return Sensation(
-            time_s=self._control_step * self._config.clock.control_timestep_s,
+            time_s=self._time_s,
             stretch_m=posture.stretch,
             rest_stretch_m=self.anatomy.rest_stretch_m,
             ring_length_m=posture.ring_length,
             muscle_force_N=self._tension_N,
-            contact_force_N=forces.contact,
+            contact_force_N=self._forces.contact,
             center_of_mass_m=posture.center_of_mass,
-            touch_N=self._touch.normal,
+            touch_N=self.touch.normal,
             front_m=posture.front,
             heading=posture.heading,
         )
 
     def alarm(self) -> str | None:
-        """Tells whether the engine has warned, or a quantity exceeds its guard.
-
-        Returns:
-            One sentence naming the quantity, its value and its limit, or None.
-        """
-        warned = self.warnings()
-        if warned.any():
+        """Returns a sentence where the engine has warned or a quantity exceeds its guard, else None."""
+        if self.warned.any():
             for warning, words in ENGINE_WARNINGS.items():
-                if warned[warning]:
+                if self.warned[warning]:
                     return f"{words}; a shorter clock.physics_timestep_s or softer settings may help"
-        guard = self._config.guard
+        guard, posture = self._config.guard, self.posture
         strain, gap = float(self._forces.edge_strain), float(self._forces.pin_gap)
         height = energy = 0.0
         due = self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0
@@ -356,52 +297,37 @@ class Worm(ABC):
             energy = self.kinetic_energy_J()
         if due or isinstance(self._surface, Plane):
             with np.errstate(invalid="ignore", over="ignore"):
-                distance, _ = self._surface.nearest(self._posture.crossing, first_order=True)
+                distance, _ = self._surface.nearest(posture.crossing, first_order=True)
                 height = float(np.abs(distance).max())
-        if (
-            height <= guard.height_m
-            and strain <= guard.edge_strain
-            and gap <= guard.pin_gap_m
-            and energy <= guard.kinetic_energy_J
-        ):
-            return self._watch.look(
-                self._control_step * self._config.clock.control_timestep_s,
-                self._posture.ring_length,
-                self._posture.spring_length,
-                self._depth_m(),
-                gap,
-                self._activation,
-                self._tension_N,
-            )
-        readings = (
+        for field, words, value, limit, unit in (
             ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
             ("guard.pin_gap_m", "gap at a pin", gap, guard.pin_gap_m, " m"),
             ("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"),
-        )
-        for field, words, value, limit, unit in readings:
+        ):
+            # Written so that NaN fails it.
             if not value <= limit:
                 return f"{words} is {value:.3g}{unit}, above the limit {field} = {limit:g}"
-        return None
+        rings, springs = posture.ring_length, posture.spring_length
+        return self._watch.look(self._time_s, rings, springs, self._depth_m(), gap, self._activation, self._tension_N)
 
     def _depth_m(self) -> float:
         """Depth of the deepest vertex in the ground, m; over moving planes that at the start of the last step."""
         if self.ground is not None:
             return self.ground.depth_m
-        return self._floor.offset_m - float(np.minimum.reduce(self._posture.skin @ self._floor.facing))
+        return self._floor.offset_m - float(np.minimum.reduce(self.posture.skin @ self._floor.facing))
 
     def doubts(self) -> tuple[str, ...]:
-        """Tells what is doubtful about the configuration, and about what has happened since time zero."""
-        time_s = self._control_step * self._config.clock.control_timestep_s
-        return *map(str, check(self._config)), *self._watch.warnings(time_s, self._energies_by_cause())
+        """Returns what is doubtful about the configuration, and about what has happened since time zero."""
+        return *map(str, check(self._config)), *self._watch.warnings(self._time_s, self._energies_by_cause())
 
     def _energies_by_cause(self) -> Energies:
-        """Tells what has driven the worm and what the integrator took of it; nothing where they do not add up."""
-        # The engine tells the forces of the last of RK4's four stages only.
+        """What has driven the worm and what the integrator took of it; nothing where they do not add up."""
+        # The engine gives the forces of the last of RK4's four stages only.
         if self.model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_RK4):
             return Energies(0.0, 0.0)
-        work = float(self._energies.muscle_work.sum())
-        lost = float(self._energies.damping_loss + self._energies.constraint_loss)
+        work = float(self.energies.muscle_work.sum())
+        lost = float(self.energies.damping_loss + self.energies.constraint_loss)
         # A worm that slides down is driven by its weight as well.
         sunk = self._potential_at_start_J - self.potential_energy_J()
         held = self.elastic_energy_J() - self._elastic_at_start_J + self.kinetic_energy_J()
@@ -409,101 +335,64 @@ class Worm(ABC):
 
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
-        anatomy = self.anatomy
-        return Recordable(
-            signals=worm_signals(anatomy),
-            coords={"muscle": anatomy.muscle_names, "axis": AXES, "side": SIDES},
-            attrs={"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m},
+        signals = (
+            Signal(name, dims, np.shape(self._value(path)), units, words, name in _FRAME_SIGNALS)
+            for name, (path, dims, units, words) in (_SIGNALS | _FRAME_SIGNALS).items()
+            if (name != "edge_strain" or self.anatomy.has_edges) and (name != "pin_gap" or self.anatomy.pins_can_part)
         )
+        coords = {"muscle": self.anatomy.muscle_names, "axis": ("x", "y", "z"), "side": SIDES}
+        attrs = {"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m}
+        return Recordable(tuple(signals), coords, attrs)
 
-    def read(self, frame: bool) -> Mapping[str, NDArray[np.generic] | float]:
+    def read(self, frame: bool) -> Values:
         """Reads the present values of the frame signals, or of all others."""
-        posture, forces, touch = self._posture, self._forces, self._touch
-        if frame:
-            return {"crossing_position": posture.crossing, "qpos": self.qpos()}
-        values: dict[str, NDArray[np.generic] | float] = {
-            "stretch_length": posture.stretch,
-            "spring_length": posture.spring_length,
-            "ring_length": posture.ring_length,
-            "muscle_force": self._tension_N,
-            "contact_force": forces.contact,
-            "touch": touch.normal,
-            "contact_count": touch.count,
-            "slip_speed": touch.slip_speed,
-            "slip_distance": touch.slip_distance,
-            "slip_loss": touch.slip_loss,
-            "center_of_mass": posture.center_of_mass,
-            "kinetic_energy": self.kinetic_energy_J(),
-            "elastic_energy": self.elastic_energy_J(),
-            "potential_energy": self.potential_energy_J(),
-            **asdict(self._energies),
-        }
-        if self.anatomy.has_edges:
-            values["edge_strain"] = forces.edge_strain
-        if self.anatomy.pins_can_part:
-            values["pin_gap"] = forces.pin_gap
-        return values
+        return {name: self._value(path) for name, (path, *_) in (_FRAME_SIGNALS if frame else _SIGNALS).items()}
+
+    def _value(self, path: str) -> Any:
+        value = attrgetter(path)(self)
+        return value() if callable(value) else value
 
     def get_state(self) -> State:
         """Returns the engine's whole state and what was sensed last."""
         forces = self._forces
         return {
-            "engine": self.engine_state(),
+            "engine": self._engine_state(),
             "control_step": np.array([self._control_step]),
             "muscle_force": self._tension_N.copy(),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
-            **asdict(self._energies),
-            **self._touch.state(),
+            **{name: np.array(total) for name, total in self.energies._asdict().items()},
+            **self.touch.state(),
             **self._watch.get_state(),
         }
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned; the run then continues bit for bit on the same machine."""
-        self.reset_engine(np.asarray(state["engine"], dtype=float))
+        self._reset_engine(np.asarray(state["engine"], dtype=float))
         self._control_step = int(state["control_step"][0])
         strain, gap = np.asarray(state["extremes"], dtype=float)
         self._tension_N = np.array(state["muscle_force"], dtype=float)
         self._forces = Forces(np.array(state["contact_force"], dtype=float), strain, gap)
-        self._energies = EnergyTotals(*(np.array(state[field.name], dtype=float) for field in fields(EnergyTotals)))
-        self._touch = Touch.of_state(state)
+        self.energies = EnergyTotals(*(np.array(state[name], dtype=float) for name in EnergyTotals._fields))
+        self.touch = Touch.of_state(state)
         self._watch.set_state(state)
-        self._posture = self.locate()
+        self.posture = self._locate()
 
 
 class WormPlant(Worm):
     """The 3D worm in its arena, with an engine of its own."""
 
-    def __init__(self, config: RunConfig) -> None:
-        """Builds and compiles the body.
-
-        Args:
-            config: The run's configuration.
-
-        Raises:
-            ConfigError: The body is planar, or the engine refuses the model.
-        """
-        super().__init__(config, compile_worm(config))
-        self.data = mujoco.MjData(self.model)
-        data = self.data
-        self._outputs: dict[str, Array] = {name: getattr(data, name) for name in self.anatomy.outputs}
-        self._work: dict[str, NDArray[Any]] = {name: getattr(data, name) for name in self.anatomy.energy_meter.outputs}
-
-    def reset_engine(self, state: Array | None = None) -> None:
-        """Resets the engine, and gives it a state that `engine_state` returned if there is one."""
-        mujoco.mj_resetData(self.model, self.data)
-        self.data.act[:] = self.anatomy.first_act
-        if self.start is not None:
-            self.data.qpos[:], self.data.plastic[:] = self.start
-        if state is not None:
-            mujoco.mj_setState(self.model, self.data, state, STATE_PARTS)
+    def __init__(self, config: RunConfig, anatomy: Anatomy | None = None) -> None:
+        """Builds and compiles the body, unless it is compiled already; raises as `compile_worm`."""
+        super().__init__(config, anatomy or compile_worm(config))
+        data = self.data = mujoco.MjData(self.model)
+        self.qpos, self.plastic, self.act, self.warned = data.qpos, data.plastic, data.act, data.warning.number
+        names = (*self.anatomy.outputs, *self.anatomy.energy_meter.outputs)
+        self.engine = {name: getattr(data, name) for name in names}
+        self.reset(0)
 
     def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps under an activation, ``(n_muscles,)``.
-
-        Raises:
-            SimulationStopped: The engine gave up.
-        """
+        """Takes physics steps with this worm's own engine, as `Worm.move`."""
         data = self.data
         data.ctrl[:] = self.control(activation, n_steps)
         try:
@@ -511,51 +400,40 @@ class WormPlant(Worm):
                 if self.ground is not None:
                     self.ground.lay(data)
                 if self.damping is not None:
-                    self.damping.renew(data.qpos)
-                drive = self.drive(activation, data.act)
+                    self.damping.renew(self.qpos)
+                drive = self.drive(activation)
                 mujoco.mj_step(self.model, data)
-                self.book(self._work, drive)
+                self.add_step(drive)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None
-        # Pin gaps are read before `locate` brings positions up to the end of the step.
-        forces, ground = self.anatomy.forces(self._outputs), self.anatomy.ground(self._outputs)
-        return Movement(self.locate(), forces, ground)
+        # Pin gaps are read before positions are brought up to the end of the step.
+        forces, ground = self.anatomy.forces(self.engine)
+        return Movement(self._locate(), forces, ground)
 
     def push(self, force_N: Array) -> None:
-        """Lets outside forces act on the crossings from the next step on; the energy totals know nothing of their work.
+        """Lets outside forces, N, ``(n_crossings, 3)``, act on the crossings from the next step on; zeros end it.
 
-        Args:
-            force_N: In the model's axes, N, ``(n_crossings, 3)``; zeros end it.
+        They are in the model's axes, and the energy totals know nothing of their work.
         """
         self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
-
-    def actuator_state(self) -> Array:
-        """Returns the engine's actuator states, ``(n_states,)``."""
-        return self.data.act
-
-    def locate(self) -> Posture:
-        """Reads the posture from the engine's coordinates."""
-        return self.anatomy.posture(*self.anatomy.locate(self.data))
-
-    def qpos(self) -> Array:
-        """Returns the generalised positions, ``(nq,)``."""
-        return self.data.qpos
-
-    def plastic(self) -> Array:
-        """Returns what the engine keeps of the rods' frames, ``(nplastic,)``."""
-        return self.data.plastic
-
-    def engine_state(self) -> Array:
-        """Returns a copy of all that the engine's next step depends on."""
-        state = np.empty(mujoco.mj_stateSize(self.model, STATE_PARTS))
-        mujoco.mj_getState(self.model, self.data, state, STATE_PARTS)
-        return state
-
-    def warnings(self) -> NDArray[np.int32]:
-        """Returns how often the engine has given each of its warnings."""
-        return self.data.warning.number
 
     def kinetic_energy_J(self) -> float:
         """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
         mujoco.mj_energyVel(self.model, self.data)
         return float(self.data.energy[1])
+
+    def _reset_engine(self, state: Array | None = None) -> None:
+        mujoco.mj_resetData(self.model, self.data)
+        self.act[:] = self.anatomy.first_act
+        if self.start is not None:
+            self.qpos[:], self.plastic[:] = self.start
+        if state is not None:
+            mujoco.mj_setState(self.model, self.data, state, STATE_PARTS)
+
+    def _engine_state(self) -> Array:
+        state = np.empty(mujoco.mj_stateSize(self.model, STATE_PARTS))
+        mujoco.mj_getState(self.model, self.data, state, STATE_PARTS)
+        return state
+
+    def _locate(self) -> Posture:
+        return self.anatomy.posture(*self.anatomy.locate(self.data))

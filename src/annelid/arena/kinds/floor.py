@@ -15,14 +15,12 @@ from annelid.config.sections import NonNegative, Positive
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
-Slope = Annotated[float, Field(ge=-60, le=60)]
-
 
 class Ground(ArenaKind):
     """What floors and reliefs have in common; it lies along x."""
 
     floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
-    slope_deg: Slope = Field(
+    slope_deg: Annotated[float, Field(ge=-60, le=60)] = Field(
         default=0.0,
         description="how steeply it rises towards -x, where a worm with body.heading_deg = 0 leads; the model's axes "
         "lie in the slope",
@@ -52,7 +50,11 @@ class Ground(ArenaKind):
         return self.floor_gap_m
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that the worm leads towards -x."""
+        """Checks that the worm leads towards -x.
+
+        Raises:
+            ValueError: It leads elsewhere.
+        """
         refuse_heading(config, f"arena.kind = {self.kind!r}")
 
 
@@ -71,21 +73,17 @@ class Floor(Ground):
         return Plane(UP, -self.floor_gap_m)
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that the worm leads towards -x between guard rails."""
+        """Checks that the worm leads towards -x between guard rails.
+
+        Raises:
+            ValueError: It leads elsewhere.
+        """
         if self.rail_gap_m is not None:
             refuse_heading(config, f"arena.rail_gap_m = {self.rail_gap_m:g}")
 
 
 def refuse_heading(config: RunConfig, where: str) -> None:
-    """Refuses a worm that does not lead towards -x in an arena that lies along x.
-
-    Args:
-        config: The configuration.
-        where: Field and value of the arena that lie along x.
-
-    Raises:
-        ValueError: ``body.heading_deg`` is not 0.
-    """
+    """Raises ValueError for a worm that does not lead towards -x where an arena, by this field, lies along x."""
     heading_deg = getattr(config.body, "heading_deg", 0.0)
     if heading_deg:
         raise ValueError(

@@ -11,8 +11,7 @@ from pydantic import Field, model_validator
 
 from annelid.arena.course import AHEAD, UP, Bore, Course, Curve, Straight
 from annelid.arena.kinds.floor import refuse_heading
-from annelid.arena.shapes import AROUND, ENTRY_SHOWN_M, EXIT_SHOWN_M, PIPE_GRAIN_M, Shape, grid_faces
-from annelid.arena.surface import Implicit, Level, lengths
+from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
 from annelid.config.arena import ArenaKind
 from annelid.config.sections import NonNegative, Positive
 from annelid.protocols import Array
@@ -28,7 +27,10 @@ ROUNDING_M = 0.02
 """Length over which the bore's slope changes where a taper begins or ends."""
 PIPE_ABOVE_FLOOR_M = 0.02
 """The floor below a pipe is there to be seen only."""
-PANELS_AROUND = 32
+ENTRY_SHOWN_M, EXIT_SHOWN_M = 0.15, 1.2
+"""How much is drawn of what goes on for ever: behind the worm's rear, and beyond the last change."""
+GRAIN_M, AROUND = 0.03, 48
+"""Of the triangles that are drawn: their length, and how many edges are round the pipe."""
 PANEL_LENGTH_M = 0.05
 HALF_THICKNESS_M = 0.01
 
@@ -115,7 +117,7 @@ class Pipe(ArenaKind):
         """Returns the centre line in the coordinates of the worm's model; arc lengths count from the worm's front."""
         start = self.bore_m * UP
         if self.course == "straight":
-            return Course((Straight(start, AHEAD, -inf, inf),), ())
+            return Course((Straight(start, AHEAD, -inf, inf),))
         turn = radians(self.turn_deg)
         rise = self.pitch_m / (2 * pi) if self.course == "helix" else 0.0
         curve = _curve(start + self.straight_m * AHEAD, AHEAD, UP, self.radius_m, rise, turn, self.straight_m)
@@ -125,16 +127,15 @@ class Pipe(ArenaKind):
             pieces.append(_curve(end.point_m, end.tangent, UP, self.radius_m, 0.0, -turn, curve.last_m))
         last = pieces[-1].at(np.array(pieces[-1].last_m))
         pieces.append(Straight(last.point_m, last.tangent, pieces[-1].last_m, inf))
-        return Course(tuple(pieces), tuple(piece.last_m for piece in pieces[:-1]))
+        return Course(tuple(pieces))
 
     def bore(self) -> Bore:
         """Returns the bore: wider at the entry by the clearance, then as the profile says."""
-        parts = [_ramp(0.0, ENTRY_RAMP_M, -self.entry_clearance_m)]
         change = self.narrowest_m - self.bore_m
-        if self.profile == "taper":
-            parts.append(_ramp(self.profile_start_m, self.profile_length_m, change))
-        if self.profile == "hourglass":
-            parts.append(_waist(self.profile_start_m, self.profile_length_m, change))
+        parts = [_change(0.0, ENTRY_RAMP_M, -self.entry_clearance_m)]
+        if self.profile != "even":
+            back = self.profile == "hourglass"
+            parts.append(_change(self.profile_start_m, self.profile_length_m, change, back=back))
         arc = np.unique(np.concatenate([knots for knots, _ in parts]))
         slope = sum((np.interp(arc, *part, left=0.0, right=0.0) for part in parts), np.zeros(len(arc)))
         rises = np.diff(arc) * (slope[1:] + slope[:-1]) / 2
@@ -151,11 +152,42 @@ class Pipe(ArenaKind):
 
     def shape(self, length_m: float) -> Shape:
         """Returns the tube to be drawn."""
-        return _tube(self.ground(), length_m)
+        wall, (first, last) = self.ground(), self._shown(length_m)
+        arc = np.linspace(first, last, int((last - first) / GRAIN_M) + 2)
+        centre, side, up = frames_along(wall.course, arc)
+        angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+        across = np.cos(angle)[:, np.newaxis] * side[:, np.newaxis] + np.sin(angle)[:, np.newaxis] * up[:, np.newaxis]
+        rings = centre[:, np.newaxis] + wall.bore.at(arc)[0][:, np.newaxis, np.newaxis] * across
+        return Shape(rings.reshape(-1, 3), grid_faces(len(arc), AROUND, closed=True))
 
-    def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
-        """Adds flat panels that are tangent to the wall in their middles."""
-        add_pipe_panels(spec, self, length_m)
+    def add_panels(self, spec: mujoco.MjSpec, length_m: float, around: int = 32) -> None:
+        """Adds flat panels that are tangent to the wall in their middles, a number of them around; none is drawn."""
+        from annelid.arena.geoms import add_box
+
+        wall, (first, last) = self.ground(), self._shown(length_m)
+        n_rings = int((last - first) / PANEL_LENGTH_M) + 1
+        arc = first + (np.arange(n_rings) + 0.5) * (last - first) / n_rings
+        centre, side, up = frames_along(wall.course, arc)
+        foot, radius = wall.course.at(arc), wall.bore.at(arc)[0]
+        for angle in 2.0 * pi * np.arange(around) / around:
+            outwards = np.cos(angle) * side + np.sin(angle) * up
+            # A ring's panels are longer on the outer side of a curve.
+            stretch = 1.0 - radius * (outwards * foot.curvature_per_m).sum(axis=-1)
+            places = centre + radius[:, np.newaxis] * outwards
+            inwards = wall.normal(places)
+            half_length = np.maximum(stretch, 0.1) * (last - first) / n_rings / 2
+            for place, facing, along, half, own in zip(places, inwards, foot.tangent, half_length, radius, strict=True):
+                ahead = along - (along @ facing) * facing
+                ahead = ahead / np.linalg.norm(ahead)
+                axes = np.stack([ahead, np.cross(facing, ahead), facing], axis=-1)
+                size = [half, own * tan(pi / around), HALF_THICKNESS_M]
+                add_box(spec, self, place - HALF_THICKNESS_M * facing, size, axes)
+
+    def _shown(self, length_m: float) -> tuple[float, float]:
+        """Arc lengths between which the pipe is drawn, m, with a worm of a length in its entry."""
+        ends = [piece.first_m for piece in self.centre_line().pieces if isinstance(piece, Straight)]
+        last = max([*filter(isfinite, ends), float(self.bore().arc_m[-1])])
+        return -(length_m + ENTRY_SHOWN_M), last + EXIT_SHOWN_M
 
 
 def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, turn_rad: float, arc_m: float) -> Curve:
@@ -166,30 +198,17 @@ def _curve(start: Array, tangent: Array, up: Array, radius: float, rise: float, 
     return Curve(start - radius * outwards, outwards, onwards, axis, radius, rise, abs(turn_rad), arc_m)
 
 
-def _ramp(start: float, length: float, change: float) -> tuple[Array, Array]:
-    """Arc lengths and slopes of an even change of the radius with rounded ends."""
+def _change(start: float, length: float, change: float, *, back: bool = False) -> tuple[Array, Array]:
+    """Arc lengths and slopes of a change of the radius with rounded ends: an even one, or a parabola there and back."""
     rounding = min(ROUNDING_M, length / 4)
-    slope = change / (length - rounding)
+    slope = 4.0 * change / length if back else change / (length - rounding)
     knots = np.array([start, start + rounding, start + length - rounding, start + length])
-    return knots, np.array([0.0, slope, slope, 0.0])
-
-
-def _waist(start: float, length: float, change: float) -> tuple[Array, Array]:
-    """Arc lengths and slopes of a parabolic waist with rounded ends, narrowest midway."""
-    rounding = min(ROUNDING_M, length / 4)
-    slope = 4.0 * change / length
-    knots = np.array([start, start + rounding, start + length - rounding, start + length])
-    return knots, np.array([0.0, slope, -slope, 0.0])
+    return knots, np.array([0.0, slope, -slope if back else slope, 0.0])
 
 
 @dataclass(frozen=True)
 class PipeWall(Implicit):
-    """The inside of a pipe.
-
-    Attributes:
-        course: Its centre line.
-        bore: Its radius along it.
-    """
+    """The inside of a pipe: its centre line, and its radius along that."""
 
     course: Course
     bore: Bore
@@ -202,16 +221,10 @@ class PipeWall(Implicit):
         on_line = radial == 0.0
         outwards = np.where(on_line[:, np.newaxis], UP, away / np.where(on_line, 1.0, radial)[:, np.newaxis])
         radius, slope = self.bore.at(foot.arc_m)
-        # The centre line's arc length grows faster than the way on the inner side of a curve.
+        # The centre line's arc length grows faster than the path on the inner side of a curve.
         stretch = np.maximum(1.0 - (away * foot.curvature_per_m).sum(axis=-1), 0.1)
         gradient = (slope / stretch)[:, np.newaxis] * foot.tangent - outwards
         return Level(radius - radial, gradient, slope == 0.0)
-
-
-def last_change_m(course: Course, bore: Bore) -> float:
-    """Returns the arc length at which a pipe's last curve or change of its bore ends, m."""
-    ends = [piece.first_m for piece in course.pieces if isinstance(piece, Straight) and isfinite(piece.first_m)]
-    return max([*ends, float(bore.arc_m[-1])])
 
 
 def frames_along(course: Course, arc_m: Array) -> tuple[Array, Array, Array]:
@@ -224,45 +237,3 @@ def frames_along(course: Course, arc_m: Array) -> tuple[Array, Array, Array]:
     side = side / np.linalg.norm(side, axis=-1, keepdims=True)
     up: Array = np.cross(side, foot.tangent)
     return foot.point_m, side, up
-
-
-def _tube(wall: PipeWall, length_m: float) -> Shape:
-    first, last = -(length_m + ENTRY_SHOWN_M), last_change_m(wall.course, wall.bore) + EXIT_SHOWN_M
-    arc = np.linspace(first, last, int((last - first) / PIPE_GRAIN_M) + 2)
-    centre, side, up = frames_along(wall.course, arc)
-    angle = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
-    across = np.cos(angle)[:, np.newaxis] * side[:, np.newaxis] + np.sin(angle)[:, np.newaxis] * up[:, np.newaxis]
-    rings = centre[:, np.newaxis] + wall.bore.at(arc)[0][:, np.newaxis, np.newaxis] * across
-    return Shape(rings.reshape(-1, 3), grid_faces(len(arc), AROUND, closed=True))
-
-
-def add_pipe_panels(spec: mujoco.MjSpec, pipe: Pipe, length_m: float, around: int = PANELS_AROUND) -> None:
-    """Adds flat panels tangent to a pipe's wall; they are not drawn.
-
-    Args:
-        spec: The worm's spec.
-        pipe: The pipe and its contact settings.
-        length_m: Length of the worm, which the entry holds.
-        around: Number of panels round the pipe.
-    """
-    from annelid.arena.contact import add_box
-
-    wall = pipe.ground()
-    first, last = -(length_m + ENTRY_SHOWN_M), last_change_m(wall.course, wall.bore) + EXIT_SHOWN_M
-    n_rings = int((last - first) / PANEL_LENGTH_M) + 1
-    arc = first + (np.arange(n_rings) + 0.5) * (last - first) / n_rings
-    centre, side, up = frames_along(wall.course, arc)
-    foot, radius = wall.course.at(arc), wall.bore.at(arc)[0]
-    for angle in 2.0 * pi * np.arange(around) / around:
-        outwards = np.cos(angle) * side + np.sin(angle) * up
-        # A ring's panels are longer on the outer side of a curve.
-        stretch = 1.0 - radius * (outwards * foot.curvature_per_m).sum(axis=-1)
-        places = centre + radius[:, np.newaxis] * outwards
-        inwards = wall.normal(places)
-        half_length = np.maximum(stretch, 0.1) * (last - first) / n_rings / 2
-        for place, facing, along, half, own in zip(places, inwards, foot.tangent, half_length, radius, strict=True):
-            ahead = along - (along @ facing) * facing
-            ahead = ahead / np.linalg.norm(ahead)
-            axes = np.stack([ahead, np.cross(facing, ahead), facing], axis=-1)
-            size = [half, own * tan(pi / around), HALF_THICKNESS_M]
-            add_box(spec, pipe, place - HALF_THICKNESS_M * facing, size, axes)

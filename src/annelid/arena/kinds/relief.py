@@ -10,16 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.arena.kinds.floor import Ground
-from annelid.arena.shapes import (
-    GROUND_AHEAD_M,
-    GROUND_BEHIND_M,
-    GROUND_GRAIN_M,
-    GROUND_HALF_WIDTH_M,
-    ROUNDED_GRAIN,
-    Shape,
-    grid_faces,
-)
-from annelid.arena.surface import Implicit, Level, Nearest, Surface
+from annelid.arena.surface import Implicit, Level, Shape, Surface, grid_faces
 from annelid.config.sections import NonNegative, Positive, Seed
 from annelid.protocols import Array
 
@@ -28,8 +19,12 @@ if TYPE_CHECKING:
 
 N_WAVES = 32
 """Waves that rough ground is the sum of."""
-FIELD_GRAIN_M = 0.02
-FIELD_BASE_M = 0.1
+AHEAD_M, BEHIND_M, HALF_WIDTH_M = 6.0, 1.5, 2.0
+"""How much is drawn of what goes on for ever, from the worm's front."""
+GRAIN_M, ROUNDED_GRAIN = 0.03, 6
+"""Of what is drawn: length of a triangle, and edges of a rounding."""
+FIELD_GRAIN_M, BASE_M = 0.02, 0.1
+"""Of what is touched in plain MuJoCo: grain of a height field, and thickness below the lowest point."""
 
 
 class Relief(Ground):
@@ -57,19 +52,41 @@ class Steps(Relief):
 
     def ground(self) -> Surface:
         """Returns the steps."""
-        return self._stairs()
+        return Stairs(self.start_m, self.step_length_m, self.step_height_m, self.rounding_m, -self.floor_gap_m)
+
+    @property
+    def _n_shown(self) -> int:
+        return max(int((AHEAD_M - self.start_m) / self.step_length_m), 1)
 
     def shape(self, length_m: float) -> Shape:
         """Returns the steps to be drawn."""
-        return _flight(self._stairs())
+        turn = np.linspace(0.0, np.pi / 2, ROUNDED_GRAIN)
+        r, h, start, length, n_steps = (
+            self.rounding_m,
+            self.step_height_m,
+            self.start_m,
+            self.step_length_m,
+            self._n_shown,
+        )
+        inner = np.stack([-r + r * np.sin(turn), r - r * np.cos(turn)], axis=-1)
+        edge = np.stack([r - r * np.cos(turn), h - r + r * np.sin(turn)], axis=-1)
+        risers = [np.concatenate([inner, edge]) + np.array([start + k * length, k * h]) for k in range(n_steps)]
+        end = [[AHEAD_M, n_steps * h]] if n_steps * length + start < AHEAD_M else []
+        line = np.concatenate([[[-BEHIND_M, 0.0]], *risers, np.reshape(end, (-1, 2))])
+        x, y = np.meshgrid(-line[:, 0], np.linspace(-HALF_WIDTH_M, HALF_WIDTH_M, 9), indexing="ij")
+        z = np.broadcast_to(line[:, 1:] - self.floor_gap_m, x.shape)
+        return Shape(np.stack([x, y, z], axis=-1).reshape(-1, 3), grid_faces(*x.shape)[:, ::-1])
 
     def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
         """Adds a block a step."""
-        _add_blocks(spec, self, self._stairs())
+        from annelid.arena.geoms import add_box
 
-    def _stairs(self) -> Stairs:
-        profile = StepProfile(self.start_m, self.step_length_m, self.step_height_m, self.rounding_m)
-        return Stairs(profile, -self.floor_gap_m)
+        bottom = -self.floor_gap_m - BASE_M
+        edges = [BEHIND_M, *(-self.start_m - k * self.step_length_m for k in range(self._n_shown))]
+        for step, edge in enumerate(edges):
+            top = -self.floor_gap_m + step * self.step_height_m
+            place = np.array([(edge - AHEAD_M) / 2, 0.0, (top + bottom) / 2])
+            add_box(spec, self, place, [(edge + AHEAD_M) / 2, HALF_WIDTH_M, (top - bottom) / 2], np.eye(3))
 
 
 class Rough(Relief):
@@ -89,53 +106,69 @@ class Rough(Relief):
             )
         return self
 
-    def ground(self) -> Surface:
-        """Returns the ground that `relief_seed` draws."""
-        return self._hills()
+    def ground(self) -> Hills:
+        """Returns the ground that `relief_seed` draws; its correlation is Gaussian in the distance."""
+        generator = np.random.default_rng(self.relief_seed)
+        waves = generator.normal(scale=sqrt(2.0) / self.correlation_m, size=(N_WAVES, 2))
+        phases = generator.uniform(0.0, 2.0 * np.pi, size=N_WAVES)
+        amplitude = self.roughness_m * sqrt(2.0 / N_WAVES)
+        return Hills(self.start_m, self.correlation_m, amplitude, waves, phases, -self.floor_gap_m)
 
     def shape(self, length_m: float) -> Shape:
         """Returns the ground to be drawn."""
-        return _field(self._hills())
+        ahead = np.arange(-BEHIND_M, AHEAD_M, GRAIN_M)
+        x, y = np.meshgrid(-ahead, np.arange(-HALF_WIDTH_M, HALF_WIDTH_M, GRAIN_M), indexing="ij")
+        height, _ = self.ground().height(np.stack([x, y], axis=-1))
+        return Shape(np.stack([x, y, height - self.floor_gap_m], axis=-1).reshape(-1, 3), grid_faces(*x.shape)[:, ::-1])
 
     def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
         """Adds a height field."""
-        _add_field(spec, self, self._hills())
+        import mujoco
 
-    def _hills(self) -> Hills:
-        return Hills(RoughGround.drawn(self), -self.floor_gap_m)
+        from annelid.arena.geoms import HIDDEN_GROUP, contact_options
+
+        half_length, middle = (AHEAD_M + BEHIND_M) / 2, (BEHIND_M - AHEAD_M) / 2
+        columns, rows = (int(2 * half / FIELD_GRAIN_M) + 1 for half in (half_length, HALF_WIDTH_M))
+        x = middle + np.linspace(-half_length, half_length, columns)
+        y = np.linspace(-HALF_WIDTH_M, HALF_WIDTH_M, rows)
+        height, _ = self.ground().height(np.stack(np.meshgrid(x, y), axis=-1))
+        lowest, span = float(height.min()), float(np.ptp(height))
+        spec.add_hfield(
+            name="relief",
+            nrow=rows,
+            ncol=columns,
+            size=[half_length, HALF_WIDTH_M, span, BASE_M],
+            userdata=((height - lowest) / span).ravel(),
+        )
+        spec.worldbody.add_geom(
+            name="relief",
+            type=mujoco.mjtGeom.mjGEOM_HFIELD,
+            hfieldname="relief",
+            pos=[middle, 0.0, lowest - self.floor_gap_m],
+            group=HIDDEN_GROUP,
+            **contact_options(self),
+        )
 
 
 @dataclass(frozen=True)
-class StepProfile:
-    """Treads and risers in a plane, with rounded edges and inner corners.
+class Stairs(Surface):
+    """A flight of steps with rounded edges and inner corners, whose distance is exact within half a step's length."""
 
-    Attributes:
-        start_m: Where the first step rises, m ahead of the worm's front.
-        length_m: Length of a step, m.
-        height_m: Height of a step, m.
-        rounding_m: Radius of edges and inner corners, m; at most half of either.
-    """
+    start_m: float  # where the first step rises, ahead of the worm's front
+    length_m: float  # of a step
+    height_m: float  # of a step
+    rounding_m: float  # at most half of either
+    level_m: float  # height z of the level ground before it
 
-    start_m: float
-    length_m: float
-    height_m: float
-    rounding_m: float
-
-    def nearest(self, ahead_m: Array, up_m: Array) -> tuple[Array, Array, Array]:
-        """Finds the nearest points of the profile; exact within half a step's length of it.
-
-        Args:
-            ahead_m: How far points are ahead of the worm's front, m, ``(...)``.
-            up_m: Their height above the ground before the steps, m, ``(...)``.
-
-        Returns:
-            Signed distances, m, positive above the steps, and the two parts of the unit normal (ahead, up), ``(...)``.
-        """
+    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
+        """Returns distance and normal of the nearest tread, riser or rounding, as `Surface.nearest`."""
+        ahead_m, up_m = -points_m[..., 0], points_m[..., 2] - self.level_m
         # By symmetry every point sees one riser only: the nearest, at the origin.
         step = np.maximum(np.round((ahead_m - self.start_m) / self.length_m), 0.0)
         x, z = ahead_m - self.start_m - step * self.length_m, up_m - step * self.height_m
         r, h = self.rounding_m, self.height_m
         corner, edge = np.hypot(x + r, z - r), np.hypot(x - r, z - h + r)
+        # Where a part is the nearest, the signed distance from it, and the two shares of its normal, ahead and up.
         parts = (
             (x <= -r, z, 0.0, 1.0),
             (x >= r, z - h, 0.0, 1.0),
@@ -148,7 +181,7 @@ class StepProfile:
             nearer = valid & (np.abs(distance) < np.abs(best))
             best = np.where(nearer, distance, best)
             ahead, up = np.where(nearer, own_ahead, ahead), np.where(nearer, own_up, up)
-        return best, ahead, up
+        return best, np.stack([-ahead, np.zeros(ahead.shape), up], axis=-1)
 
 
 def _shares(x: Array, z: Array, length: Array) -> tuple[Array, Array]:
@@ -157,30 +190,15 @@ def _shares(x: Array, z: Array, length: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class RoughGround:
-    """A random height, a sum of plane waves; it swells from level ground over one correlation length.
+class Hills(Implicit):
+    """Rough ground: a sum of plane waves, which swells from level ground over one correlation length."""
 
-    Attributes:
-        start_m: Where it begins, m ahead of the worm's front.
-        swell_m: Length over which it swells to its full height, m.
-        amplitude_m: Of each wave, m.
-        wave_per_m: Wave vectors, 1/m, ``(n_waves, 2)``.
-        phase_rad: Phases, ``(n_waves,)``.
-    """
-
-    start_m: float
-    swell_m: float
-    amplitude_m: float
-    wave_per_m: Array
-    phase_rad: Array
-
-    @classmethod
-    def drawn(cls, arena: Rough) -> Self:
-        """Draws the ground of a seed; its correlation is Gaussian in the distance."""
-        generator = np.random.default_rng(arena.relief_seed)
-        waves = generator.normal(scale=sqrt(2.0) / arena.correlation_m, size=(N_WAVES, 2))
-        phases = generator.uniform(0.0, 2.0 * np.pi, size=N_WAVES)
-        return cls(arena.start_m, arena.correlation_m, arena.roughness_m * sqrt(2.0 / N_WAVES), waves, phases)
+    start_m: float  # where it begins, ahead of the worm's front
+    swell_m: float  # length over which it swells to its full height
+    amplitude_m: float  # of each wave
+    wave_per_m: Array  # wave vectors, 1/m, (n_waves, 2)
+    phase_rad: Array  # (n_waves,)
+    level_m: float  # height z of the level ground before it
 
     def height(self, places_m: Array) -> tuple[Array, Array]:
         """Returns heights, m, ``(...)``, and their slopes, ``(..., 2)``, at places (x, y), m, ``(..., 2)``."""
@@ -195,110 +213,8 @@ class RoughGround:
         slope[..., 0] += height * swelling
         return height * swollen, slope
 
-
-@dataclass(frozen=True)
-class Hills(Implicit):
-    """Rough ground.
-
-    Attributes:
-        ground: Its height.
-        level_m: Height z of the level ground before it, m.
-    """
-
-    ground: RoughGround
-    level_m: float
-
     def level(self, points_m: Array) -> Level:
         """Returns heights above the ground straight below, m."""
-        height, slope = self.ground.height(points_m[:, :2])
+        height, slope = self.height(points_m[:, :2])
         gradient = np.concatenate([-slope, np.ones((len(slope), 1))], axis=-1)
         return Level(points_m[:, 2] - self.level_m - height, gradient, np.zeros(len(height), dtype=bool))
-
-
-@dataclass(frozen=True)
-class Stairs(Nearest):
-    """A flight of steps with rounded edges.
-
-    Attributes:
-        profile: Its side view.
-        level_m: Height z of the level ground before it, m.
-    """
-
-    profile: StepProfile
-    level_m: float
-
-    def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
-        """Returns distance and normal of the nearest tread, riser or rounding."""
-        distance, ahead, up = self.profile.nearest(-points_m[..., 0], points_m[..., 2] - self.level_m)
-        return distance, np.stack([-ahead, np.zeros(ahead.shape), up], axis=-1)
-
-
-def _flight(stairs: Stairs) -> Shape:
-    profile = stairs.profile
-    turn = np.linspace(0.0, np.pi / 2, ROUNDED_GRAIN)
-    r, h = profile.rounding_m, profile.height_m
-    riser = np.concatenate(
-        [
-            np.stack([-r + r * np.sin(turn), r - r * np.cos(turn)], axis=-1),
-            np.stack([r - r * np.cos(turn), h - r + r * np.sin(turn)], axis=-1),
-        ]
-    )
-    n_steps = max(int((GROUND_AHEAD_M - profile.start_m) / profile.length_m), 1)
-    risers = [riser + np.array([profile.start_m + k * profile.length_m, k * h]) for k in range(n_steps)]
-    end = [[GROUND_AHEAD_M, n_steps * h]] if n_steps * profile.length_m + profile.start_m < GROUND_AHEAD_M else []
-    line = np.concatenate([[[-GROUND_BEHIND_M, 0.0]], *risers, np.reshape(end, (-1, 2))])
-    across = np.linspace(-GROUND_HALF_WIDTH_M, GROUND_HALF_WIDTH_M, 9)
-    x, y = np.meshgrid(-line[:, 0], across, indexing="ij")
-    z = np.broadcast_to(line[:, 1:] + stairs.level_m, x.shape)
-    return Shape(np.stack([x, y, z], axis=-1).reshape(-1, 3), grid_faces(*x.shape)[:, ::-1])
-
-
-def _field(hills: Hills) -> Shape:
-    ahead = np.arange(-GROUND_BEHIND_M, GROUND_AHEAD_M, GROUND_GRAIN_M)
-    across = np.arange(-GROUND_HALF_WIDTH_M, GROUND_HALF_WIDTH_M, GROUND_GRAIN_M)
-    x, y = np.meshgrid(-ahead, across, indexing="ij")
-    height, _ = hills.ground.height(np.stack([x, y], axis=-1))
-    return Shape(np.stack([x, y, height + hills.level_m], axis=-1).reshape(-1, 3), grid_faces(*x.shape)[:, ::-1])
-
-
-def _add_blocks(spec: mujoco.MjSpec, arena: Steps, stairs: Stairs) -> None:
-    from annelid.arena.contact import add_box
-
-    profile = stairs.profile
-    front, rear = -GROUND_AHEAD_M, GROUND_BEHIND_M
-    bottom = stairs.level_m - FIELD_BASE_M
-    n_steps = max(int((GROUND_AHEAD_M - profile.start_m) / profile.length_m), 1)
-    edges = [rear, *(-profile.start_m - k * profile.length_m for k in range(n_steps))]
-    for step, edge in enumerate(edges):
-        top = stairs.level_m + step * profile.height_m
-        place = np.array([(edge + front) / 2, 0.0, (top + bottom) / 2])
-        add_box(spec, arena, place, [(edge - front) / 2, GROUND_HALF_WIDTH_M, (top - bottom) / 2], np.eye(3))
-
-
-def _add_field(spec: mujoco.MjSpec, arena: Rough, hills: Hills) -> None:
-    import mujoco
-
-    from annelid.arena.contact import HIDDEN_GROUP, contact_options
-
-    half_length = (GROUND_AHEAD_M + GROUND_BEHIND_M) / 2
-    middle = (GROUND_BEHIND_M - GROUND_AHEAD_M) / 2
-    columns, rows = (int(2 * half / FIELD_GRAIN_M) + 1 for half in (half_length, GROUND_HALF_WIDTH_M))
-    x = middle + np.linspace(-half_length, half_length, columns)
-    y = np.linspace(-GROUND_HALF_WIDTH_M, GROUND_HALF_WIDTH_M, rows)
-    height, _ = hills.ground.height(np.stack(np.meshgrid(x, y), axis=-1))
-    lowest, span = float(height.min()), float(np.ptp(height))
-    spec.add_hfield(
-        name="relief",
-        nrow=rows,
-        ncol=columns,
-        size=[half_length, GROUND_HALF_WIDTH_M, span, FIELD_BASE_M],
-        userdata=((height - lowest) / span).ravel(),
-    )
-    spec.worldbody.add_geom(
-        name="relief",
-        type=mujoco.mjtGeom.mjGEOM_HFIELD,
-        hfieldname="relief",
-        pos=[middle, 0.0, hills.level_m + lowest],
-        group=HIDDEN_GROUP,
-        **contact_options(arena),
-    )

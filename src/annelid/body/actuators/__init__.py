@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator
@@ -32,22 +32,10 @@ PerSegment = Annotated[Positive | tuple[Positive, ...], AfterValidator(_not_empt
 """One number for all segments, or one for each."""
 
 
-class Slopes(Protocol):
-    """Slopes of the actuators of one worm."""
-
-    def __call__(self, length_m: Array, rate_m_per_s: Array, drive: Array, tension_N: Array) -> tuple[Array, Array]:
-        """Tells both slopes, never negative, since the engine drops what would destabilise it.
-
-        Args:
-            length_m: Lengths of the rings, m, ``(n_muscles,)``.
-            rate_m_per_s: Rates of their lengths, m/s.
-            drive: What the muscles' gain is multiplied by, their activation.
-            tension_N: Their tensions, N.
-
-        Returns:
-            Tension per length, N/m, and per rate, N s/m.
-        """
-        ...
+Slopes = Callable[[Array, Array, Array, Array], tuple[Array, Array]]
+"""Slopes of the tensions of one worm, ``(n_muscles,)`` each: per length, N/m, and per rate of length, N s/m; never
+negative, since the engine drops what would destabilise it. From lengths, m, their rates, m/s, what the actuators' gain
+is multiplied by (the muscles' activation), and tensions, N, ``(n_muscles,)`` each."""
 
 
 class ActuatorKind(Kind):
@@ -67,14 +55,14 @@ class ActuatorKind(Kind):
     )
     length_range_m: Range | tuple[Range, ...] = Field(
         default=(0.566, 1.067),
-        description="operating range of a whole ring, one pair for all or one pair a segment",
+        description="operating range of a whole ring, one pair for all or one pair per segment",
     )
 
     @field_validator("length_range_m")
     @classmethod
     def _ordered(cls, value: Any) -> Any:
         if not value:
-            raise ValueError("needs one pair for all rings or one pair a segment")
+            raise ValueError("needs one pair for all rings or one pair per segment")
         for low, high in value if isinstance(value[0], tuple) else (value,):
             if low >= high:
                 raise ValueError("each length range needs its lower bound below its upper bound")
@@ -92,9 +80,9 @@ class ActuatorKind(Kind):
         value = getattr(self, self.force_field)
         return list(value) if isinstance(value, tuple) else [value] * n_segments
 
-    @abstractmethod
     def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Holds its lengths and forces against the mesh, before anything runs."""
+        """Checks its lengths and forces against the mesh, before anything runs; by default nothing is doubted."""
+        yield from ()
 
     @abstractmethod
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
@@ -125,16 +113,16 @@ class ActuatorKind(Kind):
         return np.zeros(0)
 
     def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
-        """Tells what the engine's actuators get under an activation.
+        """Returns the engine's control under an activation: the activation itself unless the kind says otherwise.
 
         Args:
             model: The compiled body.
             activation: In [0, 1], ``(n_muscles,)``.
             state: The engine's actuator states, ``(n_states,)``.
             length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
-            time_s: Time for which it holds, s.
+            time_s: Time for which it is applied, s.
 
         Returns:
-            Shape ``(n_muscles,)``; the activation itself unless the kind says otherwise.
+            Shape ``(n_muscles,)``.
         """
         return activation

@@ -11,17 +11,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
-from annelid.body.estimates import (
-    COLLAPSED,
-    SHRUNK,
-    UNSURE,
-    Finding,
-    bearable_force_N,
-    crushes,
-    rhombus_of,
-    strongest,
-    weak,
-)
+from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, strongest, weak
 from annelid.config.sections import Positive
 from annelid.morphology import Array
 
@@ -48,7 +38,7 @@ class Rings(ActuatorKind):
     force_field: ClassVar[str] = "peak_force_N"
     kind: Literal["muscle"] = "muscle"
     peak_force_N: PerSegment = Field(
-        default=117.57, description="isometric force at the optimal length, F0, one number for all or one a segment"
+        default=117.57, description="isometric force at the optimal length, F0, one number for all or one per segment"
     )
     minimum_length: Annotated[float, Field(gt=0, lt=1)] = Field(
         default=0.58, description="lmin, relative to the optimal length"
@@ -69,13 +59,12 @@ class Rings(ActuatorKind):
         return self
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Holds the muscles' lengths without force against the ring at rest, and their force against the mesh."""
-        if self.minimum_length < 1.0 < self.maximum_length:
-            for low, high, force_N in strongest(self, body.n_segments):
-                yield from _findings(body, self, low, high, force_N)
+        """Checks the muscles' lengths without force against the ring at rest, and their force against the mesh."""
+        for low, high, force_N in strongest(self, body.n_segments):
+            yield from _findings(body, self, low, high, force_N)
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
-        """Adds one muscle, as `ActuatorKind.add`."""
+        """Adds one muscle."""
         import mujoco
 
         actuator = spec.add_actuator(
@@ -102,7 +91,24 @@ class Rings(ActuatorKind):
 
     def slopes(self, model: mujoco.MjModel) -> Slopes:
         """Returns the slopes of ``F0 (activation FL(x) FV(v) + FP(x))``, with x and v in optimal lengths."""
-        return _slopes(model, self)
+        shortest, longest = model.actuator_lengthrange.T.copy()
+        low, high = model.actuator_gainprm[0, :2]
+        optimal_m = (longest - shortest) / (high - low)
+        force = model.actuator_gainprm[:, 2].copy()
+        fastest_m_per_s = optimal_m * self.maximum_velocity
+
+        def slopes(length_m: Array, rate_m_per_s: Array, drive: Array, tension_N: Array) -> tuple[Array, Array]:
+            x, v = low + (length_m - shortest) / optimal_m, rate_m_per_s / fastest_m_per_s
+            active, active_slope = _force_length(x, self.minimum_length, self.maximum_length)
+            speed, speed_slope = _force_velocity(v, self.lengthening_peak)
+            # Of the passive force: a parabola from 1 to halfway to the longest, straight beyond.
+            half = 0.5 * (self.maximum_length - 1.0)
+            passive_slope = self.passive_peak * (x - 1.0).clip(0.0, half) / half**2
+            per_length = force / optimal_m * (drive * active_slope * speed + passive_slope)
+            per_rate = force / fastest_m_per_s * drive * active * speed_slope
+            return per_length.clip(0.0), per_rate.clip(0.0)
+
+        return slopes
 
 
 def _findings(body: WormBody, rings: Rings, low: float, high: float, force_N: float) -> Iterator[Finding]:
@@ -111,36 +117,31 @@ def _findings(body: WormBody, rings: Rings, low: float, high: float, force_N: fl
     optimal = (high - low) / SPAN_OF_MUSCLE
     none = low + (rings.minimum_length - LOWEST_MUSCLE) * optimal
     at_rest = LOWEST_MUSCLE + (rest - low) / optimal
-    active, passive = active_share(at_rest, rings), passive_share(at_rest, rings)
+    pull, passive = force_N * _active_share(at_rest, rings), force_N * _passive_share(at_rest, rings)
     field, fitting = "body.rings.length_range_m", f"set [{0.59 * rest:.3g}, {1.11 * rest:.3g}]"
-    if force_N * passive > 0.1 * bearable:
+    if passive > 0.1 * bearable:
         # Its passive force ends at the optimal length.
         shrunk = low + (1.0 - LOWEST_MUSCLE) * optimal < SHRUNK * rest
-        severity = "error" if force_N * passive > UNSURE * bearable and shrunk else "warning"
         problem = (
-            f"a ring is {rest:.3g} m long at rest, so that its muscle pulls {force_N * passive:.3g} N before anything "
-            f"is activated, where the mesh bears about {bearable:.2g} N"
+            f"a ring is {rest:.3g} m long at rest, so that its muscle pulls {passive:.3g} N before anything is "
+            f"activated, where the mesh bears about {bearable:.2g} N"
         )
+        severity = "error" if passive > UNSURE * bearable and shrunk else "warning"
         yield Finding(field, [low, high], problem, fitting, severity)
-    elif active < 0.02:
+    elif _active_share(at_rest, rings) < 0.02:
         where = f"at any length below {none:.3g} m" if at_rest < 1.0 else "beyond its longest length"
-        pull = f"its muscle pulls {force_N * active:.2g} N, and 0 N {where}"
-        problem = f"a ring is {rest:.3g} m long at rest, where {pull}"
+        problem = f"a ring is {rest:.3g} m long at rest, where its muscle pulls {pull:.2g} N, and 0 N {where}"
         yield Finding(field, [low, high], problem, fitting, "error" if at_rest < 1.0 else "warning")
-    elif force_N * active > MOST_OVER * bearable:
-        yield Finding(
-            f"body.rings.{rings.force_field}",
-            force_N,
-            f"at rest length a muscle begins to pull with {force_N * active:.3g} N, {force_N * active / bearable:.0f} "
-            "times what the mesh bears: its ring may shoot beyond the length at which the force ends",
-            f"set at most {MOST_OVER * bearable / active:.2g}",
-            "warning",
+    elif pull > MOST_OVER * bearable:
+        problem = (
+            f"at rest length a muscle begins to pull with {pull:.3g} N, {pull / bearable:.0f} times what the mesh "
+            "bears: its ring may shoot beyond the length at which the force ends"
         )
+        most = MOST_OVER * bearable / _active_share(at_rest, rings)
+        yield Finding(f"body.rings.{rings.force_field}", force_N, problem, f"set at most {most:.2g}")
     else:
-        yield from weak(body, rings.force_field, force_N, force_N * active)
-    shortest = _settled_m(body, rings, none, optimal, force_N)
-    if shortest < COLLAPSED * rest and force_N > UNSURE * bearable:
-        yield crushes(f"body.rings.{rings.force_field}", force_N, bearable, shortest / rest)
+        yield from weak(body, rings.force_field, force_N, pull)
+    yield from crushes(rings.force_field, force_N, bearable, _settled_m(body, rings, none, optimal, force_N) / rest)
 
 
 def _settled_m(body: WormBody, rings: Rings, none_m: float, optimal_m: float, force_N: float) -> float:
@@ -151,8 +152,7 @@ def _settled_m(body: WormBody, rings: Rings, none_m: float, optimal_m: float, fo
     for _ in range(30):
         share = (closed + open_) / 2
         ring = shape.n_per_plane * hypotenuse * sin(share * shape.opening_rad)
-        length = rings.minimum_length + (ring - none_m) / optimal_m
-        pull = force_N * active_share(length, rings)
+        pull = force_N * _active_share(rings.minimum_length + (ring - none_m) / optimal_m, rings)
         closed, open_ = (closed, share) if pull > bearable_force_N(body, share) else (share, open_)
     return shape.n_per_plane * hypotenuse * sin(closed * shape.opening_rad)
 
@@ -182,40 +182,19 @@ def muscle_force(length: ArrayLike, velocity: ArrayLike, rings: Rings, activatio
     return activation * active * speed + passive
 
 
-def active_share(length: float, rings: Rings) -> float:
+def _active_share(length: float, rings: Rings) -> float:
     """Active force of a muscle over its peak, at a length in optimal lengths."""
     return float(_force_length(np.asarray(length), rings.minimum_length, rings.maximum_length)[0])
 
 
-def passive_share(length: float, rings: Rings) -> float:
+def _passive_share(length: float, rings: Rings) -> float:
     """Passive force of a muscle over its peak, at a length in optimal lengths."""
     return float(muscle_force(length, 0.0, rings, 0.0))
-
-
-def _slopes(model: mujoco.MjModel, rings: Rings) -> Slopes:
-    """The muscle is ``F0 (activation FL(x) FV(v) + FP(x))``, with x and v in optimal lengths."""
-    shortest, longest = model.actuator_lengthrange.T.copy()
-    low, high = model.actuator_gainprm[0, :2]
-    optimal_m = (longest - shortest) / (high - low)
-    force = model.actuator_gainprm[:, 2].copy()
-    fastest_m_per_s = optimal_m * rings.maximum_velocity
-
-    def slopes(length_m: Array, rate_m_per_s: Array, drive: Array, tension_N: Array) -> tuple[Array, Array]:
-        x, v = low + (length_m - shortest) / optimal_m, rate_m_per_s / fastest_m_per_s
-        active, active_slope = _force_length(x, rings.minimum_length, rings.maximum_length)
-        speed, speed_slope = _force_velocity(v, rings.lengthening_peak)
-        passive_slope = _passive_slope(x, rings.maximum_length, rings.passive_peak)
-        per_length = force / optimal_m * (drive * active_slope * speed + passive_slope)
-        per_rate = force / fastest_m_per_s * drive * active * speed_slope
-        return per_length.clip(0.0), per_rate.clip(0.0)
-
-    return slopes
 
 
 def _force_length(x: Array, shortest: float, longest: float) -> tuple[Array, Array]:
     """The active force's dependence on length, two parabolas on either side of 1, and its slope."""
     reach = np.where(x < 1.0, 1.0 - shortest, longest - 1.0)
-    # Way from the optimum to where the muscle has no force, 0 to 1.
     away = np.minimum(np.abs(x - 1.0) / reach, 1.0)
     value = np.where(away < 0.5, 1.0 - 2.0 * away**2, 2.0 * (1.0 - away) ** 2)
     steepness = np.where(away < 0.5, 4.0 * away, 4.0 * (1.0 - away)) / reach
@@ -230,9 +209,3 @@ def _force_velocity(v: Array, lengthening_peak: float) -> tuple[Array, Array]:
     shortens = v <= 0.0
     value = np.where(shortens, shortening**2, lengthening_peak - lengthening**2 / excess)
     return value, np.where(shortens, 2.0 * shortening, 2.0 * lengthening / excess)
-
-
-def _passive_slope(x: Array, longest: float, peak: float) -> Array:
-    """Slope of the passive force: a parabola from 1 to halfway to the longest, straight beyond."""
-    half = 0.5 * (longest - 1.0)
-    return peak * (x - 1.0).clip(0.0, half) / half**2

@@ -9,17 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
-from annelid.body.estimates import (
-    COLLAPSED,
-    SHRUNK,
-    UNSURE,
-    Finding,
-    bearable_force_N,
-    crushes,
-    rhombus_of,
-    strongest,
-    weak,
-)
+from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, strongest, weak
 from annelid.config.sections import NonNegative, Positive, Range
 from annelid.morphology import Array
 
@@ -44,22 +34,22 @@ class ServoRings(ActuatorKind):
     length_range_m: Range | tuple[Range, ...] = Field(
         default=(0.62, 0.96),
         description="shortest and longest cable of a whole ring (half-rings have half of it each), one pair for all or "
-        "one pair a segment",
+        "one pair per segment",
     )
     force_limit_N: PerSegment = Field(
-        default=13.0, description="tension at which a servo stalls, one number for all or one a segment"
+        default=13.0, description="tension at which a servo stalls, one number for all or one per segment"
     )
     speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
     stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
     damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Holds the cables' range against the ring at rest, and their force against the mesh."""
+        """Checks the cables' range against the ring at rest, and their force against the mesh."""
         for low, high, force_N in strongest(self, body.n_segments):
             yield from _findings(body, self, low, high, force_N)
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
-        """Adds a cable whose slack length is the engine's state: its rate is the control, `winding_speed`."""
+        """Adds a cable whose slack length is the engine's state: its rate is the control, `drive`."""
         import mujoco
 
         stiffness, speed = self.stiffness_N_per_m, self.speed_limit_m_per_s
@@ -100,67 +90,45 @@ class ServoRings(ActuatorKind):
         return np.array([actuator.actrange[1] for actuator in spec.actuators])
 
     def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
-        """Returns `winding_speed`; the states are the slack lengths of the cables, m."""
-        limits = -model.actuator_forcerange[:, 0]
-        return winding_speed(activation, state, length_m, model.actuator_actrange, limits, self, time_s)
+        """Returns the rate at which the slack lengths of the cables, the states, change, m/s: negative while they wind.
+
+        Towards the commanded length, but never so short that the tension at rest would exceed the force limit: a
+        stalled servo does not wind on, gives way to what pulls harder, and lets go at once when it is commanded to. The
+        rate is applied for a time, so that a cable does not overshoot the length that it is wound to.
+        """
+        (shortest, longest), limits_N = model.actuator_actrange.T, -model.actuator_forcerange[:, 0]
+        commanded = longest + activation * (shortest - longest)
+        stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
+        rate = (np.maximum(commanded, stalled) - state) / time_s
+        speed = self.speed_limit_m_per_s
+        return np.minimum(np.maximum(rate, -speed), speed)
 
 
 def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:
     """The cables' range against the ring at rest, and their force against the mesh."""
     rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
-    paths = 1 if rings.layout == "whole" else 2
-    field, fitting = "body.rings.length_range_m", f"set [{0.65 * rest:.3g}, {rest:.3g}]"
+    rate = rings.stiffness_N_per_m / (1 if rings.layout == "whole" else 2)
+    idle = min(force_N, rate * max(0.0, rest - high))
+    severity, problem = "warning", ""
     if low >= rest:
-        problem = f"a ring is {rest:.3g} m long at rest, so that even the shortest cable of {low:.3g} m pulls 0 N"
-        yield Finding(field, [low, high], problem, fitting, "error")
-        return
-    idle = min(force_N, rings.stiffness_N_per_m * max(0.0, rest - high) / paths)
-    if idle > 0.1 * bearable:
+        severity, problem = "error", f"even the shortest cable of {low:.3g} m pulls 0 N"
+    elif idle > 0.1 * bearable:
         severity = "error" if idle > UNSURE * bearable and high < SHRUNK * rest else "warning"
         problem = (
-            f"a ring is {rest:.3g} m long at rest, so that the longest cable of {high:.3g} m pulls {idle:.3g} N before "
-            f"anything is activated, where the mesh bears about {bearable:.2g} N"
+            f"the longest cable of {high:.3g} m pulls {idle:.3g} N before anything is activated, where the mesh bears "
+            f"about {bearable:.2g} N"
         )
-        yield Finding(field, [low, high], problem, fitting, severity)
     elif low > 0.98 * rest:
-        problem = f"a ring is {rest:.3g} m long at rest, so that a cable of {low:.3g} m hardly pulls"
-        yield Finding(field, [low, high], problem, fitting, "warning")
+        problem = f"a cable of {low:.3g} m hardly pulls"
     elif high > 1.5 * rest:
-        problem = f"a ring is {rest:.3g} m long at rest, so that most of the winding from {high:.3g} m is slack"
-        yield Finding(field, [low, high], problem, fitting, "warning")
-    pull = rings.stiffness_N_per_m * max(0.0, rest - low) / paths
-    yield from weak(body, "stiffness_N_per_m", rings.stiffness_N_per_m, pull)
-    yield from weak(body, rings.force_field, force_N, force_N)
-    if low < COLLAPSED * rest and force_N > UNSURE * bearable:
-        yield crushes(f"body.rings.{rings.force_field}", force_N, bearable, low / rest)
-
-
-def winding_speed(
-    activation: Array,
-    slack_m: Array,
-    length_m: Array,
-    range_m: Array,
-    force_limit_N: Array,
-    rings: ServoRings,
-    time_s: float,
-) -> Array:
-    """Rate at which servos change the slack length of their cables, m/s: negative while they wind.
-
-    Towards the commanded length, but never so short that the tension at rest would exceed the force limit: a stalled
-    servo does not wind on, gives way to what pulls harder, and lets go at once when it is told to.
-
-    Args:
-        activation: In [0, 1], shape ``(.., n_servos)``; commands a slack length between the ends of the range.
-        slack_m: Present slack lengths, m, same shape.
-        length_m: Present lengths of the cables' paths, m, same shape.
-        range_m: Shortest and longest slack length, m, ``(n_servos, 2)``.
-        force_limit_N: Tension at which a servo stalls, N, ``(n_servos,)``.
-        rings: Speed and stiffness.
-        time_s: For how long the rate is held, s: a cable does not overshoot the length that it is wound to.
-    """
-    shortest, longest = range_m[:, 0], range_m[:, 1]
-    commanded = longest + activation * (shortest - longest)
-    stalled = np.minimum(length_m - force_limit_N / rings.stiffness_N_per_m, longest)
-    rate = (np.maximum(commanded, stalled) - slack_m) / time_s
-    speed = rings.speed_limit_m_per_s
-    return np.minimum(np.maximum(rate, -speed), speed)
+        problem = f"most of the winding from {high:.3g} m is slack"
+    if problem:
+        problem, fitting = (
+            f"a ring is {rest:.3g} m long at rest, so that {problem}",
+            f"set [{0.65 * rest:.3g}, {rest:.3g}]",
+        )
+        yield Finding("body.rings.length_range_m", [low, high], problem, fitting, severity)
+    if low < rest:
+        yield from weak(body, "stiffness_N_per_m", rings.stiffness_N_per_m, rate * (rest - low))
+        yield from weak(body, rings.force_field, force_N, force_N)
+        yield from crushes(rings.force_field, force_N, bearable, low / rest)

@@ -28,7 +28,7 @@ class FormulationKind(Kind):
 
     Attributes:
         is_papers: Whether it is the paper's own, which other formulations are compared with.
-        damps_material: Whether its model has the rows of `annelid.simulation.damping`.
+        damps_material: Whether its model has the rows of `annelid.body.damping`.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("body.formulation.kind", "annelid.body.formulations")
@@ -57,9 +57,9 @@ class FormulationKind(Kind):
             ValueError: They do not fit.
         """
 
-    @abstractmethod
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Holds the physics step against what the formulation must resolve, before anything runs."""
+        """Checks the physics step against what the formulation must resolve, before a run; by default finds nothing."""
+        yield from ()
 
     @abstractmethod
     def add(
@@ -72,7 +72,7 @@ class FormulationKind(Kind):
             geometry: The mesh at rest.
             body: Materials and pins.
             arena: Contact settings, which the strands share with the floor.
-            for_plant: For a plant of annelid, which prepares every step.
+            for_plant: For a plant of annelid, which prepares every step, as `annelid.body.build_spec`.
         """
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:

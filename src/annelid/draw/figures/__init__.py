@@ -1,4 +1,4 @@
-"""Figures of runs and of what many runs tell, one module each."""
+"""Figures of runs, and of what many runs add up to."""
 
 from __future__ import annotations
 

@@ -7,40 +7,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from annelid.analysis.travel import forward_position
+from annelid.analysis.track import forward_position
 from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save
-from annelid.draw.style import panel_title, plain, segment_colors
+from annelid.draw.canvas import canvas, line_entries, panel_title, save, segment_colors
+from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
+from annelid.protocols import Array
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from annelid.simulation.runfile import Run
-
-MOST_ROWS = 6
-"""Segments that get a panel: of more, as many from the first to the last, evenly spaced."""
+MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to the last, evenly spaced
 _CM = 100.0
 
-Values = NDArray[np.float64] | None
-"""One column a segment, ``(n_times, n_segments)``; None if they were not recorded."""
+Values = Array | None  # one column per segment, ``(n_times, n_segments)``; None if they were not recorded
 Curves = Callable[["Run"], Sequence[tuple[Values, float | None]]]
 """What is drawn of a run, each with the width of its lines."""
 
 
 def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws how much each segment is longer than at rest, and its ring in shares of its longest.
-
-    Args:
-        runs: The runs, of any kinds of worm.
-        labels: A name for each.
-        path: File to write.
-
-    Raises:
-        RunFileError: No run recorded lengths, or the file cannot be written.
-    """
+    """Draws how much each segment is longer than at rest, and its ring in shares of its longest."""
     panels: dict[str, Curves] = {
         "Segment, longer than at rest (cm)": lambda run: [(_elongation(run), None)],
         "Ring (% of its longest)": lambda run: [(_rings(run), None)],
@@ -49,11 +37,7 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
 
 
 def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin.
-
-    Raises:
-        RunFileError: No run recorded neurons of half-centres, or the file cannot be written.
-    """
+    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin."""
     panels: dict[str, Curves] = {
         "Half-centres, above rest (mV); thick: contraction, thin: expansion": lambda run: [
             (_potentials(run, "contraction"), 1.5),
@@ -64,32 +48,27 @@ def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) ->
 
 
 def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the way of the centre of mass towards where the front points at first, and its track seen from above.
-
-    Raises:
-        RunFileError: No run has a centre of mass that moves, or the file cannot be written.
-    """
-    ways = [_centre(run) for run in runs]
-    drawn = [way is not None for way in ways]
+    """Draws the travel of the centre of mass along the initial heading, and its track seen from above."""
+    tracks = [_centre(run) for run in runs]
+    drawn = [track is not None for track in tracks]
     if not any(drawn):
         raise RunFileError("none of these runs recorded where the worm went")
     seen = [isinstance(run.config.body, WormBody) for run in runs]
     with canvas(3.4) as figure:
         panels = figure.subplots(1, 2 if any(seen) else 1, squeeze=False)[0]
-        panel_title(panels[0], "Way towards the front (cm)")
+        panel_title(panels[0], "Travel towards the front (cm)")
         panels[0].set_xlabel("time (s)")
-        for run, way, above, color in zip(runs, ways, seen, segment_colors(len(runs)), strict=True):
-            if way is None:
+        for run, track, above, color in zip(runs, tracks, seen, segment_colors(len(runs)), strict=True):
+            if track is None:
                 continue
             ahead = forward_position(run)
             panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), color=color)
             if above:
-                panels[1].plot(way[:, 0], way[:, 1], color=color)
-                panels[1].plot(*way[-1, :2], marker="o", markersize=4, color=color)
+                panels[1].plot(track[:, 0], track[:, 1], color=color)
+                panels[1].plot(*track[-1, :2], marker="o", markersize=4, color=color)
         if any(seen):
             panel_title(panels[1], "Track of the middle from above (cm)")
-            panels[1].set_xlabel("x, front towards the left (heading 0)")
-            panels[1].set_ylabel("y")
+            panels[1].set(xlabel="x, front towards the left (heading 0)", ylabel="y")
             panels[1].set_aspect("equal", adjustable="datalim")
         _legend(figure, labels, drawn)
         return save(figure, path)
@@ -136,18 +115,13 @@ def _rings(run: Run) -> Values:
     return 100.0 * whole / whole.max(axis=0)
 
 
-def _potentials(run: Run, kind: str) -> Values:
-    if "potential" not in run.data:
-        return None
-    names = [str(name) for name in run.data["neuron"].values]
-    wanted = [f"{kind}_{segment + 1}" for segment in range(run.config.body.n_segments)]
-    if not set(wanted) <= set(names):
-        return None
-    return run.data["potential"].values[:, [names.index(name) for name in wanted]]
+def _potentials(run: Run, role: str) -> Values:
+    found = neuron_potentials(run, role)
+    return np.stack([*found.values()], axis=1) if len(found) == run.config.body.n_segments else None
 
 
 def _centre(run: Run) -> Values:
-    """Way of the centre of mass from its first place, cm, ``(n_times, 3)``; None for worms that go nowhere."""
+    """Displacement of the centre of mass from its first place, cm, ``(n_times, 3)``; None for worms that go nowhere."""
     if "center_of_mass" not in run.data:
         return None
     places = run.data["center_of_mass"].values
@@ -156,8 +130,6 @@ def _centre(run: Run) -> Values:
 
 def _legend(figure: Figure, labels: Sequence[str], drawn: Sequence[bool]) -> None:
     """Names the runs that were drawn, above all panels."""
-    from matplotlib.lines import Line2D
-
     runs = zip(segment_colors(len(labels)), labels, drawn, strict=True)
-    handles = [Line2D([], [], color=color, linewidth=2.0, label=plain(label)) for color, label, shown in runs if shown]
+    handles = line_entries((color, "-", 2.0, label) for color, label, shown in runs if shown)
     figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 3))

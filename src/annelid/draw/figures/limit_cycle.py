@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.limit_cycle import LimitCycle
-from annelid.draw.canvas import canvas, save
+from annelid.draw.canvas import canvas, panel_title, plain, save, segment_colors
 from annelid.draw.plots import plot_path
-from annelid.draw.style import panel_title, plain, segment_colors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,30 +22,22 @@ _MARKERS = "os^"
 _LINEAR_MS_PER_MV = 1.0
 
 
-def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path, *, segment: int = 1) -> Path:
-    """Draws potentials and phase response of one segment's neurons over a cycle, and the multipliers.
+def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path) -> Path:
+    """Draws potentials and phase response of the first segment's neurons over a cycle, and the multipliers.
 
     Args:
-        cycles: Limit cycles of one worm by the name that the legend gives them; the first is drawn over its phase, and
-            the multipliers of all are compared.
+        cycles: Limit cycles of one worm by the name in the legend; the first is drawn over its phase.
         path: File to write: ``.png``, ``.pdf`` or ``.svg``; a name without a suffix becomes a ``.png``.
-        segment: Segment whose neurons are drawn, from 1; states of other names are left out.
-
-    Returns:
-        The path written.
-
-    Raises:
-        RunFileError: Another suffix, or the file cannot be written.
     """
     path = plot_path(path)
     main = next(iter(cycles.values()))
     with canvas(6.6) as figure:
         orbit, response, multipliers = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 1.0])
-        _neurons(orbit, main, main.state, segment)
-        panel_title(orbit, f"Segment {segment}, period {1e3 * main.period_s:.1f} ms")
+        _neurons(orbit, main, main.state)
+        panel_title(orbit, f"Segment 1, period {1e3 * main.period_s:.1f} ms")
         orbit.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(_ROLES), borderaxespad=0.1)
         orbit.set_ylabel("potential (mV)")
-        _neurons(response, main, 1e3 * main.phase_response, segment)
+        _neurons(response, main, 1e3 * main.phase_response)
         panel_title(response, "Phase response: advance of the cycle by a small kick of each potential")
         response.set_ylabel("advance (ms/mV)")
         response.set_yscale("symlog", linthresh=_LINEAR_MS_PER_MV)
@@ -59,31 +50,22 @@ def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path, *, se
         return save(figure, path)
 
 
-def _neurons(axes: Axes, cycle: LimitCycle, values: np.ndarray, segment: int) -> None:
+def _neurons(axes: Axes, cycle: LimitCycle, values: np.ndarray) -> None:
     phase = cycle.time_s / cycle.period_s
     for color, (role, style) in zip(segment_colors(len(_ROLES)), _ROLES.items(), strict=True):
-        label = f"{role}_{segment}"
+        label = f"{role}_1"
         if label in cycle.labels:
             axes.plot(phase, values[:, cycle.labels.index(label)], style, color=color, label=role)
 
 
 def _magnitudes(axes: Axes, cycles: Mapping[str, LimitCycle]) -> None:
-    for i, (color, (name, cycle)) in enumerate(zip(segment_colors(3), cycles.items(), strict=False)):
+    for marker, color, (name, cycle) in zip(_MARKERS, segment_colors(3), cycles.items(), strict=False):
         sizes = np.maximum(np.abs(cycle.multipliers), _LEAST)
-        axes.plot(
-            np.arange(1, len(sizes) + 1),
-            sizes,
-            _MARKERS[i],
-            color=color,
-            markersize=4.0,
-            markerfacecolor="none" if i else color,
-            label=plain(name),
-        )
+        fill = color if marker == _MARKERS[0] else "none"
+        look = {"color": color, "markersize": 4.0, "markerfacecolor": fill, "label": plain(name)}
+        axes.plot(np.arange(1, len(sizes) + 1), sizes, marker, **look)
     axes.axhline(1.0, color="0.35", linestyle=":", linewidth=1.0)
-    axes.set_yscale("log")
-    axes.set_ylim(_LEAST / 3.0, 30.0)
+    axes.set(yscale="log", ylim=(_LEAST / 3.0, 30.0), ylabel="magnitude", xlabel="Floquet multiplier, by magnitude")
     axes.locator_params(axis="x", integer=True)
-    axes.set_xlabel("Floquet multiplier, by magnitude")
-    axes.set_ylabel("magnitude")
     panel_title(axes, "Floquet multipliers")
     axes.legend(loc="center right")

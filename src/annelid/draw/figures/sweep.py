@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.draw.lines import mark_lost
-from annelid.draw.style import panel_title, plain, segment_colors
+from annelid.draw.canvas import canvas, mark_lost, panel_title, plain, save_both, segment_colors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,17 +25,10 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
     """Draws numbers over the varied fields; runs without a number are marked with crosses.
 
     Args:
-        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``, of which the mean is
-            drawn.
+        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: their mean is drawn.
         fields: The varied fields, coordinates of the data.
         numbers: Variables of the data, at most four; of three or more fields the first only.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
-
-    Raises:
-        RunFileError: A file cannot be written.
+        stem: Path without suffix; ``.svg`` and ``.png`` are written, and the latter's path is returned.
     """
     if len(fields) > 2:
         with canvas(3.8) as figure:
@@ -66,7 +57,7 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     y = values.transpose(data[field].dims[0], *others).values.reshape(len(x), -1)
     dot, line, *_ = segment_colors(4)
     order = np.argsort(x, kind="stable")
-    mean = _mean(y, axis=1)
+    mean = np.ma.masked_invalid(y).mean(axis=1).filled(np.nan)
     if y.shape[1] > 1:
         axes.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="0.65", markersize=4.0)
     on_a_grid = data[field].dims == (field,)
@@ -77,9 +68,7 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
 
 
 def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
-    values = data[name]
-    if "repeat" in values.dims:
-        values = values.mean("repeat", keep_attrs=True)
+    values = _without_repeats(data[name])
     along_x, along_y = (data[field] for field in fields)
     (x, x_ticks), (y, y_ticks) = _axis(along_x.values), _axis(along_y.values)
     if fields[0] in values.dims:
@@ -88,12 +77,12 @@ def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], na
         rows, columns = np.nonzero(np.ma.getmaskarray(grid))
         axes.plot(columns, rows, "x", color=_FAILED, markersize=5.0)
         # Cells are of one size, whatever the spacing of the values.
-        x_ticks, y_ticks = (_cells(coordinate.values) for coordinate in (along_x, along_y))
+        x_ticks, y_ticks = _cells(along_x.values), _cells(along_y.values)
     else:
         z = values.values
-        told = np.isfinite(z)
-        shown = axes.scatter(x[told], y[told], c=z[told], cmap=COLORS, s=18.0)
-        axes.plot(x[~told], y[~told], "x", color=_FAILED, markersize=5.0)
+        known = np.isfinite(z)
+        shown = axes.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=18.0)
+        axes.plot(x[~known], y[~known], "x", color=_FAILED, markersize=5.0)
     axes.grid(visible=False)
     _name_axis(axes, "x", along_x, x_ticks)
     _name_axis(axes, "y", along_y, y_ticks)
@@ -107,42 +96,40 @@ def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    flat = data[[name]].reset_coords(drop=True)
-    if "repeat" in flat.dims:
-        flat = flat.mean("repeat", keep_attrs=True)
-    z = flat[name].values.ravel()
+    values = _without_repeats(data[name])
+    z = values.values.ravel()
     # On a grid each run's values are those at its place; in samples all fields lie along the samples already.
-    places = np.indices(flat[name].shape).reshape(flat[name].ndim, -1)
-    columns, ticks = [], []
-    for field in fields:
-        scale, labels = _axis(data[field].values)
-        axis = flat[name].dims.index(data[field].dims[0])
-        columns.append(scale[places[axis]])
-        ticks.append(labels)
-    told = np.isfinite(z)
-    low, high = (float(z[told].min()), float(z[told].max())) if told.any() else (0.0, 1.0)
+    places = np.indices(values.shape).reshape(values.ndim, -1)
+    known = np.isfinite(z)
+    low, high = (float(z[known].min()), float(z[known].max())) if known.any() else (0.0, 1.0)
     norm = Normalize(low, high if high > low else low + 1.0)
-    shares = [*(_share(column) for column in columns), norm(z)]
+    label = worded(name, values.attrs["units"])
     axes = figure.subplots()
-    lines = np.array(shares, dtype=float).T
+    shares = []
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8}
+    at: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "va": "center", "zorder": 4, "bbox": behind}
+    for i, field in enumerate(fields):
+        scale, ticks = _axis(data[field].values)
+        column = scale[places[values.dims.index(data[field].dims[0])]]
+        shares.append(_share(column))
+        for value, text in ticks or [(end, f"{end:.4g}") for end in (column.min(), column.max())]:
+            axes.annotate(text, (i, _share(np.append(column, value))[-1]), (4, 0), **at)
+    lines = np.array([*shares, norm(z)], dtype=float).T
     for i in np.argsort(np.nan_to_num(z, nan=-np.inf)):
-        color: Any = colormaps[COLORS](norm(z[i])) if told[i] else _FAILED
-        width, alpha = (0.9, 0.8) if told[i] else (0.5, 0.5)
-        axes.plot(range(len(shares)), lines[i], color=color, linewidth=width, alpha=alpha)
-    names = [_label(data[field]) for field in fields]
-    axes.set_xticks(range(len(shares)), [*names, worded(name, flat[name].attrs["units"])])
+        color: Any = colormaps[COLORS](norm(z[i])) if known[i] else _FAILED
+        width, alpha = (0.9, 0.8) if known[i] else (0.5, 0.5)
+        axes.plot(range(len(lines[i])), lines[i], color=color, linewidth=width, alpha=alpha)
+    axes.set_xticks(range(len(fields) + 1), [*(_label(data[field]) for field in fields), label])
     axes.set_yticks([])
-    axes.set_xlim(-0.2, len(shares) - 1 + 0.05)
+    axes.set_xlim(-0.2, len(fields) + 0.05)
     axes.spines[["left", "bottom"]].set_visible(False)
-    for i in range(len(shares)):
+    for i in range(len(fields) + 1):
         axes.axvline(i, color="0.3", linewidth=0.8, zorder=3)
-    for i, (column, labels) in enumerate(zip(columns, ticks, strict=True)):
-        for value, text in labels or [(end, f"{end:.4g}") for end in (column.min(), column.max())]:
-            share = _share(np.append(column, value))[-1]
-            behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8}
-            at = {"textcoords": "offset points", "fontsize": 7.5, "va": "center", "zorder": 4, "bbox": behind}
-            axes.annotate(text, (i, share), (4, 0), **at)
-    figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=worded(name, flat[name].attrs["units"]))
+    figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=label)
+
+
+def _without_repeats(values: xr.DataArray) -> xr.DataArray:
+    return values.mean("repeat", keep_attrs=True) if "repeat" in values.dims else values
 
 
 def _axis(values: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:
@@ -178,13 +165,6 @@ def _is_logarithmic(values: np.ndarray) -> bool:
 def _share(values: np.ndarray) -> np.ndarray:
     low, high = values.min(), values.max()
     return (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
-
-
-def _mean(values: np.ndarray, axis: int) -> np.ndarray:
-    told = np.isfinite(values)
-    count = told.sum(axis=axis)
-    total = np.where(told, values, 0.0).sum(axis=axis)
-    return np.divide(total, count, out=np.full(count.shape, np.nan), where=count > 0)
 
 
 def _label(coordinate: xr.DataArray) -> str:

@@ -10,23 +10,19 @@ import numpy as np
 from annelid.analysis.track import Track, track_of
 from annelid.config import RunConfig
 from annelid.config.kinds import Goals
-from annelid.draw.canvas import WIDTH_IN, canvas, save
+from annelid.draw.canvas import WIDTH_IN, canvas, panel_title, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path
-from annelid.draw.style import panel_title
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from annelid.simulation.runfile import Run
-
-N_OUTLINES = 6
-"""Outlines drawn, the first and the last posture among them."""
+N_OUTLINES = 6  # outlines drawn, the first and the last posture among them
 FIRST, LAST = "#9bb0c9", "#1b2a6b"
 FRONT = "#c2410c"
 WALL = "#bf784d"
-_EDGE_IN = 1.3
-"""Room that labels take beside the plot, inches."""
+_EDGE_IN = 1.3  # room that labels take beside the plot, inches
 
 
 def track_figure(run: Run, path: str | Path) -> Path:
@@ -49,10 +45,9 @@ def track_figure(run: Run, path: str | Path) -> Path:
     track = track_of(run)
     with canvas(_height_in(track, run.config)) as figure:
         axes = figure.subplots()
-        draw_track(axes, track)
-        draw_marks(axes, run.config)
-        reached = f"{track.time_s[-1]:g} s"
-        panel_title(axes, f"{run.config.name}: track of {reached}, seen from above")
+        _draw_track(axes, track)
+        _draw_marks(axes, run.config)
+        panel_title(axes, f"{run.config.name}: track of {track.time_s[-1]:g} s, seen from above")
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
         return save(figure, path)
 
@@ -60,26 +55,22 @@ def track_figure(run: Run, path: str | Path) -> Path:
 RUN_FIGURES.add("track", track_figure)
 
 
-def draw_track(axes: Axes, track: Track, label: str = "middle of the body", color: str = LAST) -> None:
-    """Draws a track with outlines into axes of equal scale."""
+def _draw_track(axes: Axes, track: Track) -> None:
     from matplotlib.colors import LinearSegmentedColormap
 
     shades = LinearSegmentedColormap.from_list("ages", [FIRST, LAST])
     samples = np.linspace(0, len(track.time_s) - 1, N_OUTLINES).round().astype(int)
     for place, sample in enumerate(samples):
         shade = shades(place / (N_OUTLINES - 1))
-        outline = track.outline_m(sample)
-        axes.fill(*outline.T, facecolor=(*shade[:3], 0.12), edgecolor=shade, linewidth=0.9)
+        axes.fill(*track.outline_m(sample).T, facecolor=(*shade[:3], 0.12), edgecolor=shade, linewidth=0.9)
         x, y = track.middle_m[sample]
         axes.annotate(f"{track.time_s[sample]:.0f} s", (x, y), color=shade, fontsize=7, ha="center", va="center")
     axes.plot(*track.front_m.T, color=FRONT, linewidth=0.7, label="foremost ring")
-    axes.plot(*track.middle_m.T, color=color, linewidth=1.6, label=label)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.plot(*track.middle_m.T, color=LAST, linewidth=1.6, label="middle of the body")
+    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
 
 
-def draw_marks(axes: Axes, config: RunConfig) -> None:
+def _draw_marks(axes: Axes, config: RunConfig) -> None:
     """Draws posts and guard rails, and waypoints with the circle within which each counts as reached."""
     from matplotlib.patches import Circle
 

@@ -58,23 +58,18 @@ class Chain(FormulationKind):
         return 2e-6 * n_elements**2, 5e-5 * n_elements
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Holds the step against the joints', the springs' and the pins' own rates."""
+        """Checks the step against the joints', the springs' and the pins' own rates."""
         from annelid.body.worm import WormBody
 
         body, step = config.body, config.clock.physics_timestep_s
         assert isinstance(body, WormBody)
         most = _largest_step_s(body, self)
         if step > most:
-            yield Finding(
-                "clock.physics_timestep_s",
-                step,
-                f"the chain is integrated explicitly, which its joints and springs bear up to about {most:.2g} s",
-                f"set at most {most / 2:.1g}, or a larger body.formulation.armature_kg_m2",
-                "warning",
-            )
-        softest = self.pin_time_constant_s
-        if softest < 2.0 * step:
-            yield softened("body.formulation.pin_time_constant_s", softest, "pins", step)
+            problem = f"the chain is integrated explicitly, which its joints and springs bear up to about {most:.2g} s"
+            instead = f"set at most {most / 2:.1g}, or a larger body.formulation.armature_kg_m2"
+            yield Finding("clock.physics_timestep_s", step, problem, instead)
+        if self.pin_time_constant_s < 2.0 * step:
+            yield softened("body.formulation.pin_time_constant_s", self.pin_time_constant_s, "pins", step)
 
     def add(
         self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
@@ -87,41 +82,33 @@ class Chain(FormulationKind):
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
         """Reads the residual of the engine's connections, as `FormulationKind.pin_reader`."""
-        return _gap_at_connections(model, self.pins == "separate"), ("xpos", "xmat")
+        sides = ((model.eq_obj1id, model.eq_data[:, :3]), (model.eq_obj2id, model.eq_data[:, 3:6]))
+
+        def gap(engine: Mapping[str, Array]) -> Array:
+            position, turn = engine["xpos"], engine["xmat"]
+            turn = turn.reshape(*turn.shape[:-1], 3, 3)
+            first, second = (
+                position.take(body, axis=-2) + (turn.take(body, axis=-3) * local[:, np.newaxis]).sum(axis=-1)
+                for body, local in sides
+            )
+            residual = first - second
+            if self.pins == "separate":
+                # With a pin mass two connections make one crossing.
+                residual = residual[..., 0::2, :] - residual[..., 1::2, :]
+            return norm(residual).max(axis=-1)
+
+        return gap, ("xpos", "xmat")
 
 
 def _largest_step_s(body: WormBody, formulation: Chain) -> float:
     """Largest stable step of the explicit integrator, s, from the joints' and the springs' own rates."""
-    strands, shape = body.strands, rhombus_of(body)
-    element = shape.side_m / body.mesh.elements_per_side
+    strands, element = body.strands, rhombus_of(body).side_m / body.mesh.elements_per_side
     inertia = formulation.armature_kg_m2 + strands.linear_density_kg_per_m * element**3 / 12.0
     stiffness = strands.bending_rigidity_Nm2 / element
+    mass = body.pins.mass_kg if formulation.pins == "separate" else strands.linear_density_kg_per_m * element * 2.0
     # Neighbouring joints act on one element: four times the rate of one at the shortest wave.
-    swung = [(4.0 * stiffness / inertia) ** 0.5]
-    mass = strands.linear_density_kg_per_m * element * 2.0
-    if formulation.pins == "separate":
-        mass = body.pins.mass_kg
-    swung.append((4.0 * body.springs.stiffness_N_per_m / mass) ** 0.5)
-    explicit = formulation.integrator == "RK4"
-    damped = 4.0 * strands.joint_damping(stiffness) / inertia if explicit else 0.0
-    limit = _RK4_SWUNG if explicit else 2.0
-    return min(limit / max(swung), _RK4_DAMPED / damped if damped else inf)
-
-
-def _gap_at_connections(model: mujoco.MjModel, separate: bool) -> PinReader:
-    """Reads the residual of the engine's connections; with a pin mass, two of them make one crossing."""
-    sides = ((model.eq_obj1id, model.eq_data[:, :3]), (model.eq_obj2id, model.eq_data[:, 3:6]))
-
-    def gap(engine: Mapping[str, Array]) -> Array:
-        position, turn = engine["xpos"], engine["xmat"]
-        turn = turn.reshape(*turn.shape[:-1], 3, 3)
-        first, second = (
-            position.take(body, axis=-2) + (turn.take(body, axis=-3) * local[:, np.newaxis]).sum(axis=-1)
-            for body, local in sides
-        )
-        residual = first - second
-        if separate:
-            residual = residual[..., 0::2, :] - residual[..., 1::2, :]
-        return norm(residual).max(axis=-1)
-
-    return gap
+    swung = max((4.0 * stiffness / inertia) ** 0.5, (4.0 * body.springs.stiffness_N_per_m / mass) ** 0.5)
+    if formulation.integrator != "RK4":
+        return 2.0 / swung
+    damped = 4.0 * strands.joint_damping(stiffness) / inertia
+    return min(_RK4_SWUNG / swung, _RK4_DAMPED / damped if damped else inf)

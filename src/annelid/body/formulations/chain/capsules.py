@@ -9,22 +9,21 @@ tied by two `connect` constraints to its strands, or one constraint straight bet
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
-from annelid.arena.contact import contact_options
-from annelid.body.actuation import crossing_site
-from annelid.body.formulations.rods.net import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
+from annelid.arena.geoms import contact_options
+from annelid.body.actuation import crossing_site, mark_crossing
+from annelid.body.damping import add_row
+from annelid.body.formulations.rods.net import AXES, STRAND_RGBA, add_touch
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
 
 if TYPE_CHECKING:
     from annelid.body.formulations.chain import Chain
-
-JACOBIAN = mujoco.mjtJacobian.mjJAC_SPARSE
 
 
 def add_chains(
@@ -36,21 +35,15 @@ def add_chains(
     *,
     vertices_touch: bool = False,
 ) -> None:
-    """Adds the mesh as chains of capsules, and the paper's solver settings.
+    """Adds the mesh as chains of capsules, and the paper's solver settings, as `FormulationKind.add`.
 
-    Args:
-        spec: An empty spec.
-        geometry: The mesh at rest.
-        body: Materials and pins.
-        formulation: Joints, pins and integrator.
-        arena: Contact settings, which the strands share with the floor.
-        vertices_touch: A sphere at each vertex touches the ground instead of the capsules.
+    With ``vertices_touch`` a sphere at each vertex touches the ground instead of the capsules.
     """
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{formulation.integrator.upper()}")
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
     spec.option.iterations = formulation.solver_iterations
     spec.option.tolerance = formulation.solver_tolerance
-    spec.option.jacobian = JACOBIAN
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     for strand in range(geometry.n_strands):
         add_chain(
             spec,
@@ -95,7 +88,6 @@ def add_chain(
     """
     n_elements = len(vertices_m) - 1
     middle = _middle_element(len(vertices_m)) if root is None else root
-    rigidity = _rigidity(strands)
 
     def add_element(parent: mujoco.MjsBody, element: int, joint_vertex: int, origin: Array) -> mujoco.MjsBody:
         place = vertices_m[joint_vertex]
@@ -127,31 +119,14 @@ def add_chain(
             joint_vertex = element if direction > 0 else element + 1
             parent = add_element(parent, element, joint_vertex, origin)
             origin = vertices_m[joint_vertex]
-            _add_joint(parent, vertices_m, joint_vertex, rigidity, strands, formulation)
+            _add_joint(parent, vertices_m, joint_vertex, strands, formulation)
 
 
-class _Rigidity(NamedTuple):
-    """Resistance of a round strand to bending, E I, and to twisting, G J, N m^2."""
-
-    bending: float
-    torsion: float
-
-
-def _rigidity(strands: Strands) -> _Rigidity:
-    return _Rigidity(strands.bending_rigidity_Nm2, strands.shear_modulus_Pa * pi * strands.radius_m**4 / 2)
-
-
-def _add_joint(
-    link: mujoco.MjsBody,
-    vertices_m: Array,
-    vertex: int,
-    rigidity: _Rigidity,
-    strands: Strands,
-    formulation: Chain,
-) -> None:
+def _add_joint(link: mujoco.MjsBody, vertices_m: Array, vertex: int, strands: Strands, formulation: Chain) -> None:
     """Joins two elements at a vertex; the joint stands for half of each."""
     before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
     length = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
+    bending, torsion = strands.bending_rigidity_Nm2, strands.shear_modulus_Pa * pi * strands.radius_m**4 / 2
 
     def add(kind: mujoco.mjtJoint, rate: float, **axis: Array) -> None:
         stiffness = rate / length
@@ -164,17 +139,13 @@ def _add_joint(
         )
 
     if formulation.joint == "ball":
-        add(mujoco.mjtJoint.mjJNT_BALL, rigidity.bending)
+        add(mujoco.mjtJoint.mjJNT_BALL, bending)
         return
     tangent = before / np.linalg.norm(before) + after / np.linalg.norm(after)
     tangent /= np.linalg.norm(tangent)
     normal = np.cross(tangent, AXES[np.argmin(np.abs(tangent))])
     normal /= np.linalg.norm(normal)
-    for axis, rate in (
-        (normal, rigidity.bending),
-        (np.cross(tangent, normal), rigidity.bending),
-        (tangent, rigidity.torsion),
-    ):
+    for axis, rate in ((normal, bending), (np.cross(tangent, normal), bending), (tangent, torsion)):
         add(mujoco.mjtJoint.mjJNT_HINGE, rate, axis=axis)
 
 
@@ -189,37 +160,15 @@ def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: W
             pin.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         place, pairs = np.zeros(3), [(name, link.name) for link in links]
     else:
-        pin = links[0]
-        place = position - _joint_place(geometry, int(geometry.crossing_strands[crossing, 0]), vertex)
+        # The origin of an element's body is its joint, and its axes are the world's at rest.
+        pin, joint = links[0], vertex if vertex >= _middle_element(geometry.vertices_m.shape[1]) else vertex + 1
+        place = position - geometry.vertices_m[geometry.crossing_strands[crossing, 0], joint]
         pairs = [(pin.name, links[1].name)]
-    pin.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        pos=place,
-        size=[body.pins.radius_m, 0.0, 0.0],
-        mass=body.pins.mass_kg,
-        contype=0,
-        conaffinity=0,
-        rgba=PIN_RGBA,
-    )
-    pin.add_site(name=name, pos=place, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
-    for k, (first, second) in enumerate(pairs):
-        spec.add_equality(
-            name=f"pin_{crossing}_{k}",
-            type=mujoco.mjtEq.mjEQ_CONNECT,
-            objtype=mujoco.mjtObj.mjOBJ_BODY,
-            name1=first,
-            name2=second,
-            data=[*place, *([0.0] * 9)],
-            solref=[formulation.pin_time_constant_s, 1.0],
-            solimp=[*formulation.pin_impedance, 0.5, 2.0],
-        )
-
-
-def _joint_place(geometry: MeshGeometry, strand: int, element: int) -> Array:
-    """Rest position of an element's joint, the origin of its body (whose axes are the world's at rest)."""
-    middle = _middle_element(geometry.vertices_m.shape[1])
-    return geometry.vertices_m[strand, element if element >= middle else element + 1]
+    mark_crossing(pin, name, body.pins.radius_m, body.pins.mass_kg, place)
+    solver = {"solref": [formulation.pin_time_constant_s, 1.0], "solimp": [*formulation.pin_impedance, 0.5, 2.0]}
+    connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
+    for k, pair in enumerate(pairs):
+        add_row(spec, connect, bodies, f"pin_{crossing}_{k}", *pair, data=[*place, *([0.0] * 9)], **solver)
 
 
 def _middle_element(n_vertices: int) -> int:

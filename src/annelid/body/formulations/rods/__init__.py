@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from annelid.body.estimates import Finding
@@ -83,28 +82,20 @@ class Rods(FormulationKind):
             )
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Holds the step against the edges and the material's damping."""
+        """Checks the step against the edges and the material's damping."""
         from annelid.body.worm import WormBody
 
         body, step = config.body, config.clock.physics_timestep_s
         assert isinstance(body, WormBody)
+        field, time_s = "clock.physics_timestep_s", body.strands.material_damping_s or 0.0
         if step > 0.04:
-            yield Finding(
-                "clock.physics_timestep_s",
-                step,
-                "rods are measured up to 0.04 s, where their edges stretch by 3 %",
-                "set at most 0.04",
-                "warning",
-            )
-        time_s = body.strands.material_damping_s or 0.0
+            problem = "rods are measured up to 0.04 s, where their edges stretch by 3 %"
+            yield Finding(field, step, problem, "set at most 0.04")
         if 0.0 < time_s < 2.0 * step:
-            yield Finding(
-                "clock.physics_timestep_s",
-                step,
-                f"the step damps rods as one to two steps more of damping time do, and the material has {time_s:g} s",
-                f"set at most {time_s / 5:.1g}",
-                "warning",
+            problem = (
+                f"the step damps rods as one to two steps more of damping time do, and the material has {time_s:g} s"
             )
+            yield Finding(field, step, problem, f"set at most {time_s / 5:.1g}")
 
     def add(
         self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
@@ -118,7 +109,16 @@ class Rods(FormulationKind):
         """Reads separate pins, as `FormulationKind.pin_reader`."""
         if self.pins == "shared":
             return None, ()
-        return _gap_at_vertices(_pinned_bodies(model, geometry)), ("xpos",)
+        from annelid.body.formulations.rods.net import vertex_name
+
+        places = zip(geometry.crossing_strands.tolist(), geometry.crossing_vertex[geometry.crossing_plane], strict=True)
+        bodies = np.array([[model.body(vertex_name(strand, vertex)).id for strand in pair] for pair, vertex in places])
+
+        def gap(engine: Mapping[str, Array]) -> Array:
+            ends = engine["xpos"].take(bodies, axis=-2)
+            return norm(ends[..., 1, :] - ends[..., 0, :]).max(axis=-1)
+
+        return gap, ("xpos",)
 
     def refuse_fidelity(self, level: str) -> None:
         """Refuses any level for separate pins, which are fitted to their mesh and step."""
@@ -132,24 +132,3 @@ class Rods(FormulationKind):
     def hastened(self, haste: float) -> Self:
         """Returns the section with its viscous coefficient divided."""
         return self.model_copy(update={"lateral_damping_Nms_per_rad": self.lateral_damping_Nms_per_rad / haste})
-
-
-def _pinned_bodies(model: mujoco.MjModel, geometry: MeshGeometry) -> NDArray[np.int64]:
-    """Bodies of both strands at every crossing of rods with separate pins, ``(n_crossings, 2)``."""
-    vertices = geometry.crossing_vertex[geometry.crossing_plane]
-    from annelid.body.formulations.rods.net import vertex_name
-
-    return np.array(
-        [
-            [model.body(vertex_name(int(strand), int(vertex))).id for strand in strands]
-            for strands, vertex in zip(geometry.crossing_strands, vertices, strict=True)
-        ]
-    )
-
-
-def _gap_at_vertices(bodies: NDArray[np.int64]) -> PinReader:
-    def gap(engine: Mapping[str, Array]) -> Array:
-        ends = engine["xpos"].take(bodies, axis=-2)
-        return norm(ends[..., 1, :] - ends[..., 0, :]).max(axis=-1)
-
-    return gap

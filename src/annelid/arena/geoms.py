@@ -1,0 +1,170 @@
+"""The geoms of an arena: what the skin touches, and what is seen.
+
+A level floor and guard rails are planes of the engine, and posts its cylinders. Any other ground is touched through one
+plane for each part of the skin that can touch, tangent to the ground at the nearest point and paired with that part
+alone. The planes hang on mocap bodies, which are part of the engine's state, and are laid anew before every step
+(`annelid.simulation.ground`): the ground has no seams, one part has one contact, and a step costs the same on any
+ground (docs/arenas.md).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import mujoco
+import numpy as np
+
+from annelid.arena.surface import Shape
+from annelid.config.arena import ArenaKind, Walls
+from annelid.protocols import Array
+
+PLANE_HALF_SIZE_M = 0.01
+"""Of a moving plane as drawn; the engine's planes have no end."""
+HIDDEN_GROUP = 4
+SKY = ((1.0, 1.0, 1.0), (0.88, 0.92, 0.96))
+CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
+FLOOR_HALF_SIZE_M = 40.0
+RAIL_HALF_HEIGHT_M = 0.1
+POST_HALF_HEIGHT_M = 0.3
+"""Posts are about twice as high as the worm."""
+POST_RGBA = (0.75, 0.47, 0.30, 1.0)
+RAIL_RGBA = (0.55, 0.6, 0.66, 0.45)
+PIPE_RGBA = (0.62, 0.72, 0.80, 0.28)
+
+
+def contact_options(arena: ArenaKind) -> dict[str, list[float]]:
+    """Contact attributes that worm and floor share, so that neither dilutes the other's."""
+    return {
+        "friction": [arena.friction, 0.005, 0.0001],
+        "solref": [arena.contact_time_constant_s, 1.0],
+        "solimp": [*arena.contact_impedance, 0.5, 2.0],
+    }
+
+
+def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
+    """Returns the geoms of the skin that can touch the ground, in the order of the spec, each with a name."""
+    skin = [geom for geom in spec.geoms if geom.conaffinity and not geom.contype]
+    for number, geom in enumerate(skin):
+        geom.name = geom.name or f"skin_{number}"
+    return skin
+
+
+def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
+    """Adds to a worm's spec one plane on a mocap body for every geom that can touch the ground, and pairs the two."""
+    options = contact_options(arena)
+    slide, spin, roll = options.pop("friction")
+    for geom in touching(spec):
+        name = f"ground_of_{geom.name}"
+        holder = spec.worldbody.add_body(name=name, mocap=True)
+        holder.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[PLANE_HALF_SIZE_M, PLANE_HALF_SIZE_M, 1.0],
+            contype=0,
+            conaffinity=0,
+            group=HIDDEN_GROUP,
+        )
+        friction = [slide, slide, spin, roll, roll]
+        spec.add_pair(name=name, geomname1=name, geomname2=geom.name, condim=3, friction=friction, **options)
+        geom.conaffinity = int(arena.walls != Walls())
+
+
+def set_friction(model: mujoco.MjModel, friction: float) -> None:
+    """Gives skin and ground of a compiled worm another coefficient of sliding friction, from the next step on.
+
+    A worm with setae sets its own before every step.
+    """
+    model.geom_friction[(model.geom_contype != 0) | (model.geom_conaffinity != 0), 0] = friction
+    model.pair_friction[:, :2] = friction
+
+
+def add_box(spec: mujoco.MjSpec, arena: ArenaKind, place_m: Array, half_size_m: list[float], axes: Array) -> None:
+    """Adds a box that can be touched and is not drawn, to support a worm in plain MuJoCo; its axes are columns."""
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    spec.worldbody.add_geom(
+        type=box, pos=place_m, quat=quaternion, size=half_size_m, group=HIDDEN_GROUP, **contact_options(arena)
+    )
+
+
+def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
+    """Adds the arena to look at, below a sky and a light, to the spec of a worm of a length.
+
+    Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
+    unbounded planes, posts cylinders; relief and pipes are shapes to see, and hidden panels that can be touched.
+    """
+    kinds, looks = mujoco.mjtTexture, mujoco.mjtBuiltin
+    for name, kind, look, (first, second), size in (
+        ("sky", kinds.mjTEXTURE_SKYBOX, looks.mjBUILTIN_GRADIENT, SKY, 64),
+        ("floor", kinds.mjTEXTURE_2D, looks.mjBUILTIN_CHECKER, CHECKER, 128),
+    ):
+        spec.add_texture(name=name, type=kind, builtin=look, rgb1=first, rgb2=second, width=size, height=size)
+    material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+    spec.worldbody.add_light(
+        name="lamp",
+        pos=[length_m / 2, -1.0, 2.5],
+        dir=[0.0, 0.35, -1.0],
+        diffuse=[0.7, 0.7, 0.7],
+        # The engine would let walls that are seen through cast the shadow of solid ones.
+        castshadow=not arena.is_closed and arena.walls == Walls(),
+    )
+    shape = arena.shape(length_m)
+    if shape is not None:
+        _add_shape(spec, shape, arena)
+        arena.add_panels(spec, length_m)
+    if arena.is_closed or shape is None:
+        # The floor of a flat arena, or one to see below a pipe.
+        spec.worldbody.add_geom(
+            name="floor",
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[length_m / 2, 0.0, -arena.floor_depth_m],
+            size=[FLOOR_HALF_SIZE_M, FLOOR_HALF_SIZE_M, 1.0],
+            material="floor",
+            contype=int(arena.is_plane),
+            conaffinity=int(arena.is_plane),
+            **contact_options(arena),
+        )
+    add_walls(spec, arena)
+
+
+def add_walls(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
+    """Adds what stands upright, if anything: guard rails, which are planes drawn 20 cm high, and posts."""
+    rail_gap_m, posts = arena.walls
+    for number, (x, y, radius) in enumerate(posts):
+        spec.worldbody.add_geom(
+            name=f"post_{number}",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[x, y, POST_HALF_HEIGHT_M - arena.floor_depth_m],
+            size=[radius, POST_HALF_HEIGHT_M, 0.0],
+            rgba=POST_RGBA,
+            **contact_options(arena),
+        )
+    if rail_gap_m is None:
+        return
+    for name, side, turn in (("rail_left", -1.0, -sqrt(0.5)), ("rail_right", 1.0, sqrt(0.5))):
+        spec.worldbody.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[0.0, side * rail_gap_m / 2, RAIL_HALF_HEIGHT_M - arena.floor_depth_m],
+            quat=[sqrt(0.5), turn, 0.0, 0.0],
+            size=[FLOOR_HALF_SIZE_M, RAIL_HALF_HEIGHT_M, 1.0],
+            rgba=RAIL_RGBA,
+            **contact_options(arena),
+        )
+
+
+def _add_shape(spec: mujoco.MjSpec, shape: Shape, arena: ArenaKind) -> None:
+    """Adds a shape that nothing touches; it has no mass, since the world is at rest."""
+    spec.add_mesh(
+        name="ground",
+        uservert=shape.vertices_m.ravel(),
+        userface=shape.faces.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        smoothnormal=True,
+    )
+    look = {"rgba": PIPE_RGBA} if arena.is_closed else {"material": "floor"}
+    spec.worldbody.add_geom(
+        name="ground", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="ground", contype=0, conaffinity=0, **look
+    )

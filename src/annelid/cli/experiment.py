@@ -1,0 +1,278 @@
+"""The commands `experiment ..`: what is done to a worm to learn about it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli.common import (
+    RIGID_PRESET,
+    Assignments,
+    ClusterName,
+    FidelityLevel,
+    Force,
+    Jobs,
+    NamedPreset,
+    Output,
+    Quiet,
+    ResultsFolder,
+    config_of,
+    kept_runs,
+    overrides_of,
+    print_results,
+    refuse_existing,
+)
+from annelid.cli.entry import lock, study
+
+SLIP = Path("slip")
+GAIT = "riddle2025-muscles"
+
+
+@study("speed")
+def speed_command(
+    gaits: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PRESET|FILE.toml]...", help="Gaits.  [default: riddle2025-muscles and crawler]"),
+    ] = None,
+    output: Output = Path("speed"),
+    quick: Annotated[bool, typer.Option("--quick", help="Two values of each quantity.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find out how fast gaits crawl over friction and number of segments.
+
+    Every gait crawls on ground of friction 0.05 to 1.5, and with 3 to 12 segments, whose inner rings are all as strong
+    as its second. Speed, stride, period, cost of transport and slip are computed over complete cycles.
+
+    Writes speed.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes
+    on. Some 15 runs a gait of about ten seconds each; docs/speed_of_travel.md explains the results.
+
+    \b
+    annelid experiment speed --quick
+    annelid experiment speed
+    annelid experiment speed crawler tune/best.toml -o mine
+    """
+    from annelid_studies import crawling
+
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = crawling.crawl(store, gaits or crawling.GAITS, "quick" if quick else "full")
+    path = crawling.write_readings(readings, output / "speed.csv")
+    tables = (crawling.crawling_table(readings, quantity) for quantity in crawling.VALUES)
+    print_results((path, crawling.write_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)
+
+
+@study("slip")
+def slip_command(
+    output: Output = SLIP,
+    preset: Annotated[str, typer.Option(help="Gait that gets the feedback: riddle2025-muscles or crawler.")] = GAIT,
+    quick: Annotated[bool, typer.Option("--quick", help="Two frictions only.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure what pressure feedback saves of the work lost to friction.
+
+    A six-segment worm crawls on several frictions with the paper's network, and with that of controller sns-pressure,
+    without and with its pressure neurons. Speed and loss are computed over complete cycles; "saved" is per second and
+    per metre. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Twenty-one runs of
+    about ten seconds each; docs/slip.md explains the results.
+
+    \b
+    annelid experiment slip --quick
+    annelid experiment slip --preset crawler -o slip-crawler
+    """
+    from annelid_studies import slip
+
+    frictions = slip.QUICK_FRICTIONS if quick else slip.FRICTIONS
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = slip.slip_feedback(store, frictions, preset)
+    path = slip.write_readings(readings, output / "slip.csv")
+    written = path, slip.feedback_figure(readings, preset, path.with_suffix(""))
+    print_results(written, slip.feedback_table(readings, preset), quiet=quiet)
+
+
+@study("slip-detector")
+def slip_detector_command(
+    output: Output = SLIP,
+    quick: Annotated[bool, typer.Option("--quick", help="Two runs only.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Judge the slip detector, which knows stretch and pressure only, by the slip that the simulator knows of.
+
+    The six-segment worm crawls by several controllers on several frictions. A segment truly slips while what touches
+    of it moves at more than 5 cm/s along the body. Prints precision, recall, delay and false alarms of the detector as
+    it is set, and precision against recall over all limits. Writes slip_detector.csv, .png and .svg, and keeps runs,
+    which it shares with `annelid experiment slip`; docs/slip.md explains the results.
+
+    \b
+    annelid experiment slip-detector --quick
+    annelid experiment slip-detector -o slip
+    """
+    from annelid_studies import slip
+
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        found = slip.slip_detection(store, slip.QUICK_CASES if quick else tuple(slip.CASES))
+    scores = slip.scores(found)
+    path = slip.write_scores(scores, output / "slip_detector.csv")
+    written = path, slip.detector_figure(found, path.with_suffix(""))
+    print_results(written, slip.detection_table(scores), quiet=quiet)
+
+
+@study("turning")
+def turning_command(
+    output: Output = Path("turning"),
+    quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find out on which radius the worm turns.
+
+    The authors' six-segment robot with half-rings crawls on flat ground under constant modulations of its two sides,
+    with three gaits: the timed pattern 3x1 with all segments modulated alike, the same with the middle segments bent
+    the other way, and the nervous system with ideal muscles.
+
+    Writes turning.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes
+    on. 21 runs of some seconds to a minute each; docs/turning.md explains the results.
+
+    \b
+    annelid experiment turning --quick
+    annelid experiment turning -o turning
+    """
+    from annelid_studies.tables import write_fields
+    from annelid_studies.turning import MODULATIONS, QUICK, Reading, turning, turning_picture, turning_table
+
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings, tracks = turning(store, QUICK if quick else MODULATIONS)
+    path = write_fields(Reading, readings, output / "turning.csv")
+    written = path, turning_picture(readings, tracks, path.with_suffix(""))
+    print_results(written, turning_table(readings), quiet=quiet)
+
+
+@study("pipes")
+def pipes_command(
+    output: Output = Path("pipes"),
+    quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find out which pipes the worm passes, and how fast.
+
+    The six-segment worm with ideal muscles goes through a taper and an hourglass down to a radius of 0.13 m: with one
+    nervous system whose wave keeps its pace, adapts it to the pressure on the worm's back, or is fast throughout; with
+    the paper's nervous system, and with the timed pattern 3x1. And round bends of 90 degrees with that pattern, the
+    same turning away from contact, the paper's nervous system and the robust one. Speeds are those along the pipe's
+    centre line.
+
+    Writes pipes.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one goes on.
+    34 runs of half a minute to three minutes each; docs/pipes.md explains the results.
+
+    \b
+    annelid experiment pipes --quick
+    annelid experiment pipes -o pipes
+    """
+    from annelid_studies.pipes import Reading, pass_pipes, pipes_picture, pipes_table, trials
+    from annelid_studies.tables import write_fields
+
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings, courses = pass_pipes(store, trials(quick))
+    path = write_fields(Reading, readings, output / "pipes.csv")
+    written = path, pipes_picture(readings, courses, path.with_suffix(""))
+    print_results(written, pipes_table(readings), quiet=quiet)
+
+
+@study("load-frame")
+def load_frame_command(
+    preset: NamedPreset = RIGID_PRESET,
+    output: ResultsFolder = Path("load-frame"),
+    assignments: Assignments = None,
+    fidelity: FidelityLevel = None,
+    displacement: Annotated[float, typer.Option(help="How far the cable is wound, mm.")] = 330.0,
+    speed: Annotated[float, typer.Option(help="Speed of the cable, mm/s.")] = 10.0,
+    cable_friction: Annotated[
+        float,
+        typer.Option(min=0.0, max=20.0, help="Friction of the cable: coefficient times its wrap angle, rad."),
+    ] = 0.0,
+    data: Annotated[
+        Path | None, typer.Option(help="Measured loop to compare with.  [default: the one of annelid]")
+    ] = None,
+    quiet: Quiet = False,
+    force: Force = False,
+) -> None:
+    """Close one ring by its cable and open it again.
+
+    The middle ring of a weightless worm is wound in slowly and let out; the cable's force is compared with what
+    the authors measured on one segment of the robot. A few seconds. Writes load_frame.csv, .png and .svg.
+
+    \b
+    annelid experiment load-frame
+    annelid experiment load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
+    """
+    from annelid.experiment.load_frame import (
+        MM,
+        cable_force,
+        draw_loops,
+        frame_table,
+        load_frame,
+        read_loop,
+        write_loop,
+    )
+    from annelid.experiment.progress import study_progress
+
+    table = output / "load_frame.csv"
+    lock(output)
+    refuse_existing(table, force)
+    measured = read_loop(data)
+    config = config_of(preset, overrides_of(assignments), fidelity=fidelity)
+    with study_progress(quiet=quiet) as progress:
+        report = None if progress is None else partial(progress, "load frame", 0, 0)
+        tension = load_frame(config, displacement_m=displacement * MM, speed_m_per_s=speed * MM, progress=report)
+    loop = cable_force(tension, cable_friction)
+    loops = {config.name: loop, "measured": measured}
+    written = write_loop(loop, tension, table), draw_loops(loops, table.with_suffix(""))
+    print_results(written, frame_table(loops), quiet=quiet)
+
+
+@study("weak-middle")
+def weak_middle_command(
+    output: Output = Path("weak-middle"),
+    quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Find out why the middle of the worm elongates less than its ends.
+
+    Every segment of a resting worm (preset wang with the authors' rods and springs) is pulled alone, wound in and held
+    until it stands still; the deficit is how far the interior segments stay below the two ends, on average. Swept one
+    at a time: number of segments, Young's modulus, weight, friction; each with four kinds of actuators. Force-limited:
+    a servo that stalls at a tension. Servo: one that stalls, or ends at its shortest cable. Muscle: the paper's, whose
+    force falls with its length. Length-limited: wound to a length, whatever that takes. Then: which differences
+    between two interior segments would make them elongate as the robot's, 3.82 and 4.78 cm.
+
+    Writes weak_middle.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one
+    goes on. About 250 runs of some seconds each; docs/weak_middle.md explains the results.
+
+    \b
+    annelid experiment weak-middle --quick
+    annelid experiment weak-middle -o weak-middle
+    """
+    from annelid_studies.weak_middle import results
+    from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, asymmetry, weak_middle
+
+    found = None
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        set_to, readings = weak_middle(store, "quick" if quick else "full")
+        if not quick:
+            found = asymmetry(store, set_to[BASE_KEY].force_N)
+    tables = [results.settings_table(set_to), *(results.sweep_table(readings, quantity) for quantity in QUANTITIES)]
+    tables += [results.checks_table(readings), results.asymmetry_table(found)] if found else []
+    path = results.write_readings([*readings, *(found.readings if found else ())], output / "weak_middle.csv")
+    print_results((path, results.weak_middle_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)

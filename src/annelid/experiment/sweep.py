@@ -1,0 +1,392 @@
+"""Sweeps: fields of a configuration varied over a grid or in samples, all runs in one labelled dataset.
+
+Beside the dataset (netCDF), a sweep leaves a row a run as CSV, a figure, and a table of the highest, lowest and failed
+runs.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from rich.table import Table
+
+import annelid
+from annelid.config import (
+    Cluster,
+    RunConfig,
+    Study,
+    Vary,
+    field_paths,
+    find_cluster,
+    load_config,
+    load_study,
+    toml_value,
+    unit_of,
+)
+from annelid.config.study import MOST_RUNS
+from annelid.draw.figures.sweep import sweep_figure, worded
+from annelid.errors import ConfigError
+from annelid.experiment.case import Case
+from annelid.experiment.cluster import workers_of
+from annelid.experiment.numbers import PREFERRED, Number, chosen_numbers
+from annelid.experiment.progress import StudyProgress
+from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
+from annelid.experiment.store import Done, Store
+from annelid.output import whole_file, write_csv
+from annelid.simulation.lock import locks
+
+__all__ = ["Sweep", "sweep"]
+
+SAMPLE, REPEAT, SEGMENT = "sample", "repeat", "segment"
+"""Dimensions beside those of the varied fields."""
+RUNS, DATASET, ROWS, FIGURE = "runs", "sweep.nc", "sweep.csv", "sweep"
+"""What is in the folder of the results."""
+N_SHOWN = 4
+"""Numbers in the table and panels in the figure."""
+N_ENDS, N_FAILED = 3, 8
+"""Rows of the table: from either end, and of reasons."""
+LONG_S = 100 * 3600.0
+"""Studies that take longer on one core begin with a warning, s."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All runs of a sweep: the fields of a configuration that are varied, by dotted path."""
+
+    study: Study
+    base: RunConfig
+    fields: tuple[str, ...]
+    samples: Sequence[tuple[Any, ...]]
+    """Values of the fields of each combination or sample, ``(n, n_fields)``."""
+    levels: Mapping[str, Sequence[Any]]
+    """By dimension, what stands along it: a field's values, numbers of samples, seeds of repeats."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the dimensions."""
+        return tuple(len(levels) for levels in self.levels.values())
+
+    @cached_property
+    def points(self) -> tuple[tuple[Mapping[str, Any], Case], ...]:
+        """Each run with its values of the varied fields by dotted path, the last dimension counting fastest."""
+        fixed = flattened(self.study.set)
+        seeds = [{"seed": seed} for seed in self.levels[REPEAT]] if REPEAT in self.levels else [{}]
+        varied = [dict(zip(self.fields, sample, strict=True)) for sample in self.samples]
+        return tuple((values, Case(self.study.preset, fixed | values | seed)) for values in varied for seed in seeds)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sweep that is done.
+
+    Attributes:
+        plan: The design.
+        numbers: What is read from every run.
+        runs: What became of the plan's points, in their order.
+        folder: Folder of the results.
+    """
+
+    plan: Plan
+    numbers: tuple[Number, ...]
+    runs: tuple[Done, ...]
+    folder: Path
+
+    @cached_property
+    def data(self) -> xr.Dataset:
+        """All numbers, labelled, each with ``units`` and ``long_name``; NaN where a run has none.
+
+        They lie along every varied field of a grid, by dotted path, or along ``sample``; ``repeat`` has the seeds of
+        repeats and ``segment`` counts from 1.
+        """
+        plan, dims = self.plan, tuple(self.plan.levels)
+        variables: dict[str, Any] = {}
+        for name, (text, words_of) in _WORDS.items():
+            words = np.array([words_of(run) for run in self.runs], dtype=object).reshape(plan.shape)
+            variables[name] = (dims, words, {"units": "1", "long_name": text})
+        outcomes = [run.outcome for run in self.runs]
+        read = {number: [None if one is None else number.read(one) for one in outcomes] for number in self.numbers}
+        lengths = [len(value or ()) for number, values in read.items() if number.per_segment for value in values]
+        n_segments = max(lengths, default=0)
+        for number, values in read.items():
+            below = {SEGMENT: n_segments} if number.per_segment else {}
+            table = np.full((len(values), prod(below.values())), np.nan)
+            for row, value in zip(table, values, strict=True):
+                if value is not None:
+                    row[: np.size(value)] = np.array(value, dtype=float)
+            attrs = {"units": number.unit, "long_name": number.text}
+            variables[number.name] = ((*dims, *below), table.reshape(*plan.shape, *below.values()), attrs)
+        counted = {SAMPLE: "number of the sample", REPEAT: "seed of the run", SEGMENT: "segment, from the front"}
+        levels = dict(plan.levels) | ({SEGMENT: range(1, n_segments + 1)} if lengths else {})
+        coords: dict[str, Any] = {
+            name: (name, np.array(levels[name]), {"units": "1", "long_name": text})
+            for name, text in counted.items()
+            if name in levels
+        }
+        meanings = field_paths()
+        for i, field in enumerate(plan.fields):
+            dim, values = (field, levels[field]) if field in levels else (SAMPLE, [row[i] for row in plan.samples])
+            attrs = {"units": unit_of(field) or "1", "long_name": meanings[field] or field}
+            coords[field] = (dim, _column(values), attrs)
+        return xr.Dataset(
+            variables,
+            coords=coords,
+            attrs={
+                "title": plan.study.name,
+                "study": plan.study.model_dump_json(by_alias=True),
+                "base_config": plan.base.model_dump_json(),
+                "annelid_version": annelid.__version__,
+                "n_failed": sum(run.status == "failed" for run in self.runs),
+                "n_warned": sum(bool(run.warnings) for run in self.runs),
+            },
+        )
+
+
+_WORDS: Mapping[str, tuple[str, Callable[[Done], str]]] = {
+    "status": ("complete, stopped by a guard, or failed", lambda run: run.status),
+    "reason": ("why a run is not complete", lambda run: run.reason),
+    "run": ("folder of the run", lambda run: "" if run.outcome is None else run.outcome.path.name),
+    "rhythm": ("verdict on the rhythm", lambda run: "" if run.outcome is None else run.outcome.rhythm.verdict or ""),
+    "warnings": ("what is doubtful about a run, a sentence a line", lambda run: "\n".join(run.warnings)),
+}
+
+
+def _column(values: Sequence[Any]) -> np.ndarray:
+    """Values of a field as numbers where all are, else as words."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.array(values)
+    return np.array([label(value) for value in values], dtype=object)
+
+
+def label(value: Any) -> str:
+    """Writes a value of a field for an axis or a table."""
+    return value if isinstance(value, str) else toml_value(value)
+
+
+@locks("folder")
+def sweep(
+    study: Study | str | Path | Mapping[str, Any],
+    folder: str | Path = "sweep",
+    *,
+    cluster: Cluster | str | None = None,
+    jobs: int | None = None,
+    progress: StudyProgress | None = None,
+) -> xr.Dataset:
+    """Computes a sweep, writes its results, and returns them.
+
+    Call it below ``if __name__ == "__main__":``, since workers start as new processes.
+
+    Args:
+        study: The study, the path of its TOML file, or a nested mapping.
+        folder: Folder for ``sweep.nc``, ``sweep.csv``, a figure, and the runs, which a second call finds there.
+        cluster: Where runs are computed: a section, or a word as `find_cluster` takes; default: processes of this
+            machine. What a study says of it is not used, since a scheduler and a job run code: name its file here.
+        jobs: Workers, instead of as many as there are cores, or as the cluster says.
+        progress: Called at the start and after every run.
+
+    Returns:
+        Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
+        ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason``, ``warnings``
+        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder.
+
+    Raises:
+        ConfigError: The study is refused, or all of its runs are.
+        MissingDependency: Dask or dask-jobqueue is needed and not installed.
+        ClusterError: The workers are lost for good; finished runs are kept.
+        RunFileError: A file cannot be written.
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
+    done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
+    write_results(done)
+    return done.data
+
+
+def swept(
+    study: Study,
+    folder: Path,
+    *,
+    cluster: Cluster | str | None = None,
+    jobs: int | None = None,
+    progress: StudyProgress | None = None,
+    to_use: str = "pass it as cluster",
+) -> Sweep:
+    """Computes a sweep as `sweep` does, in a folder that the caller has locked, and writes nothing but the runs.
+
+    ``to_use`` is what the user has to do to have the cluster used that the study describes, for a sentence.
+    """
+    numbers = chosen_numbers(study.outputs, study.rank)
+    if cluster is None and study.cluster is not None:
+        warnings.warn(
+            f"the study {study.name!r} describes a cluster ({study.cluster}): not used; {to_use} to use it",
+            stacklevel=2,
+        )
+    to_join = find_cluster(cluster or "processes") if isinstance(cluster, str | None) else cluster
+    its_workers = workers_of(to_join, jobs)
+    plan = plan_of(study)
+    with its_workers as workers:
+        cases = [case for _, case in plan.points]
+        done = Store(folder / RUNS, workers, study.keep).finish(cases, "sweep", progress=progress)
+    if all(one.refused for one in done) and done[0].error is not None:
+        raise done[0].error
+    return Sweep(plan, numbers, tuple(done), folder)
+
+
+def plan_of(study: Study) -> Plan:
+    """Lays out the runs of a study; refuses too many of them."""
+    base = load_config(study.preset, flattened(study.set))
+    variables = variables_of(study.vary, base)
+    fields = tuple(variable.field for variable in variables)
+    if "seed" in fields and study.repeats > 1:
+        raise ConfigError(f"vary 'seed' and repeats = {study.repeats} both set the seed: leave one out")
+    grid = {} if study.samples else dict(zip(fields, map(_levels, variables, study.vary), strict=True))
+    levels: dict[str, Sequence[Any]] = dict(grid) or {SAMPLE: range(study.samples or 0)}
+    if study.repeats > 1:
+        levels[REPEAT] = range(base.seed, base.seed + study.repeats)
+    n = prod(map(len, levels.values()))
+    total_s = n * Case(study.preset, flattened(study.set)).cost_s
+    size = f"the study has {n:,} runs, about {total_s / 3600:,.0f} hours of one core"
+    if n > MOST_RUNS:
+        raise ConfigError(f"{size}: it must have at most {MOST_RUNS:,}; take fewer values, samples or repeats")
+    if total_s > LONG_S:
+        warnings.warn(size, stacklevel=2)
+    if grid:
+        samples = list(product(*grid.values()))
+    else:
+        places = unit_samples(study.design, study.samples or 0, len(variables), study.seed)
+        samples = [tuple(map(sampled, variables, row)) for row in places.tolist()]
+    return Plan(study, base, fields, samples, levels)
+
+
+def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Returns the fields of nested tables by dotted path."""
+    fields: dict[str, Any] = {}
+    for name, value in tree.items():
+        path = f"{prefix}{name}"
+        fields |= flattened(value, f"{path}.") if isinstance(value, Mapping) else {path: value}
+    return fields
+
+
+def _levels(variable: Variable, vary: Vary) -> tuple[Any, ...]:
+    if isinstance(variable, Choice):
+        return variable.values
+    shares = np.linspace(0.0, 1.0, vary.number or 0).tolist()
+    levels = tuple(dict.fromkeys(from_unit(variable, share) for share in shares))
+    if len(levels) != vary.number:
+        raise ConfigError(
+            f"vary {variable.field!r}: number = {vary.number}: from {variable.low:g} to {variable.high:g} there are "
+            f"only {len(levels)} distinct values"
+        )
+    return levels
+
+
+def write_results(sweep: Sweep) -> list[Path]:
+    """Writes a sweep's dataset, its rows and its figure; without the figure where there is no number to draw."""
+    sweep.folder.mkdir(parents=True, exist_ok=True)
+    path = sweep.folder / DATASET
+    with whole_file(path) as draft:
+        sweep.data.to_netcdf(draft, engine="h5netcdf")
+    written = [path, _write_rows(sweep, sweep.folder / ROWS)]
+    if names := shown_numbers(sweep):
+        written.append(sweep_figure(_drawn(sweep.data, names), sweep.plan.fields, names, sweep.folder / FIGURE))
+    return written
+
+
+def _write_rows(sweep: Sweep, path: Path) -> Path:
+    """Writes one row a run as CSV with a header; what there is per segment has a column for each."""
+    columns: dict[str, np.ndarray] = {}
+    for number in sweep.numbers:
+        values = sweep.data[number.name].values.reshape(len(sweep.runs), -1)
+        names = [f"{number.name}_{i}" for i in sweep.data[SEGMENT].values] if number.per_segment else [number.name]
+        columns |= dict(zip(names, values.T, strict=True))
+    rows = (
+        [
+            i,
+            *_varied(sweep, i),
+            run.status,
+            run.reason,
+            " | ".join(run.warnings),
+            "" if run.outcome is None else run.outcome.path.name,
+            *("" if np.isnan(values[i]) else f"{values[i]:.10g}" for values in columns.values()),
+        ]
+        for i, run in enumerate(sweep.runs)
+    )
+    seed = ["seed"] if REPEAT in sweep.plan.levels else []
+    return write_csv(path, ["number", *sweep.plan.fields, *seed, "status", "reason", "warnings", "run", *columns], rows)
+
+
+def shown_numbers(sweep: Sweep) -> list[str]:
+    """Returns which numbers the table and the figure show: the one to rank by first, and only such as there are."""
+    study, kept = sweep.plan.study, {number.name for number in sweep.numbers}
+    wanted = dict.fromkeys([*([] if study.rank is None else [study.rank]), *(study.outputs or PREFERRED)])
+    return [name for name in wanted if name in kept and bool(np.isfinite(sweep.data[name]).any())][:N_SHOWN]
+
+
+def _drawn(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Numbers to draw, those per segment as their mean over the segments."""
+    chosen = data[[*names, "status"]]
+    for name in names:
+        if SEGMENT in chosen[name].dims:
+            text = f"{chosen[name].attrs['long_name']}, mean of segments"
+            chosen[name] = chosen[name].mean(SEGMENT).assign_attrs(chosen[name].attrs | {"long_name": text})
+    return chosen
+
+
+def results_table(sweep: Sweep) -> Table:
+    """Returns the runs with the highest and the lowest values of the first number, and those that failed and why."""
+    plan, names = sweep.plan, shown_numbers(sweep)
+    drawn = _drawn(sweep.data, names)
+    columns = [drawn[name].values.reshape(-1) for name in names]
+    content = f"highest and lowest {names[0]}" if names else "no number has a value"
+    table = Table(title=f"{plan.study.name}: {content}", caption=_caption(sweep))
+    heads = [worded(name.rsplit(".", 1)[-1], sweep.data[name].attrs["units"]) for name in (*plan.fields, *names)]
+    n = len(plan.fields)
+    for head in ("run", *heads[:n], *([REPEAT] if REPEAT in plan.levels else []), *heads[n:]):
+        table.add_column(head, justify="right")
+    if names:
+        order = [i for i in np.argsort(-columns[0], kind="stable").tolist() if np.isfinite(columns[0][i])]
+        for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:
+            for i in rows:
+                values = ("" if np.isnan(column[i]) else f"{column[i]:.4g}" for column in columns)
+                table.add_row(str(i), *_varied(sweep, i), *values)
+            table.add_section()
+    return table
+
+
+def failures(sweep: Sweep) -> list[tuple[str, list[int]]]:
+    """Returns why runs failed or were stopped, and the numbers of those runs, the most frequent reason first."""
+    by_reason: dict[str, list[int]] = {}
+    for i, run in enumerate(sweep.runs):
+        if run.status != "complete":
+            by_reason.setdefault(f"{run.status}: {run.reason}", []).append(i)
+    return sorted(by_reason.items(), key=lambda item: -len(item[1]))
+
+
+def _caption(sweep: Sweep) -> str:
+    reasons = failures(sweep)
+    lines = [f"{len(sweep.runs)} runs, of which {sum(run.status == 'complete' for run in sweep.runs)} are complete"]
+    if doubtful := [i for i, run in enumerate(sweep.runs) if run.warnings]:
+        lines[0] += f", and {len(doubtful)} have warnings (run {_listed(doubtful)}), which {ROWS} has"
+    lines += [f"{len(numbers)} {reason} (run {_listed(numbers)})" for reason, numbers in reasons[:N_FAILED]]
+    if len(reasons) > N_FAILED:
+        lines.append(f"{len(reasons) - N_FAILED} more reasons in {ROWS}")
+    return "\n".join(lines)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ", ".join(map(str, numbers[:5])) + (", .." if len(numbers) > 5 else "")
+
+
+def _varied(sweep: Sweep, i: int) -> list[str]:
+    """Values of the varied fields of a run, and its seed where there are repeats."""
+    values, case = sweep.plan.points[i]
+    seed = [str(case.changes["seed"])] if REPEAT in sweep.plan.levels else []
+    return [*map(label, values.values()), *seed]

@@ -1,0 +1,198 @@
+"""Tables of numbers are filled from result files: page and files agree, and no such table stands without a file."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shlex
+import tomllib
+from collections.abc import Iterator
+from itertools import groupby
+from pathlib import Path
+
+import pytest
+from doc_commands import PAGES, ROOT, Command
+from test_doc_commands import check_annelid, check_program
+
+import measure_runs
+from fill_tables import DOCS, MARKED, FillError, filled, main, waiting
+
+MOST = 5
+"""Cells with a number that a table may have and not be one of results."""
+NUMBER = re.compile(r"^\W*\d[\d.,]*(?![\d-])")
+
+WAITING = (
+    "results/arena_contacts.csv",
+    "results/batch_throughput.csv",
+    "results/environments.csv",
+    "results/levels.csv",
+    "results/pipes.csv",
+    "results/slip.csv",
+    "results/slip_crawler.csv",
+    "results/slip_parts.csv",
+    "results/speed.csv",
+    "results/tune_front.csv",
+    "results/turning.csv",
+    "results/uncertainty_wang.csv",
+    "results/weak_middle.csv",
+)
+"""Result files that do not exist yet: their tables have the numbers of earlier runs."""
+
+EXCEPTIONS = {
+    ("docs/environments.md", "numbers"): "spaces of the environment, not results: tests/environments compares them",
+    ("docs/environments.md", "number"): "the same",
+    ("docs/gait.md", "number"): "definitions, not results",
+    ("docs/material.md", "source"): "published values",
+    ("docs/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims docs/paper.md`",
+    ("docs/paper.md", "#"): "the same",
+    ("docs/troubleshooting.md", "code"): "exit codes, not results",
+    ("docs/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
+    ("docs/validation.md", "step (ms)"): "the same",
+    ("docs/weak_middle.md", "cause"): "printed by `annelid experiment weak-middle`, which writes it into no file",
+}
+"""Tables of numbers without a result file, by page and first head, and why."""
+
+LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))
+PAGE = """# Gaits
+
+<!-- table: results/gaits.csv, results/bench.json:levels
+made by: annelid experiment speed -o speed
+| gait | of friction | speed | elongation |
+|---|---|---|---|
+for each if run != "fast":
+| {run} | {arena_friction} | {100 * speed_m:.1f} cm/s | {100 * (e_m / slow_one.e_m):.0f} % |
+| `fast`, ordered: {fast.ordered} | | {fast.speed_m / slow_one.speed_m:.1f} times | published: 4 / 5 cm |
+-->
+
+<!-- end of table -->
+"""
+FILLED = """
+| gait | of friction | speed | elongation |
+|---|---|---|---|
+| slow one | 0.3 | 2.0 cm/s | 100 / 100 % |
+| none | – | – cm/s | – / – % |
+| `fast`, ordered: yes | | 2.5 times | published: 4 / 5 cm |
+"""
+
+
+@pytest.fixture
+def docs(tmp_path: Path) -> Path:
+    """A folder of pages with results."""
+    tmp_path = tmp_path / "docs"
+    (tmp_path / "results").mkdir(parents=True)
+    rows = "run,arena.friction,speed_m,e_m_1,e_m_2\nslow one,0.3,0.02,0.04,0.05\nnone,,,nan,\n"
+    (tmp_path / "results" / "gaits.csv").write_text(rows)
+    levels = {"levels": [{"run": "fast", "speed_m": 0.05, "ordered": True}], "machine": "none"}
+    (tmp_path / "results" / "bench.json").write_text(json.dumps(levels))
+    return tmp_path
+
+
+def unfilled(page: str) -> Iterator[str]:
+    """First head of every table that has numbers and stands between no markers."""
+    for is_table, lines in groupby(MARKED.sub("", page).splitlines(), lambda line: line.lstrip().startswith("|")):
+        if is_table:
+            head, *rows = (re.sub(r"`[^`]*`|\\\|", "", line).strip().strip("|").split("|") for line in lines)
+            if sum(bool(NUMBER.match(cell.strip())) for row in rows for cell in row) > MOST:
+                yield head[0].strip()
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_has_the_numbers_of_its_files(page: str) -> None:
+    assert filled(PAGES[page]) == PAGES[page], "run: python docs/site/fill_tables.py"
+
+
+def test_only_these_files_are_waited_for() -> None:
+    assert {file for page in PAGES.values() for file in waiting(page)} == set(WAITING)
+
+
+def test_every_table_of_numbers_has_its_file() -> None:
+    assert {(name, head) for name, page in PAGES.items() for head in unfilled(page)} == set(EXCEPTIONS)
+
+
+def test_every_result_file_is_shown() -> None:
+    named = {
+        file.partition(":")[0]
+        for page in PAGES.values()
+        for found in MARKED.finditer(page)
+        for file in found["files"].split(", ")
+    }
+    there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
+    assert {file for file in there - named if not any(f"]({file})" in page for page in PAGES.values())} == set()
+
+
+def test_commands_that_make_results_are_understood() -> None:
+    made_by = {
+        one for page in PAGES.values() for found in MARKED.finditer(page) for one in found["command"].split("; ")
+    }
+    lists = {one for path in LISTS for one in tomllib.loads(path.read_text(encoding="utf-8"))["runs"].values()}
+    assert lists
+    for line in made_by | lists:
+        words = tuple(shlex.split(line))
+        (check_annelid if words[0] == "annelid" else check_program)(Command(words))
+        assert all((ROOT / word).exists() for word in words if word.endswith(".toml")), line
+
+
+def test_numbers_are_filled_in(docs: Path) -> None:
+    page = filled(PAGE, docs)
+    assert page == PAGE.replace("-->\n\n<!--", f"-->\n{FILLED}\n<!--")
+    assert filled(page, docs) == page
+
+
+def test_a_changed_file_is_found(docs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page, root = docs / "page.md", docs.parent
+    page.write_text(PAGE)
+    (root / "README.md").touch()
+    assert (main(True, root), main(False, root), main(True, root)) == (1, 0, 0)
+    results = docs / "results" / "gaits.csv"
+    results.write_text(results.read_text().replace("0.02", "0.03"))
+    assert main(True, root) == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "docs/page.md: differs from its result files"
+    assert "2.0 cm/s" in page.read_text()
+
+
+def test_a_table_waits_for_its_file(docs: Path) -> None:
+    page = filled(PAGE, docs)
+    (docs / "results" / "gaits.csv").unlink()
+    assert filled(page, docs) == page
+    assert waiting(page, docs) == {"results/gaits.csv": "annelid experiment speed -o speed"}
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("{run}", "{name}"),
+        ("slow_one.", "slower_one."),
+        ("results/gaits.csv", "results/../gaits.csv"),
+        ("results/gaits.csv", "/etc/gaits.csv"),
+        ("made by", "by"),
+        ("<!-- end of table -->", "<!-- end -->"),
+    ],
+)
+def test_a_wrong_marker_is_refused(docs: Path, right: str, wrong: str) -> None:
+    with pytest.raises(FillError):
+        filled(PAGE.replace(right, wrong), docs)
+
+
+def test_a_table_of_numbers_without_markers_is_found() -> None:
+    table = "| a | b |\n|---|---|\n" + "| 1.5 cm | -2 |\n" * 3
+    assert list(unfilled(f"text\n\n{table}\ntext\n")) == ["a"]
+    assert list(unfilled("| a | b |\n|---|---|\n" + "| `1.5` | 1-2-3 |\n" * 9)) == []
+    assert list(unfilled(PAGE.replace("-->\n\n", f"-->\n\n{table}\n"))) == []
+
+
+def test_a_list_of_runs_is_measured(tmp_path: Path) -> None:
+    path = tmp_path / "planar.toml"
+    path.write_text(
+        '[runs]\nlong = "annelid run riddle2022-planar --duration 3"\n'
+        'short = "annelid run riddle2022-planar --duration 0.1"\n'
+    )
+    measure_runs.main(path)
+    with path.with_suffix(".csv").open(encoding="utf-8") as file:
+        long, short = csv.DictReader(file)
+    assert (long["run"], long["command"]) == ("long", "annelid run riddle2022-planar --duration 3")
+    assert float(long["period_s"]) == pytest.approx(2.625, abs=0.02)
+    assert long["order"].startswith("1-2-3")
+    assert float(long["elongation_mean_max_m_3"]) > 0
+    assert short["period_s"] == short["gait_speed_m_per_s"] == ""
+    assert "real_time_factor" not in long

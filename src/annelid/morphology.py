@@ -41,37 +41,22 @@ class MeshGeometry:
 
     Crossings are numbered plane by plane: crossing ``p * n_per_plane + i`` lies on plane ``p`` and on
     clockwise strand ``i``. Strands are numbered clockwise first.
-
-    Attributes:
-        n_segments: Actuated segments.
-        radius_m: Radius of the tube.
-        angular_rate_rad_per_m: Turn of a strand per metre of body.
-        vertices_m: Points of every strand, shape ``(n_strands, n_vertices, 3)``, front to back.
-        crossing_vertex: Index along the strand of each plane's crossing, shape ``(n_planes,)``; the same for every
-            strand.
-        crossing_strands: The clockwise and the counter-clockwise strand of each crossing, ``(n_crossings, 2)``.
-        plane_x_m: Position of each crossing plane, shape ``(n_planes,)``.
-        ring_planes: Plane of each segment's ring, shape ``(n_segments,)``.
-        rings: Crossings round each ring in order of angle, shape ``(n_segments, n_per_plane)``; closed by returning to
-            the first.
-        springs: Front and rear crossing of every axial spring, shape ``(n_springs, 2)``, bay by bay.
-        sensor_springs: The springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the first of
-            each starts on clockwise strand 0, "the first helix".
-        rhombi: Front, left, rear and right crossing of every complete rhombus, shape ``(n_rhombi, 4)``.
     """
 
-    n_segments: int
-    radius_m: float
-    angular_rate_rad_per_m: float
-    vertices_m: Array
-    crossing_vertex: Indices
-    crossing_strands: Indices
-    plane_x_m: Array
-    ring_planes: Indices
-    rings: Indices
-    springs: Indices
+    n_segments: int  # actuated
+    radius_m: float  # of the tube
+    angular_rate_rad_per_m: float  # turn of a strand per metre of body
+    vertices_m: Array  # points of every strand, front to back, (n_strands, n_vertices, 3)
+    crossing_vertex: Indices  # index along every strand of each plane's crossing, (n_planes,)
+    crossing_strands: Indices  # the clockwise and the counter-clockwise strand of each crossing, (n_crossings, 2)
+    plane_x_m: Array  # position of each crossing plane, (n_planes,)
+    ring_planes: Indices  # plane of each segment's ring, (n_segments,)
+    rings: Indices  # crossings round each ring in order of angle, (n_segments, n_per_plane); the first closes it
+    springs: Indices  # front and rear crossing of every axial spring, (n_springs, 2), bay by bay
     sensor_springs: Indices
-    rhombi: Indices
+    """Springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the first starts on clockwise strand
+    0, "the first helix"."""
+    rhombi: Indices  # front, left, rear and right crossing of every complete rhombus, (n_rhombi, 4)
 
     @property
     def n_strands(self) -> int:
@@ -167,19 +152,7 @@ def helical_mesh(
     free_planes_at_ends: int = 3,
     rear_overhang_m: float | None = None,
 ) -> MeshGeometry:
-    """Generates the mesh of a worm.
-
-    Args:
-        n_segments: Actuated segments, at least 3.
-        n_helices: Strands, half of each handedness; even and at least 6.
-        radius_m: Radius of the tube at rest.
-        angular_rate_rad_per_m: Turn of a strand per metre of body (2 pi over the pitch).
-        elements_per_side: Straight elements between neighbouring crossings.
-        elements_per_end: Straight elements in each free end of a strand; by default as many as in a side.
-        planes_between_rings: Crossing planes from one ring to the next, at least 2.
-        free_planes_at_ends: Crossing planes before the first and after the last ring, at least 1.
-        rear_overhang_m: Free strand behind the last plane; by default half a plane spacing, as in front.
-    """
+    """Generates the mesh of a worm at rest from the fields of `annelid.body.worm.Mesh`, where they are checked."""
     ends = elements_per_side if elements_per_end is None else elements_per_end
     half = n_helices // 2
     step = 2 * pi / half

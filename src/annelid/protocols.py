@@ -90,7 +90,14 @@ class Plant(Protocol):
         ...
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step under ``activation``, shape ``(n_muscles,)``, each in [0, 1]."""
+        """Advances by one control step.
+
+        Args:
+            activation: Muscle activation, each in [0, 1], shape ``(n_muscles,)``.
+
+        Returns:
+            What the body senses at the end of the step.
+        """
         ...
 
 
@@ -102,7 +109,14 @@ class Controller(Protocol):
         ...
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step; returns activation in [0, 1], shape ``(n_muscles,)``."""
+        """Advances by one control step.
+
+        Args:
+            sensation: What the body senses at its beginning.
+
+        Returns:
+            Muscle activation in [0, 1], shape ``(n_muscles,)``.
+        """
         ...
 
 

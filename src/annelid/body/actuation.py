@@ -1,11 +1,9 @@
 """Tendons between the crossings, the same for every formulation: axial springs, ring actuators, crossings' friction.
 
-Two strands that cross at the angle a span rhombi of side s, whose axial diagonal is ``d = 2 s cos(a/2)`` and whose
-hoop diagonal is ``h = 2 s sin(a/2)``. A change of the angle lengthens the axial diagonal by ``h/2`` a radian, and there
-is one rhombus for every crossing, so a torque T at the crossings does the work of a force ``2 T / h`` in the diagonals,
-and a torque c per angular velocity that of ``4 c / h^2`` per velocity. Force and damping of a diagonal are constant and
-set at rest: a Coulomb torque so given is exact at rest and proportional to h elsewhere, two thirds at a ring
-contracted to two thirds.
+Two strands that cross at the angle a span rhombi of side s with an axial diagonal ``d = 2 s cos(a/2)``, which lengthens
+by half the hoop diagonal ``h = 2 s sin(a/2)`` a radian. With one rhombus for every crossing, a torque T at the
+crossings does the work of a force ``2 T / h`` in the axial diagonals, and a torque c per angular velocity that of ``4 c
+/ h^2`` per velocity. Both are set at rest: a Coulomb torque is exact there and proportional to h elsewhere.
 """
 
 from __future__ import annotations

@@ -70,11 +70,7 @@ def task_of(
     weights: Mapping[str, float] | None,
     start_activation: float,
 ) -> Task:
-    """Checks what a user asks of an environment; the arguments are those of `annelid.environments.single.WormEnv`.
-
-    Raises:
-        ConfigError: A name or value that cannot be, or a field that an environment has no use for.
-    """
+    """Checks what a user asks of an environment; takes and raises what `annelid.environments.WormEnv` does."""
     require_positive(interval_s=interval_s, episode_s=episode_s)
     if not 0.0 <= start_activation <= 1.0:
         raise ConfigError(f"start_activation = {start_activation}: must be in 0 .. 1")

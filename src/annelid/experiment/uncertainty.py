@@ -1,15 +1,8 @@
-"""A run with error bars: the run itself, Monte Carlo samples about it, finer steps and more elements.
+"""A run with error bars, as `DEFINITIONS` says: the run itself, samples about it, finer steps and more elements.
 
-What the error bars are:
-
-* parameters: the sample standard deviation over n worms. The logarithms of their calibrated parameters are normal about
-  the run's own values, with exactly the errors and the correlation of a fit to the load frame (`spread.draw`);
-* time step: the largest difference between the run and the same at half and, where that is a whole multiple of the
-  control step, at a quarter of its physics step, its signals recorded as much more often, since onsets and maxima are
-  read from the record;
-* discretization: the largest difference between the run and the same with one and with two more elements a side.
-
-The total is the root of the sum of their squares. All runs have the run's own seed and controller.
+The logarithms of the samples' calibrated parameters are normal about the run's own values, with exactly the errors and
+the correlation of a fit to the load frame (`spread.draw`). Finer steps have signals recorded as much more often, since
+onsets and maxima are read from the record. All runs have the run's own seed and controller.
 """
 
 from __future__ import annotations

@@ -150,12 +150,7 @@ def simulate_batch(
 def checked_configs(
     configs: RunConfig | str | Sequence[RunConfig | str], n_worms: int | None, seeds: Sequence[int] | None
 ) -> list[RunConfig]:
-    """Returns the configuration of every worm of a batch; the arguments are those of `simulate_batch`.
-
-    Raises:
-        ConfigError: The numbers of worms, configurations and seeds do not fit together, there is none, a body is
-            planar, or two worms differ in a field of `ALIKE`.
-    """
+    """Returns the configuration of every worm of a batch; takes and raises what `simulate_batch` does."""
     if isinstance(configs, RunConfig | str | Mapping):
         if n_worms is None and seeds is None:
             raise ConfigError("a batch of one configuration needs n_worms or seeds")

@@ -64,15 +64,11 @@ class Skin:
     def touch(
         self, so_far: Touch, ground_N: Array, before_m: Array, after_m: Array, axis: Array, time_s: float
     ) -> Touch:
-        """Adds a movement of the body to what was sensed so far.
+        """Adds a movement of the body, which took a time, to what was sensed so far.
 
-        Args:
-            so_far: What was sensed before the movement.
-            ground_N: Force of the ground on each geom during the movement's last physics step, N, ``(n_geoms, 3)``.
-            before_m: Centres of the geoms before the movement, m, ``(n_geoms, 3)``.
-            after_m: The same after it.
-            axis: Unit vectors along the body towards its front at each segment, ``(n_segments, 3)``.
-            time_s: How long it took, s.
+        Given are the force of the ground on each geom during the last physics step, N, ``(n_geoms, 3)``, their centres
+        before and after the movement, m, and unit vectors along the body towards its front at each segment,
+        ``(n_segments, 3)``.
         """
         # A few belly vertices touch, of hundreds.
         touching = np.flatnonzero(_dot(ground_N, ground_N))

@@ -15,6 +15,24 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "SIDES",
+    "Array",
+    "Controller",
+    "Doubtful",
+    "MultiRatePlant",
+    "Plant",
+    "Recordable",
+    "Records",
+    "Sensation",
+    "Signal",
+    "State",
+    "Stateful",
+    "StridingController",
+    "Values",
+    "Watched",
+]
+
 Array = NDArray[np.float64]
 State = dict[str, NDArray[np.generic]]
 """Named arrays whose shapes and dtypes never change during a run."""

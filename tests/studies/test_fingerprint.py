@@ -39,6 +39,12 @@ def test_the_key_of_an_outcome_covers_all_that_reads_it() -> None:
     assert not {name for name in modules if name.split(".")[1] in ("draw", "live", "cli", "export")}
 
 
+def test_a_module_is_found_where_a_package_loads_its_names_on_first_use() -> None:
+    modules = modules_behind("annelid_studies.robustness")
+    assert {"annelid.analysis.rhythm", "annelid.experiment.store", "annelid_studies.tables"} <= modules
+    assert "annelid.experiment.tune" not in modules
+
+
 def test_a_module_is_found_by_its_import_wherever_it_stands(copied: Path) -> None:
     before = code_fingerprint(*PHYSICS)
     (copied / "added.py").write_text("SHARE = 0.5\n")

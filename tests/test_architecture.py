@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -205,3 +207,21 @@ def test_simulating_needs_neither_opengl_nor_matplotlib_nor_torch() -> None:
 def test_every_public_name_can_be_had(room: str) -> None:
     package = import_module(f"annelid.{room}" if room else "annelid")
     assert all(getattr(package, name) is not None for name in getattr(package, "__all__", ()))
+
+
+ROOMS = ["annelid", *(f"annelid.{path.name}" for path in SOURCE.iterdir() if (path / "__init__.py").exists())]
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_public_functions_document_their_arguments_and_errors(room: str) -> None:
+    module = importlib.import_module(room)
+    for name in getattr(module, "__all__", ()):
+        function = getattr(module, name)
+        if not inspect.isfunction(function):
+            continue
+        text, own = inspect.getdoc(function) or "", list(inspect.signature(function).parameters)
+        _, stands, arguments = text.partition("Args:")
+        assert stands or len(own) < 2, f"{room}.{name} documents no arguments"
+        missing = [one for one in own if not re.search(rf"\b{one}\b", arguments)] if stands else []
+        assert not missing, f"{room}.{name} does not document {missing}"
+        assert "raise " not in inspect.getsource(function) or "Raises:" in text, f"{room}.{name} documents no error"

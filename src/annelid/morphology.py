@@ -152,7 +152,19 @@ def helical_mesh(
     free_planes_at_ends: int = 3,
     rear_overhang_m: float | None = None,
 ) -> MeshGeometry:
-    """Generates the mesh of a worm at rest from the fields of `annelid.body.worm.Mesh`, where they are checked."""
+    """Generates the mesh of a worm at rest.
+
+    Args:
+        n_segments: Segments; this and all others are fields of `annelid.body.worm.Mesh`, where they are checked.
+        n_helices: Strands, half of each handedness.
+        radius_m: Radius at rest, m.
+        angular_rate_rad_per_m: Turn of a strand along the axis, rad/m.
+        elements_per_side: Elements of a strand between two crossings.
+        elements_per_end: Of a free end; as many as of a side by default.
+        planes_between_rings: Planes of crossings from one ring to the next.
+        free_planes_at_ends: Planes before the first ring and behind the last.
+        rear_overhang_m: Length of the strands behind the last plane, m; half a plane's distance by default.
+    """
     ends = elements_per_side if elements_per_end is None else elements_per_end
     half = n_helices // 2
     step = 2 * pi / half

@@ -22,13 +22,26 @@ class Deformation:
 
 
 def rhombus_diagonals(crossings_m: ArrayLike, rhombi: Indices) -> tuple[Array, Array]:
-    """Measures axial and lateral diagonals, m, ``(..., n_rhombi)``, from crossings, m, ``(..., n_crossings, 3)``."""
+    """Measures the diagonals of rhombi.
+
+    Args:
+        crossings_m: Positions of the crossings, m, ``(..., n_crossings, 3)``.
+        rhombi: Crossings at the corners, ``(n_rhombi, 4)``.
+
+    Returns:
+        Axial and lateral diagonals, m, ``(..., n_rhombi)`` each.
+    """
     front, left, rear, right = np.moveaxis(np.asarray(crossings_m, dtype=float)[..., rhombi, :], -2, 0)
     return np.linalg.norm(rear - front, axis=-1), np.linalg.norm(right - left, axis=-1)
 
 
 def deformation(crossings_m: ArrayLike, geometry: MeshGeometry) -> Deformation:
-    """Compares every rhombus with its shape at rest; crossings in m, ``(..., n_crossings, 3)``."""
+    """Compares every rhombus with its shape at rest.
+
+    Args:
+        crossings_m: Positions of the crossings, m, ``(..., n_crossings, 3)``.
+        geometry: The mesh at rest.
+    """
     axial, lateral = rhombus_diagonals(crossings_m, geometry.rhombi)
     rest_axial, rest_lateral = rhombus_diagonals(geometry.crossings_m, geometry.rhombi)
     return Deformation(axial / rest_axial - 1.0, lateral / rest_lateral - 1.0)
@@ -36,6 +49,13 @@ def deformation(crossings_m: ArrayLike, geometry: MeshGeometry) -> Deformation:
 
 def nearest_frame(run: Run, time_s: float) -> int:
     """Finds the recorded posture nearest to a time.
+
+    Args:
+        run: The run.
+        time_s: Simulated time, s.
+
+    Returns:
+        Index of the frame.
 
     Raises:
         RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.
@@ -79,7 +99,15 @@ def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
 
 
 def plane_means(values: ArrayLike, geometry: MeshGeometry) -> Array:
-    """Averages values, ``(.., n_rhombi)``, round each plane that has rhombi, front to back, ``(.., n_planes - 2)``."""
+    """Averages values round each plane that has rhombi.
+
+    Args:
+        values: One for each rhombus, ``(.., n_rhombi)``.
+        geometry: The mesh.
+
+    Returns:
+        Means, front to back, ``(.., n_planes - 2)``.
+    """
     array = np.asarray(values, dtype=float)
     plane = rhombus_plane(geometry)
     return np.stack([array[..., plane == p].mean(axis=-1) for p in np.unique(plane)], axis=-1)

@@ -84,7 +84,15 @@ class RhythmScore:
 
 
 def segment_activation(activation: ArrayLike, n_segments: int) -> Array:
-    """Averages ``(n_times, n_muscles)`` over each segment's ring or half-rings, to ``(n_times, n_segments)``."""
+    """Averages activation over each segment's ring or half-rings.
+
+    Args:
+        activation: Of every muscle, ``(n_times, n_muscles)``.
+        n_segments: Segments.
+
+    Returns:
+        Activation of every segment, ``(n_times, n_segments)``.
+    """
     values = np.asarray(activation, dtype=float)
     return values.reshape(len(values), n_segments, values.shape[1] // n_segments).mean(axis=2)
 
@@ -94,6 +102,12 @@ def contractions(time_s: ArrayLike, signal: ArrayLike, threshold: float = CONTRA
 
     Interruptions below ``shortest_s`` are bridged, then contractions below it left out. What is contracted at the first
     sample begins there; what is contracted at the last ends at infinity, and is as long as was seen of it.
+
+    Args:
+        time_s: Times of the samples, s, ``(n_times,)``.
+        signal: The signal, ``(n_times,)``.
+        threshold: Contracted is at least this.
+        shortest_s: Shorter interruptions and contractions do not count, s.
 
     Returns:
         Onset and release of each contraction, s, shape ``(n_contractions, 2)``.

@@ -41,7 +41,12 @@ def fields_of(config: RunConfig) -> dict[str, str]:
 
 
 def field_value(config: RunConfig, path: str) -> Any:
-    """Returns the value of a field by its dotted path, one of `fields_of`."""
+    """Returns the value of a field.
+
+    Args:
+        config: The configuration.
+        path: Dotted path, one of `fields_of`.
+    """
     value: Any = config
     for name in path.split("."):
         value = getattr(value, name)

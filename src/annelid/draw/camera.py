@@ -57,7 +57,12 @@ def fitting_distance(offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: fl
 def picture_axes(
     azimuth_deg: float, elevation_deg: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Returns the unit vectors of a view: to the right and up in the picture, and along the line of sight."""
+    """Returns the unit vectors of a view: to the right and up in the picture, and along the line of sight.
+
+    Args:
+        azimuth_deg: Direction of the line of sight about the vertical, degrees.
+        elevation_deg: Its angle above the horizontal, degrees; negative looks down.
+    """
     azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
     level = math.cos(elevation)
     sight = np.array([level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)])
@@ -68,7 +73,14 @@ def picture_axes(
 def picture_points(
     offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: float, distance_m: float, aspect: float
 ) -> NDArray[np.float64]:
-    """Finds where points, ``(..., 3)``, appear in a perspective picture; arguments are those of `fitting_distance`.
+    """Finds where points appear in a perspective picture.
+
+    Args:
+        offsets_m: Points from the centre of the picture, m, ``(..., 3)``.
+        azimuth_deg: As of `picture_axes`.
+        elevation_deg: As of `picture_axes`.
+        distance_m: Of the camera from the centre, m.
+        aspect: Width of the picture over its height.
 
     Returns:
         Places as shares of the picture's width and height from its upper left corner, shape ``(..., 2)``.

@@ -53,7 +53,12 @@ _UNDATED = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 @contextmanager
 def canvas(height_in: float, width_in: float = WIDTH_IN) -> Iterator[Figure]:
-    """Gives an empty figure of a size in inches, without a window or global state; draw and save it in the block."""
+    """Gives an empty figure without a window or global state; draw and save it in the block.
+
+    Args:
+        height_in: Height, inches.
+        width_in: Width, inches.
+    """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -118,7 +123,12 @@ def plain(text: str) -> str:
 
 
 def panel_title(axes: Axes, text: str) -> None:
-    """Writes a panel's title, plain text, above its left edge."""
+    """Writes a panel's title above its left edge.
+
+    Args:
+        axes: The panel.
+        text: The title, plain text.
+    """
     axes.set_title(plain(text), pad=5.0)
 
 

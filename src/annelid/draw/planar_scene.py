@@ -95,7 +95,11 @@ class PlanarScene(AbstractContextManager):
 
 
 def bent_rhombi(outline: NDArray[np.float64], n_segments: int) -> NDArray[np.float64]:
-    """Closes each segment's part of the upper outline, ``(n_segments * n + 1, 2)``, with its mirror image.
+    """Closes each segment's part of the upper outline with its mirror image.
+
+    Args:
+        outline: Corners of the upper side, front to back, m, ``(n_segments * n + 1, 2)``.
+        n_segments: Segments.
 
     Returns:
         Corners round each segment, shape ``(n_segments, 2 n, 2)``.
@@ -106,7 +110,11 @@ def bent_rhombi(outline: NDArray[np.float64], n_segments: int) -> NDArray[np.flo
 
 
 def rhombi(lengths: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Puts rhombi of horizontal and vertical diagonals, ``(n_segments,)``, in a row with its middle at the origin.
+    """Puts rhombi in a row with its middle at the origin.
+
+    Args:
+        lengths: Horizontal diagonals, m, ``(n_segments,)``.
+        heights: Vertical diagonals, m, ``(n_segments,)``.
 
     Returns:
         Corners (left, top, right, bottom), shape ``(n_segments, 4, 2)``.

@@ -217,6 +217,10 @@ def render_still(
 def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
     """Returns the generalised positions of every frame of a 3D worm's run, ``(n_frames, n_coordinates)``.
 
+    Args:
+        run: The run.
+        n_coordinates: Of the body that is built from its configuration.
+
     Raises:
         RunFileError: No postures were recorded, or those of another body than is built from the configuration.
     """

@@ -18,7 +18,12 @@ LINE_EVERY_S = 30.0
 
 
 def in_stage(progress: StudyProgress | None, stage: str) -> Callable[[int, int, float], object] | None:
-    """Returns what a store of runs calls as one stage goes on, or None where nobody wants to know."""
+    """Returns what a store of runs calls as one stage goes on, or None where nobody wants to know.
+
+    Args:
+        progress: Of the whole study.
+        stage: Name of the stage.
+    """
     return None if progress is None else partial(progress, stage)
 
 

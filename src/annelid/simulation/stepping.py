@@ -215,6 +215,12 @@ class Simulation:
 def start(config: RunConfig, plant: Plant, controller: Controller, origin: Origin | None) -> Simulation:
     """Resets plant and controller, each with a seed of its own, or takes up the checkpoint of a run to continue.
 
+    Args:
+        config: The configuration.
+        plant: The body.
+        controller: The controller.
+        origin: The run to continue, or None.
+
     Raises:
         RunFileError: There is a run to continue, but plant or controller cannot be restored, or not to its state.
     """

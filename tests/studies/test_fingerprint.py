@@ -25,7 +25,7 @@ COMPUTING = sorted(
 
 def test_the_key_of_a_run_covers_all_that_computes_it_and_nothing_else() -> None:
     modules = modules_behind(*PHYSICS)
-    others = ("engine", "errors", "plausibility", "protocols", "registry", "text", "textfiles")
+    others = ("engine", "errors", "output", "plausibility", "protocols", "registry", "text", "textfiles")
     rooms = {".".join(name.split(".")[:2]) for name in modules}
     assert rooms == {*PHYSICS, *(f"annelid.{room}" for room in others)}
     assert {name_of(path) for path in COMPUTING} <= modules

@@ -12,7 +12,8 @@ from rich.table import Table as TerminalTable
 from annelid.markdown import Table
 from annelid.output import write_csv
 
-T, K = TypeVar("T"), TypeVar("K")
+T = TypeVar("T")
+K = TypeVar("K")
 
 
 def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:

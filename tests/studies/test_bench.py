@@ -200,7 +200,7 @@ SPEED = {
 }
 
 
-def as_measured(cases: list[BenchCase], **special: Any) -> dict[str | None, Any]:
+def as_measured(cases: list[BenchCase], **special: Any) -> dict[str, Any]:
     return {case.name: {**SPEED, "step_median_ms": 1.5 * case.body.n_segments} | special for case in cases}
 
 

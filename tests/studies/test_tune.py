@@ -185,7 +185,7 @@ class Toy(Store):
         super().__init__(Path("nowhere"))
         self._refused = refused
 
-    def compute(self, cases: Any, *, failed: Any = None, **_: Any) -> Mapping[str, Outcome]:
+    def compute(self, cases: Any, stage: str = "", *, failed: Any = None, **_: Any) -> Mapping[str, Outcome]:
         found = {}
         for case in cases:
             if self._refused and self._refused in case.command:

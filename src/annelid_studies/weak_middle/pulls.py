@@ -109,7 +109,8 @@ def force_limited(*force_N: float) -> Actuator:
 
     Its shortest cable is out of reach.
     """
-    forces = list(force_N) if len(force_N) > 1 else force_N[0]
+    first, *others = force_N
+    forces = [first, *others] if others else first
     changes = _winding(forces, SOFT_N_PER_M, round(SHORTEST * rest_ring_m(), 6))
     return Actuator("force-limited", f"{' / '.join(f'{one:.2f}' for one in force_N)} N", changes)
 

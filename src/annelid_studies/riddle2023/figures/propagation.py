@@ -101,7 +101,8 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
         length, width = ((float(rest[0]), float(now[0])) for rest, now in zip(*both, strict=True))
         measured.append(Measured(rhombus, float(distance[rhombus]), length, width))
     change = deformation(posture.crossings_m, geometry)
-    return Propagation(posture, segment, *measured, plane_means(distance, geometry), change)
+    beside, away = measured
+    return Propagation(posture, segment, beside, away, plane_means(distance, geometry), change)
 
 
 def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from annelid.analysis import nearest_frame
 from annelid.body import WormBody, mesh_of
@@ -123,8 +123,8 @@ def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], wid
     axes.set_aspect("equal")
     if not rendering_works():
         return draw_worm(axes, posture, angles_deg, perspective=True)
-    size = (int(width_in * _PIXELS_PER_INCH),) * 2
-    still = render_still(posture.config, angles_deg, size, qpos=posture.qpos, activation=posture.activation)
+    side = int(width_in * _PIXELS_PER_INCH)
+    still = render_still(posture.config, angles_deg, (side, side), qpos=posture.qpos, activation=posture.activation)
     axes.imshow(still.pixels)
     rows, columns = np.nonzero((still.pixels < 250).any(axis=-1))
     axes.set_xlim(columns.min() - 4, columns.max() + 4)
@@ -159,7 +159,7 @@ def draw_worm(
     near, far = depth.min(), depth.max()
     bounds = np.linspace(far, near, _LAYERS + 1)[1:-1]
 
-    def faded(colors: Array, depth: Array) -> tuple[Array, Array]:
+    def faded(colors: Array, depth: Array) -> tuple[Array, NDArray[np.intp]]:
         """Colours mixed with white the more the farther behind, and the layer of each depth."""
         share = strength * (1.0 - (1.0 - _FARTHEST_SHARE) * np.clip((depth - near) / (far - near), 0, 1))
         return 1.0 - share[:, None] * (1.0 - colors), np.searchsorted(-bounds, -depth)

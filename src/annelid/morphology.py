@@ -26,11 +26,7 @@ Indices = NDArray[np.int64]
 
 
 def heading_turn(heading_deg: float) -> Array:
-    """Returns the rotation of a worm that leads towards -x to one of another heading, ``(3, 3)``.
-
-    Args:
-        heading_deg: Angle about the vertical, positive to the worm's left; exact for quarter turns.
-    """
+    """Returns the rotation, ``(3, 3)``, by an angle to the left about the vertical, exact for quarter turns."""
     quarter, rest = divmod(heading_deg, 90.0)
     c, s = cos(radians(rest)), sin(radians(rest))
     c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
@@ -43,37 +39,22 @@ class MeshGeometry:
 
     Crossings are numbered plane by plane: crossing ``p * n_per_plane + i`` lies on plane ``p`` and on
     clockwise strand ``i``. Strands are numbered clockwise first.
-
-    Attributes:
-        n_segments: Actuated segments.
-        radius_m: Radius of the tube.
-        angular_rate_rad_per_m: Turn of a strand per metre of body.
-        vertices_m: Points of every strand, shape ``(n_strands, n_vertices, 3)``, front to back.
-        crossing_vertex: Index along the strand of each plane's crossing, shape ``(n_planes,)``; the same for every
-            strand.
-        crossing_strands: The clockwise and the counter-clockwise strand of each crossing, ``(n_crossings, 2)``.
-        plane_x_m: Position of each crossing plane, shape ``(n_planes,)``.
-        ring_planes: Plane of each segment's ring, shape ``(n_segments,)``.
-        rings: Crossings round each ring in order of angle, shape ``(n_segments, n_per_plane)``; closed by returning to
-            the first.
-        springs: Front and rear crossing of every axial spring, shape ``(n_springs, 2)``, bay by bay.
-        sensor_springs: The springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the first of
-            each starts on clockwise strand 0, "the first helix".
-        rhombi: Front, left, rear and right crossing of every complete rhombus, shape ``(n_rhombi, 4)``.
     """
 
-    n_segments: int
-    radius_m: float
-    angular_rate_rad_per_m: float
-    vertices_m: Array
-    crossing_vertex: Indices
-    crossing_strands: Indices
-    plane_x_m: Array
-    ring_planes: Indices
-    rings: Indices
-    springs: Indices
+    n_segments: int  # actuated
+    radius_m: float  # of the tube
+    angular_rate_rad_per_m: float  # turn of a strand per metre of body
+    vertices_m: Array  # points of every strand, front to back, (n_strands, n_vertices, 3)
+    crossing_vertex: Indices  # index along every strand of each plane's crossing, (n_planes,)
+    crossing_strands: Indices  # the clockwise and the counter-clockwise strand of each crossing, (n_crossings, 2)
+    plane_x_m: Array  # position of each crossing plane, (n_planes,)
+    ring_planes: Indices  # plane of each segment's ring, (n_segments,)
+    rings: Indices  # crossings round each ring in order of angle, (n_segments, n_per_plane); the first closes it
+    springs: Indices  # front and rear crossing of every axial spring, (n_springs, 2), bay by bay
     sensor_springs: Indices
-    rhombi: Indices
+    """Springs that span each segment's ring plane, ``(n_segments, n_per_plane)``; the first starts on clockwise strand
+    0, "the first helix"."""
+    rhombi: Indices  # front, left, rear and right crossing of every complete rhombus, (n_rhombi, 4)
 
     @property
     def n_strands(self) -> int:
@@ -169,19 +150,7 @@ def helical_mesh(
     free_planes_at_ends: int = 3,
     rear_overhang_m: float | None = None,
 ) -> MeshGeometry:
-    """Generates the mesh of a worm.
-
-    Args:
-        n_segments: Actuated segments, at least 3.
-        n_helices: Strands, half of each handedness; even and at least 6.
-        radius_m: Radius of the tube at rest.
-        angular_rate_rad_per_m: Turn of a strand per metre of body (2 pi over the pitch).
-        elements_per_side: Straight elements between neighbouring crossings.
-        elements_per_end: Straight elements in each free end of a strand; by default as many as in a side.
-        planes_between_rings: Crossing planes from one ring to the next, at least 2.
-        free_planes_at_ends: Crossing planes before the first and after the last ring, at least 1.
-        rear_overhang_m: Free strand behind the last plane; by default half a plane spacing, as in front.
-    """
+    """Generates the mesh of a worm at rest from the fields of `annelid.body.worm.Mesh`, where they are checked."""
     ends = elements_per_side if elements_per_end is None else elements_per_end
     half = n_helices // 2
     step = 2 * pi / half
@@ -192,16 +161,30 @@ def helical_mesh(
     ring_planes = free_planes_at_ends + planes_between_rings * np.arange(n_segments)
     offset = step / 2 + step * floor(pi / 2 / step)
 
-    # Pairs strands at each plane: i + j is the same number on a whole plane, modulo half.
+    # Every strand at the planes, at its two ends, and evenly in between.
+    knots = np.concatenate([[0.0], plane_x, [plane_x[-1] + overhang]])
+    counts = [ends, *[elements_per_side] * (n_planes - 1), ends]
+    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], counts, strict=False)]
+    x = np.append(np.concatenate(spans), knots[-1])
+    turn, phase = angular_rate_rad_per_m * x[None], step * np.arange(half)[:, None]
+    angle = np.concatenate([turn + phase, offset - turn - phase])
+    y, z = radius_m * np.cos(angle), radius_m + radius_m * np.sin(angle)
+
+    # Strands pair at each plane: i + j is the same number on a whole plane, modulo half.
     total = np.rint((offset - 2 * angular_rate_rad_per_m * plane_x) / step).astype(np.int64)
     clockwise = np.arange(half)
     counter = (total[:, None] - clockwise[None]) % half + half
     springs, sensor_springs = _springs(ring_planes, n_planes, half)
+
+    # Every rhombus by its four corners: front, its two neighbours on the next plane, rear.
+    plane, strand = np.meshgrid(np.arange(n_planes - 2), clockwise, indexing="ij")
+    lower = (strand - 1) % half
+    corners = plane * half + strand, (plane + 1) * half + strand, (plane + 2) * half + lower, (plane + 1) * half + lower
     return MeshGeometry(
         n_segments=n_segments,
         radius_m=radius_m,
         angular_rate_rad_per_m=angular_rate_rad_per_m,
-        vertices_m=_strands(plane_x, overhang, half, radius_m, angular_rate_rad_per_m, offset, elements_per_side, ends),
+        vertices_m=np.stack([np.broadcast_to(x, angle.shape), y, z], axis=-1),
         crossing_vertex=ends + elements_per_side * np.arange(n_planes),
         crossing_strands=np.stack([np.broadcast_to(clockwise, counter.shape), counter], axis=-1).reshape(-1, 2),
         plane_x_m=plane_x,
@@ -209,21 +192,8 @@ def helical_mesh(
         rings=ring_planes[:, None] * half + clockwise[None],
         springs=springs,
         sensor_springs=sensor_springs,
-        rhombi=_rhombi(n_planes, half),
+        rhombi=np.stack(corners, axis=-1).reshape(-1, 4),
     )
-
-
-def _strands(
-    plane_x: Array, overhang: float, half: int, radius: float, rate: float, offset: float, elements: int, ends: int
-) -> Array:
-    """Samples every strand at the planes, at its two ends, and evenly in between."""
-    knots = np.concatenate([[0.0], plane_x, [plane_x[-1] + overhang]])
-    counts = [ends, *[elements] * (len(plane_x) - 1), ends]
-    spans = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], counts, strict=False)]
-    x = np.append(np.concatenate(spans), knots[-1])
-    phase = (2 * pi / half) * np.arange(half)
-    angle = np.concatenate([rate * x[None] + phase[:, None], offset - rate * x[None] - phase[:, None]])
-    return np.stack([np.broadcast_to(x, angle.shape), radius * np.cos(angle), radius + radius * np.sin(angle)], axis=-1)
 
 
 def _springs(ring_planes: Indices, n_planes: int, half: int) -> tuple[Indices, Indices]:
@@ -245,14 +215,6 @@ def _springs(ring_planes: Indices, n_planes: int, half: int) -> tuple[Indices, I
     springs = np.stack([front, rear], axis=-1).reshape(-1, 2)
     sensor_bay = np.asarray([bays.index(int(ring) - 1) for ring in ring_planes])
     return springs, sensor_bay[:, None] * half + strand[None]
-
-
-def _rhombi(n_planes: int, half: int) -> Indices:
-    """Lists every rhombus by its four corners: front, its two neighbours on the next plane, rear."""
-    plane, strand = np.meshgrid(np.arange(n_planes - 2), np.arange(half), indexing="ij")
-    lower = (strand - 1) % half
-    corners = plane * half + strand, (plane + 1) * half + strand, (plane + 2) * half + lower, (plane + 1) * half + lower
-    return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
 def norm(vectors: Array) -> Array:

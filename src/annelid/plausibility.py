@@ -1,4 +1,4 @@
-"""What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances held against one another.
+"""What is wrong with a 3D worm before it runs: lengths, forces, steps and tolerances checked against one another.
 
 Everything here follows from the configuration alone, in closed form, in under a millisecond and without the engine.
 """
@@ -23,7 +23,7 @@ IDLE_SHARE = 1e-3
 
 
 def check(config: RunConfig) -> list[Finding]:
-    """Holds the numbers of a configuration against one another, before anything is computed.
+    """Checks the numbers of a configuration against one another, before anything is computed.
 
     Args:
         config: Any configuration; of a planar worm there is nothing to check.
@@ -44,14 +44,7 @@ def check(config: RunConfig) -> list[Finding]:
 
 
 def refuse_nonsense(config: RunConfig) -> tuple[str, ...]:
-    """Refuses what can mean nothing.
-
-    Returns:
-        The warnings, a sentence each.
-
-    Raises:
-        ConfigError: `check` finds an error.
-    """
+    """Raises `ConfigError` where `check` finds an error; returns the warnings, a sentence each."""
     found = check(config)
     errors = [str(finding) for finding in found if finding.severity == "error"]
     if errors:
@@ -150,18 +143,13 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     Below, contracting neighbours lift a segment at rest out of its tolerance. Above, a segment that lets go is back
     within it before the next has left it: all sensors say "at rest", and nothing contracts again. The middle of both
     is the tolerance to set. Fitted to the paper's robot of rods under a timed wave, with moduli of 0.3 to 2 GPa,
-    friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 5 mm (docs/robust.md). The stiffness enters
-    as ``sqrt(EI / (k s^3))``, with the springs' rate k and the side s of a rhombus: the stiffer the strands, the
-    further a contraction spreads.
-
-    Args:
-        config: Any configuration.
+    friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 5 mm (docs/robust.md). The stiffness enters as
+    ``sqrt(EI / (k s^3))``, with the springs' rate k and the side s of a rhombus: stiffer strands spread a contraction.
 
     Returns:
         How far neighbours lift a segment, and the length beyond rest at which the releasing and the next segment are
         equally long; where the first is the larger, no tolerance is known to do. None for bodies that were not
-        measured: other than rods with rigid crossings, of a material with a damping time of 0.05 to 0.4 s, contracted
-        by muscles all round.
+        measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s and muscles all round.
     """
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:

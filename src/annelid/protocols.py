@@ -26,7 +26,7 @@ SIDES = ("belly", "left", "back", "right")
 
 @dataclass(frozen=True, slots=True)
 class Sensation:
-    """What the body feels at one instant; its receiver may keep the arrays but must not write to them.
+    """What the body senses at one instant; its receiver may keep the arrays but must not write to them.
 
     Attributes:
         time_s: Simulated time, s.
@@ -38,7 +38,7 @@ class Sensation:
         center_of_mass_m: Centre of mass, m, shape ``(3,)``; planar worms use the first component.
         touch_N: Normal force of the ground on each side of every segment, N, ``(n_segments, 4)`` in the order of
             `SIDES`; ``(0, 4)`` for a body that has no skin.
-        front_m: Centre of the foremost ring, m, ``(3,)``; NaN for a body that cannot tell.
+        front_m: Centre of the foremost ring, m, ``(3,)``; NaN for a body that has none.
         heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``; NaN likewise.
     """
 

@@ -34,15 +34,14 @@ def tied_points(timestep_s: float, stiffness: float, damping: float, inertance: 
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     for name in ("a", "b"):
         add_vertex(spec, name, np.zeros(3), 0.001)
-    solref, solimp = spring_row(2 / 0.001, stiffness, damping, inertance)
+    row = spring_row(2 / 0.001, stiffness, damping, inertance)
     spec.add_equality(
         type=mujoco.mjtEq.mjEQ_CONNECT,
         objtype=mujoco.mjtObj.mjOBJ_BODY,
         name1="a",
         name2="b",
         data=[0.0] * 12,
-        solref=solref,
-        solimp=solimp,
+        **row,
     )
     return spec.compile()
 

@@ -26,15 +26,8 @@ WAITING = (
     "results/arena_contacts.csv",
     "results/batch_throughput.csv",
     "results/environments.csv",
-    "results/levels.csv",
-    "results/pipes.csv",
-    "results/slip.csv",
-    "results/slip_crawler.csv",
     "results/slip_parts.csv",
-    "results/speed.csv",
     "results/tune_front.csv",
-    "results/turning.csv",
-    "results/uncertainty_wang.csv",
     "results/weak_middle.csv",
 )
 """Result files that do not exist yet: their tables have the numbers of earlier runs."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import exp, log
+from typing import Any
 
 import numpy as np
 import pytest
@@ -142,6 +143,6 @@ def test_full_drive_makes_six_segments_four_times_as_fast_at_most() -> None:
         ({"drive_ms": 0.0}, "must be positive"),
     ],
 )
-def test_bad_pathways_are_refused(changes: dict[str, float], says: str) -> None:
+def test_bad_pathways_are_refused(changes: dict[str, Any], says: str) -> None:
     with pytest.raises(ConfigError, match=says):
         driven_robust_network(3, **changes)

@@ -1,6 +1,6 @@
 """The geoms of an arena: what the skin touches, and what is seen.
 
-A level floor and guard rails are planes of the engine, and posts its cylinders. Every other ground is felt through one
+A level floor and guard rails are planes of the engine, and posts its cylinders. Any other ground is touched through one
 plane for each part of the skin that can touch, tangent to the ground at the nearest point and paired with that part
 alone. The planes hang on mocap bodies, which are part of the engine's state, and are laid anew before every step
 (`annelid.simulation.ground`): the ground has no seams, one part has one contact, and a step costs the same on any
@@ -21,6 +21,7 @@ from annelid.protocols import Array
 PLANE_HALF_SIZE_M = 0.01
 """Of a moving plane as drawn; the engine's planes have no end."""
 HIDDEN_GROUP = 4
+SKY = ((1.0, 1.0, 1.0), (0.88, 0.92, 0.96))
 CHECKER = ((0.86, 0.88, 0.90), (0.80, 0.83, 0.86))
 FLOOR_HALF_SIZE_M = 40.0
 RAIL_HALF_HEIGHT_M = 0.1
@@ -78,7 +79,7 @@ def set_friction(model: mujoco.MjModel, friction: float) -> None:
 
 
 def add_box(spec: mujoco.MjSpec, arena: ArenaKind, place_m: Array, half_size_m: list[float], axes: Array) -> None:
-    """Adds a box that can be touched and is not drawn, to hold a worm in plain MuJoCo; its axes are columns."""
+    """Adds a box that can be touched and is not drawn, to support a worm in plain MuJoCo; its axes are columns."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(axes).ravel())
     box = mujoco.mjtGeom.mjGEOM_BOX
@@ -93,24 +94,12 @@ def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
     Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
     unbounded planes, posts cylinders; relief and pipes are shapes to see, and hidden panels that can be touched.
     """
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[1.0, 1.0, 1.0],
-        rgb2=[0.88, 0.92, 0.96],
-        width=64,
-        height=64,
-    )
-    spec.add_texture(
-        name="floor",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=CHECKER[0],
-        rgb2=CHECKER[1],
-        width=128,
-        height=128,
-    )
+    kinds, looks = mujoco.mjtTexture, mujoco.mjtBuiltin
+    for name, kind, look, (first, second), size in (
+        ("sky", kinds.mjTEXTURE_SKYBOX, looks.mjBUILTIN_GRADIENT, SKY, 64),
+        ("floor", kinds.mjTEXTURE_2D, looks.mjBUILTIN_CHECKER, CHECKER, 128),
+    ):
+        spec.add_texture(name=name, type=kind, builtin=look, rgb1=first, rgb2=second, width=size, height=size)
     material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
     spec.worldbody.add_light(

@@ -1,6 +1,6 @@
 """The 3D worm: its sections, and its MuJoCo spec.
 
-`build_spec` is the one way to the engine, and `compile_spec` makes the engine's model of it. Kinds of formulation
+`build_spec` is the one entrance to the engine, and `compile_spec` makes the engine's model of it. Kinds of formulation
 (`formulations`) build the mesh with a site at every crossing; springs and ring actuators (`actuators`) between those
 sites are the same for all. `elimination` orders the engine's factor along the tube. The sections (`worm`) are read
 without the engine, which is loaded on first use of the names below.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from annelid.body.formulations.rods import Rods
     from annelid.body.worm import WormBody
 
-# Every use of the engine begins here, and a mixed one fails in ways that tell nothing.
+# Every use of the engine begins here, and a mixed one fails with errors that explain nothing.
 refuse_mixed_engine()
 
 _HOME = {

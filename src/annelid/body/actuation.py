@@ -1,11 +1,9 @@
 """Tendons between the crossings, the same for every formulation: axial springs, ring actuators, crossings' friction.
 
-Two strands that cross at the angle a span rhombi of side s, whose axial diagonal is ``d = 2 s cos(a/2)`` and whose
-hoop diagonal is ``h = 2 s sin(a/2)``. A change of the angle lengthens the axial diagonal by ``h/2`` a radian, and there
-is one rhombus for every crossing, so a torque T at the crossings does the work of a force ``2 T / h`` in the diagonals,
-and a torque c per angular velocity that of ``4 c / h^2`` per velocity. Force and damping of a diagonal are constant and
-set at rest: a Coulomb torque so given is exact at rest and proportional to h elsewhere, two thirds at a ring
-contracted to two thirds.
+Two strands that cross at the angle a span rhombi of side s with an axial diagonal ``d = 2 s cos(a/2)``, which lengthens
+by half the hoop diagonal ``h = 2 s sin(a/2)`` a radian. With one rhombus for every crossing, a torque T at the
+crossings does the work of a force ``2 T / h`` in the axial diagonals, and a torque c per angular velocity that of ``4 c
+/ h^2`` per velocity. Both are set at rest: a Coulomb torque is exact there and proportional to h elsewhere.
 """
 
 from __future__ import annotations
@@ -13,11 +11,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from annelid.arena.geoms import HIDDEN_GROUP
 from annelid.body.actuators import ActuatorKind
 from annelid.body.worm import Joints, Springs
-from annelid.morphology import Indices, MeshGeometry
+from annelid.morphology import Array, Indices, MeshGeometry
 
 SPRING_RGBA = (0.75, 0.15, 0.1, 1.0)
+PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
 RING_RGBA = (0.85, 0.1, 0.1, 1.0)
 STICTION_IMPEDANCE = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 """The engine's greatest: a diagonal that sticks creeps by a ten-thousandth of what it would do freely."""
@@ -26,6 +26,14 @@ STICTION_IMPEDANCE = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 def crossing_site(crossing: int) -> str:
     """Name of the site (and body) of a crossing."""
     return f"crossing_{crossing}"
+
+
+def mark_crossing(pin: mujoco.MjsBody, name: str, radius_m: float, mass_kg: float, place_m: Array) -> None:
+    """Adds the sphere by which a crossing is drawn, and its site, at a place of a body."""
+    ball = mujoco.mjtGeom.mjGEOM_SPHERE
+    size = [radius_m, 0.0, 0.0]
+    pin.add_geom(name=name, type=ball, pos=place_m, size=size, mass=mass_kg, contype=0, conaffinity=0, rgba=PIN_RGBA)
+    pin.add_site(name=name, pos=place_m, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
 
 
 def ring_names(n_segments: int, rings: ActuatorKind) -> list[str]:

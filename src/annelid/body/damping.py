@@ -16,11 +16,13 @@ The coefficients follow the posture, step by step. As dampers of tendons they wo
 plant has constraint rows instead, which the engine solves at the end of the step too. The engine scales a row's damping
 by A, the ratio of the row's inverse inertia without the forces of the step to that with them: a row's force is
 ``-A (I a + c v)``, with the wanted damping c and a small inertance I. A depends on step, posture and the world's axes,
-and would be 1 to 80. So every row also takes hold of one dof that is held fast and so light that it alone decides about
-A, which then is 1.
+and would be 1 to 80. So every row also includes one dof that is fixed and so light that it alone decides about A, which
+then is 1.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -33,7 +35,7 @@ HELD_MASS_KG = 1e-9
 HELD_LEVER = 1e3
 """Coefficient of the held dof in every row: its share of a row's inverse inertia is 1e15, of the others 1e9 at most."""
 HELD_INVERSE_KG = 1e-16
-"""The engine holds a dof by a force in proportion to the inertia that it believes it to have."""
+"""The engine fixes a dof by a force in proportion to the inertia that it believes it to have."""
 INERTANCE = 1e-3
 """Of a row, as a share of its damping times the step: nothing that could be seen."""
 IMPEDANCE = 0.01
@@ -86,7 +88,7 @@ def damper_rows(vertices_m: Array) -> Array:
 
 
 def add_held_coordinate(spec: mujoco.MjSpec) -> None:
-    """Adds, once, the coordinate that every row takes hold of: to every model, so that all have as many."""
+    """Adds, once, the coordinate that every row includes: to every model, so that all have as many."""
     if spec.body(HELD) is None:
         held = add_holder(spec, HELD, HELD_MASS_KG, HELD_MASS_KG)
         held.gravcomp = 1.0
@@ -130,21 +132,22 @@ def add_damper_rows(spec: mujoco.MjSpec) -> None:
     tendons = [tendon for tendon in spec.tendons if _DAMPER in tendon.name]
     if not tendons:
         return
-    joint = mujoco.mjtObj.mjOBJ_JOINT
-    spec.add_equality(name=HELD, type=mujoco.mjtEq.mjEQ_JOINT, objtype=joint, name1=HELD, data=[0.0] * 12)
+    add_row(spec, mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT, HELD, HELD)
+    # The engine wants a stiffness. Damping over inertance, times the impedance as the engine has it.
+    solref = [-1e-12, -IMPEDANCE / (INERTANCE * spec.option.timestep)]
     for tendon in tendons:
         tendon.damping = [0.0, 0.0, 0.0]
         tendon.wrap_joint(HELD, HELD_LEVER)
-        spec.add_equality(
-            name=tendon.name,
-            type=mujoco.mjtEq.mjEQ_TENDON,
-            objtype=mujoco.mjtObj.mjOBJ_TENDON,
-            name1=tendon.name,
-            data=[0.0] * 12,
-            # The engine wants a stiffness. Damping over inertance, times the impedance as the engine has it.
-            solref=[-1e-12, -IMPEDANCE / (INERTANCE * spec.option.timestep)],
-            solimp=[IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-        )
+        limits = {"solref": solref, "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]}
+        add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, tendon.name, tendon.name, **limits)
+
+
+def add_row(
+    spec: mujoco.MjSpec, kind: mujoco.mjtEq, of: mujoco.mjtObj, name: str, *between: str, **options: Sequence[float]
+) -> None:
+    """Adds an equality constraint of one or two things of the spec, with no data unless options give some."""
+    names = dict(zip(("name1", "name2"), between, strict=False))
+    spec.add_equality(**{"name": name, "type": kind, "objtype": of, "data": [0.0] * 12, **names, **options})
 
 
 class MaterialDamping:

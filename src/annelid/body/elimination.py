@@ -2,7 +2,7 @@
 
 Each step factors matrices whose graph is the mesh. The engine orders their unknowns by minimum degree, which suits a
 short worm; along a long tube its fronts meet at random, and the factor of twelve segments takes five times the
-arithmetic it needs. Cutting the tube across where the fewest vertices hold it together, both halves likewise, and so
+arithmetic it needs. Cutting the tube across where the fewest vertices connect it, both halves likewise, and so
 on down to parts that minimum degree does well, makes fill and arithmetic proportional to length (George 1973).
 
 The order lives in the compiled model (``MjModel.efmC_perm``), from where the engine's constraint solver takes it too;
@@ -84,7 +84,7 @@ def nested_dissection(pairs: Indices, position: Array, largest_part: int = LARGE
 
 
 def _cut(part: Indices, pairs: Indices, position: Array) -> tuple[Indices, Indices] | None:
-    """Cuts a part across the axis where the fewest vertices hold its sides together, and of these the most evenly.
+    """Cuts a part across the axis where the fewest vertices connect its sides, and of these the most evenly.
 
     Returns what a separator on one side of the cut leaves of the two sides, or None where no cut divides the part.
     """

@@ -1,18 +1,16 @@
-"""How much a mesh resists its rings, in closed form, and what is found by holding a worm's numbers against it.
+"""How much a mesh resists its rings, in closed form, and what is found by checking a worm's numbers against it.
 
-How much the mesh resists: where a ring of the length L = m c is drawn in (m crossings, c apart), the rhombi round it
-close. With h, the hypotenuse of a rhombus' two diagonals at rest, they keep ``c = h sin(a)`` and springs of the length
-``x = h cos(a)``, a being half the angle at which strands meet. Each strand of bending stiffness EI is bent by the
-change of a over about one side s of the rhombus, and the springs of rate k and rest length x0 are drawn out. With the
-virtual work of the ring's tension T, ``T dL = d(energy)``, this is
+Where a ring of m crossings, c apart, is drawn in, the rhombi round it close. With h, the hypotenuse of a rhombus' two
+diagonals at rest, they keep ``c = h sin(a)`` and springs of the length ``x = h cos(a)``, a being half the angle at
+which strands meet. Each strand of bending stiffness EI is bent by the change of a over about one side s of the rhombus,
+and the springs of rate k and rest length x0 are drawn out. The virtual work of the ring's tension T gives
 
     T(a) = 1.3 EI (a0 - a) / (s^2 cos(a)) + k (x - x0) tan(a)
 
-The number of strands drops out. The factor 1.3 is fitted to the one ring that the authors simulated in a load frame
-(E 2 GPa, radius 2.99 mm), whose curve the estimate then follows within 15 % from 10 to 100 mm of its diameter. The end
-rings bear about a fifth less, and with the paper's soft strands the estimate is low by up to a half. So it is good to a
-factor of two, and nothing is refused on its account unless it is exceeded by more. Measured, rings of that mesh
-collapse at 14 to 16 N; the estimate at a third of a0 is 16.8 N.
+The factor 1.3 is fitted to the one ring that the authors simulated in a load frame (E 2 GPa, radius 2.99 mm), whose
+curve the estimate then follows within 15 % from 10 to 100 mm of its diameter. End rings bear a fifth less, and with the
+paper's soft strands the estimate is low by up to a half: it is good to a factor of two, and nothing is refused on its
+account unless it is exceeded by more. Rings of that mesh collapse at 14 to 16 N; the estimate at a0 / 3 is 16.8 N.
 """
 
 from __future__ import annotations
@@ -97,7 +95,7 @@ def strongest(rings: ActuatorKind, n_segments: int) -> Iterator[tuple[float, flo
 
 
 def weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
-    """Holds the greatest force of an actuator against what hardly closes a ring."""
+    """Checks the greatest force of an actuator against what hardly closes a ring."""
     needed = bearable_force_N(body, 1.0 - HARDLY)
     if force_N < needed / UNSURE:
         problem = (
@@ -108,7 +106,7 @@ def weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[F
 
 
 def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Iterator[Finding]:
-    """Holds a force against what the mesh bears, where its actuator closes a ring to a share of its length at rest."""
+    """Checks a force against what the mesh bears, where its actuator closes a ring to a share of its length at rest."""
     if share < COLLAPSED and force_N > UNSURE * bearable_N:
         problem = (
             f"rings close under about {bearable_N:.2g} N, and nothing stops them above {100 * max(0.0, share):.0f} % "

@@ -80,7 +80,7 @@ class Strands(Section):
         description="tan delta of the material at loss_frequency_Hz, instead of damping_time_s (not set: none)",
     )
     loss_frequency_Hz: Positive | None = Field(
-        default=None, description="frequency at which the loss factor holds (not set: none)"
+        default=None, description="frequency at which the loss factor applies (not set: none)"
     )
     joint_damping_Nms_per_rad: NonNegative = Field(
         default=JOINT_DAMPING,
@@ -103,7 +103,7 @@ class Strands(Section):
             )
         if (loss is None) != (self.loss_frequency_Hz is None):
             raise ValueError(
-                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it holds, and "
+                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it applies, and "
                 "the other way round"
             )
         return self

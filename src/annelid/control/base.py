@@ -83,7 +83,13 @@ class OpenLoopController(SegmentController, Generic[Pattern]):
     """Contracts segments by the clock: during the step from t to t + dt as its pattern says for t; has no state."""
 
     def __init__(self, pattern: Pattern, n_segments: int, n_muscles: int) -> None:
-        """Takes the pattern, its section of the configuration, and the size of the worm as `SegmentController`."""
+        """Takes a pattern and the size of the worm.
+
+        Args:
+            pattern: Its section of the configuration.
+            n_segments: Segments.
+            n_muscles: As `SegmentController`.
+        """
         self._pattern = pattern
         super().__init__(n_segments, n_muscles)
 

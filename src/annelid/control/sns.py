@@ -52,8 +52,7 @@ class Sns(HalfCentreKind):
     )
     activation_slope_per_mV: Positive = Field(default=0.35, description="slope of the sigmoid")
     scheme: Literal["euler", "toolbox", "heun"] = Field(
-        default="euler",
-        description="forward Euler, SNS-Toolbox's order (gates before potentials), or second order",
+        default="euler", description="forward Euler, SNS-Toolbox's order (gates before potentials), or second order"
     )
     gate_start: Literal["steady", "toolbox"] = Field(
         default="steady", description="gates start at h_inf(U), or as SNS-Toolbox starts them"

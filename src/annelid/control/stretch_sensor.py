@@ -37,7 +37,12 @@ class StretchSensor:
     """
 
     def __init__(self, settings: StretchSettings, n_segments: int) -> None:
-        """Makes a sensor for ``n_segments`` segments from its section of the configuration."""
+        """Makes a sensor.
+
+        Args:
+            settings: Its section of the configuration.
+            n_segments: Segments.
+        """
         require_at_least(1, n_segments=n_segments)
         self.settings = settings
         self.on: NDArray[np.bool_] = np.zeros(n_segments, dtype=bool)

@@ -45,10 +45,8 @@ class PlanarScene(AbstractContextManager):
             figure.set_dpi(_DPI)
             self._canvas: Any = figure.canvas
             self._axes = axes = figure.add_subplot()
-            axes.set_aspect("equal")
-            axes.set_xlabel("along the body (cm)" if self._outline is None else "x (cm)")
-            axes.set_ylabel("height (cm)")
-            axes.set_xlim(*self._extent())
+            xlabel = "along the body (cm)" if self._outline is None else "x (cm)"
+            axes.set(aspect="equal", xlabel=xlabel, ylabel="height (cm)", xlim=self._extent())
             half_height = _ROOM * self._heights.max() / 2
             if (distance_m := run.config.body.wall_distance_m) is not None:
                 wall_height = _CM * distance_m / 2

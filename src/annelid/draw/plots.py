@@ -57,8 +57,7 @@ def figure7(run: Run, path: str | Path) -> Path:
         _potentials(neural, run, colors)
         _phases(phases, run, colors)
         _lengths(lengths, run, colors)
-        lengths.set_xlabel("time (s)")
-        lengths.set_xlim(float(data["time"].values[0]), float(data["time"].values[-1]))
+        lengths.set(xlabel="time (s)", xlim=data["time"].values[[0, -1]])
         title = plain(f"{run.config.name}: {n_segments} segments")
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, weight="bold")
         figure.align_ylabels()
@@ -107,10 +106,8 @@ def _phases(axes: Axes, run: Run, colors: list) -> None:
     data = run.data
     n_segments = len(colors)
     panel_title(axes, "Contraction (activation above 0.5)")
-    axes.set_ylabel("segment")
-    axes.set_ylim(n_segments + 0.6, 0.4)
     step = max(1, -(-n_segments // 12))
-    axes.set_yticks(range(1, n_segments + 1, step))
+    axes.set(ylabel="segment", ylim=(n_segments + 0.6, 0.4), yticks=range(1, n_segments + 1, step))
     axes.grid(visible=False, axis="y")
     if "activation" not in data:
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import mujoco
@@ -79,7 +78,7 @@ class DrawnWorm:
         return np.concatenate([middles - reach, middles + reach])
 
 
-class _Scene(AbstractContextManager):
+class _Scene(Canvas):
     """Pictures of a worm from one direction and distance, with or without shadows and smooth edges (``fine``)."""
 
     def __init__(
@@ -92,24 +91,17 @@ class _Scene(AbstractContextManager):
         fine: bool,
         upright: Array | None,
     ) -> None:
+        super().__init__(worm.model, *size, find_backend(), fine=fine, upright=upright)
         self._worm = worm
-        self._canvas = Canvas(worm.model, *size, find_backend(), fine=fine, upright=upright)
-        self._canvas.camera.azimuth, self._canvas.camera.elevation = angles_deg
-        self._canvas.camera.distance = distance_m
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Frees the back-end."""
-        self._canvas.close()
+        self.camera.azimuth, self.camera.elevation = angles_deg
+        self.camera.distance = distance_m
 
     def _draw(
         self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None, target_m: Array, caption: str = ""
     ) -> NDArray[np.uint8]:
         self._worm.pose(qpos, activation)
-        self._canvas.camera.lookat[:] = target_m
-        return self._canvas.draw(self._worm.posture, caption)
+        self.camera.lookat[:] = target_m
+        return self.draw(self._worm.posture, caption)
 
 
 class WormScene(_Scene):

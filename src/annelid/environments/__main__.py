@@ -6,7 +6,7 @@ from annelid.environments.single import WormEnv
 
 
 def observation_table(env: WormEnv) -> str:
-    """Lays out what an observation holds as a table in Markdown."""
+    """Lays out what an observation contains as a table in Markdown."""
     rows = ["| numbers | entry | shape | unit | scaled from | meaning |", "|---|---|---|---|---|---|"]
     first = 0
     for entry in env.layout.entries:
@@ -19,7 +19,7 @@ def observation_table(env: WormEnv) -> str:
 
 
 def action_table(env: WormEnv) -> str:
-    """Lays out what an action holds as a table in Markdown."""
+    """Lays out what an action contains as a table in Markdown."""
     rows = ["| number | muscle | unit | range |", "|---|---|---|---|"]
     low, high = float(env.action_space.low.min()), float(env.action_space.high.max())  # type: ignore[attr-defined]
     rows += [f"| {k} | `{name}` | 1 | {low:g} .. {high:g} |" for k, name in enumerate(env.worm.anatomy.muscle_names)]

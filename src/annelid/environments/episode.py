@@ -214,7 +214,7 @@ class Episode:
         wanted = np.asarray(action, dtype=float)
         if wanted.shape != self.activation.shape:
             raise ConfigError(
-                f"the action has shape {wanted.shape}: must be {self.activation.shape}, one a ring muscle"
+                f"the action has shape {wanted.shape}: must be {self.activation.shape}, one per ring muscle"
             )
         bad = np.flatnonzero(~((wanted >= -ACTION_SLACK) & (wanted <= 1.0 + ACTION_SLACK)))
         if bad.size:
@@ -269,8 +269,8 @@ class Episode:
 
     def _observed(self, random: np.random.Generator, before_m: Array, moved_m: Array) -> Observation:
         """The observation, with the rings' lengths one step before, and what the middle was displaced by since, m."""
-        felt, noise_m, axes = self.sensation, self.task.config.sensor.noise_m, self._place.axes
-        stretch_m, ring_m, interval_s = felt.stretch_m, felt.ring_length_m, self.task.interval_s
+        sensed, noise_m, axes = self.sensation, self.task.config.sensor.noise_m, self._place.axes
+        stretch_m, ring_m, interval_s = sensed.stretch_m, sensed.ring_length_m, self.task.interval_s
         if noise_m:
             stretch_m = stretch_m + random.normal(0.0, noise_m, stretch_m.shape)
         corners = self.worm.posture.crossing[self._middle_ring]
@@ -279,9 +279,9 @@ class Episode:
             {
                 "ring_strain": ring_m / self._rest_m - 1.0,
                 "ring_rate": (ring_m - before_m) / (self._rest_m * interval_s),
-                "stretch_strain": stretch_m / felt.rest_stretch_m - 1.0,
-                "touch": felt.touch_N / self._weight_N,
-                "heading": axes @ felt.heading,
+                "stretch_strain": stretch_m / sensed.rest_stretch_m - 1.0,
+                "touch": sensed.touch_N / self._weight_N,
+                "heading": axes @ sensed.heading,
                 "upright": sides @ axes[2] / np.sqrt((sides * sides).sum(axis=1)),
                 "velocity": axes @ moved_m / (self.worm.geometry.length_m * interval_s),
                 "activation": self.activation,

@@ -91,7 +91,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def sensation(self) -> Sensation:
-        """What the worm feels, in full and without noise."""
+        """What the worm senses, in full and without noise."""
         return self._episode.sensation
 
     def reset(

@@ -70,11 +70,7 @@ def task_of(
     weights: Mapping[str, float] | None,
     start_activation: float,
 ) -> Task:
-    """Checks what a user asks of an environment; the arguments are those of `annelid.environments.single.WormEnv`.
-
-    Raises:
-        ConfigError: A name or value that cannot be, or a field that an environment has no use for.
-    """
+    """Checks what a user asks of an environment; takes and raises what `annelid.environments.WormEnv` does."""
     require_positive(interval_s=interval_s, episode_s=episode_s)
     if not 0.0 <= start_activation <= 1.0:
         raise ConfigError(f"start_activation = {start_activation}: must be in 0 .. 1")
@@ -89,7 +85,11 @@ def task_of(
             raise ConfigError(f"unknown weight {name!r}: {suggest(name, names)}")
         require_at_least(0.0, **{f"weights[{name!r}]": value})
     checked = Weights(**{name: float(value) for name, value in (weights or {}).items()})
-    return Task(config, moves, steps, checked, float(start_activation), _goal_m(config))
+    # The middle of a worm has passed a pipe behind all that bends or narrows, else a body length on.
+    reach_m = config.arena.reach_m() if config.arena is not None else None
+    assert isinstance(config.body, WormBody)
+    goal_m = None if reach_m is None else reach_m[1] or mesh_of(config.body.mesh).length_m
+    return Task(config, moves, steps, checked, float(start_activation), goal_m)
 
 
 class Deed(NamedTuple):
@@ -143,12 +143,3 @@ def _whole(name: str, value: float, unit_name: str, unit: float) -> int:
             f"{name} = {value:g}: must be an integer multiple of {unit_name} = {unit:g}, for example {near:g}"
         )
     return round(ratio)
-
-
-def _goal_m(config: RunConfig) -> float | None:
-    """Returns where the middle of a worm has passed a pipe: behind all that bends or narrows, else a body length on."""
-    reach_m = config.arena.reach_m() if config.arena is not None else None
-    if reach_m is None:
-        return None
-    assert isinstance(config.body, WormBody)
-    return reach_m[1] or mesh_of(config.body.mesh).length_m

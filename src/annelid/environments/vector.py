@@ -12,18 +12,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
+from annelid.environments import single
 from annelid.environments.episode import Episode, Layout, Observation
-from annelid.environments.single import (
-    EPISODE_S,
-    INTERVAL_S,
-    PRESET,
-    SIZE,
-    START_ACTIVATION,
-    Pictures,
-    WormEnv,
-    action_space,
-    refuse_options,
-)
+from annelid.environments.single import Pictures, WormEnv, action_space, refuse_options
 from annelid.environments.task import COARSE, Task, task_of
 from annelid.errors import ConfigError, require_at_least, suggest
 from annelid.morphology import Array
@@ -33,7 +24,6 @@ from annelid.simulation.batch import checked_configs, threads_for
 from annelid.simulation.batch_body import BodyBatch, compile_worms
 
 Flags = NDArray[np.bool_]
-Stepped = tuple[Observation, Array, Flags, Flags, dict[str, Any]]
 
 
 class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
@@ -62,19 +52,19 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
     def __init__(
         self,
         num_envs: int = 1,
-        preset: str = PRESET,
+        preset: str = single.PRESET,
         changes: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
         *,
         arena: str | None = None,
         fidelity: str | None = COARSE,
-        interval_s: float = INTERVAL_S,
-        episode_s: float = EPISODE_S,
+        interval_s: float = single.INTERVAL_S,
+        episode_s: float = single.EPISODE_S,
         weights: Mapping[str, float] | None = None,
-        start_activation: float = START_ACTIVATION,
+        start_activation: float = single.START_ACTIVATION,
         render_mode: str | None = None,
         camera: str = "isometric",
-        width: int = SIZE[0],
-        height: int = SIZE[1],
+        width: int = single.SIZE[0],
+        height: int = single.SIZE[1],
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
     ) -> None:
@@ -112,7 +102,7 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
 
     @property
     def sensations(self) -> list[Sensation]:
-        """What every worm feels, in full and without noise."""
+        """What every worm senses, in full and without noise."""
         return [episode.sensation for episode in self._episodes]
 
     def reset(
@@ -138,14 +128,20 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         if not (isinstance(mask, np.ndarray) and mask.dtype == bool and mask.shape == (n,) and mask.any()):
             raise ConfigError(f"reset_mask must be an array of truth values of shape ({n},) with at least one true")
         refuse_options(options)
-        self._seed(seed, mask)
+        if seed is not None:
+            seeds = [seed + row for row in range(n)] if isinstance(seed, int | np.integer) else list(seed)
+            if len(seeds) != n:
+                raise ConfigError(f"seed has {len(seeds)} numbers for num_envs = {n}: give one for each")
+            for row, own in enumerate(seeds):
+                if mask[row] and own is not None:
+                    self._random[row] = seeding.np_random(own)[0]
         infos: dict[str, Any] = {}
         for row in map(int, np.flatnonzero(mask)):
             infos = self._add_info(infos, self._restart(row), row)
         self._ended[mask] = False
         return self._observations.copy(), infos
 
-    def step(self, actions: ArrayLike) -> Stepped:
+    def step(self, actions: ArrayLike) -> tuple[Observation, Array, Flags, Flags, dict[str, Any]]:
         """Lets all worms move for one interval.
 
         Args:
@@ -201,16 +197,6 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         """Puts one worm at its start and returns its info."""
         self._observations[row], info = self._episodes[row].reset(self._random[row])
         return info
-
-    def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
-        if seed is None:
-            return
-        seeds = [seed + row for row in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
-        if len(seeds) != self.num_envs:
-            raise ConfigError(f"seed has {len(seeds)} numbers for num_envs = {self.num_envs}: give one for each")
-        for row, own in enumerate(seeds):
-            if mask[row] and own is not None:
-                self._random[row] = seeding.np_random(own)[0]
 
 
 class _Team:

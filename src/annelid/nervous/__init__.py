@@ -43,14 +43,7 @@ from annelid.nervous.peristalsis import (
     neuron_names,
     peristalsis_network,
 )
-from annelid.nervous.phase_chain import (
-    DriveResponse,
-    PhaseNetwork,
-    PhaseState,
-    PhaseStepper,
-    phase_chain,
-    steady_lags,
-)
+from annelid.nervous.phase_chain import DriveResponse, PhaseNetwork, PhaseState, PhaseStepper, phase_chain, steady_lags
 from annelid.nervous.shc import (
     HeteroclinicRing,
     HeteroclinicStepper,

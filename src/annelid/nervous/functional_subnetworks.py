@@ -58,7 +58,12 @@ class Signals:
         return Neuron(self.capacitance_nF, self.leak_conductance_uS)
 
     def synapse(self, conductance_uS: float, reversal_mV: float) -> Synapse:
-        """Returns a synapse that transmits between 0 and R."""
+        """Returns a synapse that transmits between 0 and R.
+
+        Args:
+            conductance_uS: Largest conductance, uS.
+            reversal_mV: Reversal potential, mV.
+        """
         return Synapse(conductance_uS, reversal_mV, 0.0, self.range_mV)
 
 

@@ -17,7 +17,13 @@ from annelid.nervous.toml import read_network, write_network
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A synapse or gap junction between two named neurons."""
+    """A synapse or gap junction between two named neurons.
+
+    Attributes:
+        source: Name of the presynaptic neuron.
+        target: Name of the postsynaptic neuron.
+        kind: What joins them.
+    """
 
     source: str
     target: str

@@ -179,14 +179,10 @@ def add_drive(
 
 
 def adaptive_half_centre(parameters: PeristalsisParameters | None = None) -> Network:
-    """Builds a half-centre under a descending drive.
+    """Builds a half-centre under a descending drive, by default that of the papers.
 
-    Args:
-        parameters: Of the half-centre; default: those of the papers.
-
-    Returns:
-        A network of ``contraction``, ``expansion`` and ``descending``. Its input ``drive`` is a current into the last
-        one: ``drive Gm R`` nA keeps it at the drive. Outputs are the first two.
+    Its neurons are ``contraction``, ``expansion`` and ``descending``. The input ``drive`` is a current into the last
+    one: ``drive Gm R`` nA keeps it at the drive. Outputs are the first two.
     """
     p = parameters or PeristalsisParameters()
     network, halves = Network("half-centre under a drive"), ("contraction", "expansion")

@@ -180,7 +180,12 @@ class PhaseStepper:
     """
 
     def __init__(self, network: PhaseNetwork, timestep_s: float) -> None:
-        """Prepares a step of ``timestep_s``."""
+        """Prepares a step.
+
+        Args:
+            network: The oscillators.
+            timestep_s: Step, s.
+        """
         if not 0 < timestep_s * AMPLITUDE_RATE_PER_S <= 1:
             raise ConfigError(
                 f"a time step of {timestep_s:g} s is too long for phase oscillators: "

@@ -122,7 +122,12 @@ class HeteroclinicStepper:
     """
 
     def __init__(self, ring: HeteroclinicRing, timestep_s: float) -> None:
-        """Prepares a step of ``timestep_s``."""
+        """Prepares a step.
+
+        Args:
+            ring: The ring.
+            timestep_s: Step, s.
+        """
         if not 0 < timestep_s * ring.growth_rate_per_s <= 0.5:
             raise ConfigError(
                 f"a time step of {timestep_s:g} s does not fit growth_rate_per_s = {ring.growth_rate_per_s:g}: "

@@ -18,7 +18,7 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
     """Returns a simulation under another configuration, in the state of a running one that is not to be used any more.
 
     Friction is changed in the compiled model, which takes microseconds. For anything else in the body, its ground or
-    the clock the body is built anew and takes over the old one's state; so does the controller. Either way the worm
+    the clock the body is built anew and takes over the old one's state; so does the controller. In both cases the worm
     moves on as one does that was built with the new values and brought into this state.
 
     Raises:

@@ -29,8 +29,7 @@ _NET_FORCE = 3
 def add_contact_sensors(spec: mujoco.MjSpec) -> None:
     """Adds, for every geom of the skin and every geom of the arena that it can touch, a sensor of the net force on it.
 
-    Forces are in the world's axes. The sensors change nothing in the motion, take no measurable time, and read the same
-    in a batch as alone.
+    They are in the world's axes, change nothing in the motion, and read the same in a batch as alone.
     """
     force = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
     grounds = [geom.name for geom in spec.geoms if geom.contype]
@@ -88,7 +87,7 @@ class Anatomy:
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
-        elasticity: The energy that strands, joints and springs hold.
+        elasticity: The energy that strands, joints and springs store.
         energy_meter: What a physics step does, in work.
         outputs: Names of the engine's arrays that `forces` needs.
     """

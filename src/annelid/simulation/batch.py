@@ -150,12 +150,7 @@ def simulate_batch(
 def checked_configs(
     configs: RunConfig | str | Sequence[RunConfig | str], n_worms: int | None, seeds: Sequence[int] | None
 ) -> list[RunConfig]:
-    """Returns the configuration of every worm of a batch; the arguments are those of `simulate_batch`.
-
-    Raises:
-        ConfigError: The numbers of worms, configurations and seeds do not fit together, there is none, a body is
-            planar, or two worms differ in a field of `ALIKE`.
-    """
+    """Returns the configuration of every worm of a batch; takes and raises what `simulate_batch` does."""
     if isinstance(configs, RunConfig | str | Mapping):
         if n_worms is None and seeds is None:
             raise ConfigError("a batch of one configuration needs n_worms or seeds")
@@ -318,11 +313,11 @@ class ControllerGroup:
         errors: dict[int, Exception] = {}
         try:
             if self._strides:
-                felt = [simulation.sensation for simulation in self._simulations]
-                return dict(zip(self.rows, self._take(felt, n_steps), strict=True)), errors
+                observed = [simulation.sensation for simulation in self._simulations]
+                return dict(zip(self.rows, self._take(observed, n_steps), strict=True)), errors
             for later in range(n_steps):
-                felt = [_felt(simulation, later) for simulation in self._simulations]
-                activation = dict(zip(self.rows, self._take(felt, 1), strict=True))
+                observed = [_observed(simulation, later) for simulation in self._simulations]
+                activation = dict(zip(self.rows, self._take(observed, 1), strict=True))
                 for row, simulation in zip(self.rows, self._simulations, strict=True):
                     try:
                         simulation.check_activation(activation[row])
@@ -334,12 +329,12 @@ class ControllerGroup:
             errors = dict.fromkeys(self.rows, error)
         return activation, errors
 
-    def _take(self, felt: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
-        """Takes control steps under what each worm feels; returns each one's activation."""
+    def _take(self, observed: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
+        """Takes control steps under what each worm observes; returns each one's activation."""
         controller = self._simulations[0].controller
         if self._strides and isinstance(controller, StridingController):
-            return [np.asarray(controller.stride(felt[0], n_steps), dtype=np.float64)]
-        return [np.asarray(controller.step(felt[0]), dtype=np.float64)]
+            return [np.asarray(controller.stride(observed[0], n_steps), dtype=np.float64)]
+        return [np.asarray(controller.step(observed[0]), dtype=np.float64)]
 
     def settle(self) -> None:
         """Brings every worm's own controller up to the state that was reached; here it is the one that steps."""
@@ -350,8 +345,8 @@ class ControllerGroup:
         del self.rows[place], self._simulations[place]
 
 
-def _felt(simulation: Simulation, later: int) -> Sensation:
-    """What a worm is told at the beginning of a control step, so many steps after its body's last event."""
+def _observed(simulation: Simulation, later: int) -> Sensation:
+    """What a worm's controller observes at a control step, so many steps after its body's last event."""
     if not later:
         return simulation.observed()
     simulation.step += 1
@@ -372,8 +367,8 @@ class Networks(ControllerGroup):
         self._states["n_steps"] = states[0]["n_steps"]
         self._each = type(self._first.own).of(controller.own for controller in self._controllers)
 
-    def _take(self, felt: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
-        together = replace(felt[0], stretch_m=np.stack([one.stretch_m for one in felt]))
+    def _take(self, observed: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
+        together = replace(observed[0], stretch_m=np.stack([one.stretch_m for one in observed]))
         self._states, activation = self._first.step_copies(self._states, together, n_steps, self._each)
         return list(activation)
 

@@ -1,4 +1,4 @@
-"""The state of a whole simulation as bytes, and the two slots of a run file that hold it.
+"""The state of a whole simulation as bytes, and the two slots of a run file that carry it.
 
 The slots are written in turn. Each carries a sequence number and a checksum, so that a slot torn by a kill is
 noticed and the other one, at most one checkpoint older, is used.
@@ -74,12 +74,7 @@ class Checkpoint:
 
     @classmethod
     def from_bytes(cls, packed: bytes) -> Checkpoint:
-        """Unpacks what `to_bytes` gave.
-
-        Raises:
-            ValueError: They are no such bytes, or declare more than they hold.
-            KeyError: Something is missing.
-        """
+        """Unpacks what `to_bytes` gave; ValueError or KeyError where they are no such bytes or declare more."""
         groups: dict[str, dict[str, NDArray[Any]]] = {"loop": {}, "sensation": {}, "plant": {}, "controller": {}}
         with zipfile.ZipFile(io.BytesIO(packed)) as archive:
             entries = archive.infolist()
@@ -148,11 +143,7 @@ def generator_state(generator: np.random.Generator) -> NDArray[np.uint64]:
 
 
 def restore_generator(words: NDArray[np.uint64]) -> np.random.Generator:
-    """Returns a PCG64 generator in the state that `generator_state` gave.
-
-    Raises:
-        ValueError: No generator has such a state.
-    """
+    """Returns a PCG64 generator in the state that `generator_state` gave; ValueError where none has such a state."""
     if words.shape != (6,) or words.dtype != np.uint64 or not words[3] & 1 or words[4] > 1 or words[5] >> 32:
         raise ValueError("no generator of noise has the state that it holds")
     high, low, inc_high, inc_low, has_uint32, uinteger = words.tolist()

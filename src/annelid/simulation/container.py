@@ -1,10 +1,9 @@
 """A netCDF-4 file of fixed size, laid out whole before a run and then overwritten in place.
 
 HDF5 keeps its metadata in memory while a file is open for writing, so a process killed in the middle can leave
-a file that no longer opens. Here HDF5 only lays the file out: every variable at its full size, contiguous,
-allocated and filled at once. Then the file is closed, and the run writes raw numbers at the variables'
-offsets. The metadata never change again, so the file is valid at every instant, other processes may read it
-during the run, and its room on the disk is taken from the start. Behind it lies room for a digest of the finished file.
+a file that no longer opens. Here HDF5 only lays the file out, every variable contiguous, allocated and filled at once.
+Then the run writes raw numbers at the variables' offsets. The file is valid at every instant, other processes may read
+it during the run, and its room on the disk is taken from the start. Behind it lies room for a digest of the whole.
 """
 
 from __future__ import annotations

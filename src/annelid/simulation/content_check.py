@@ -24,11 +24,7 @@ _UNSTORED_SHARE = 8
 
 
 def check_content(file: h5py.File, size: int) -> None:
-    """Refuses a file that holds anything but plain numbers and texts within itself.
-
-    Args:
-        file: The open file.
-        size: Its size, bytes.
+    """Refuses an open file of a size, bytes, that holds anything but plain numbers and texts within itself.
 
     Raises:
         ValueError: The sentence says which part is what it should not be.

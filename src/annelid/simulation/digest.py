@@ -60,11 +60,7 @@ def write_whole(file: BinaryIO, content: bytes) -> None:
 
 
 def examine(path: Path, *, footer_only: bool = False) -> Finding:
-    """Compares a file with its digest, or only looks whether it has one: a finished one then counts as intact.
-
-    Raises:
-        OSError: The file cannot be read.
-    """
+    """Compares a file with its digest, or only looks whether it has one: a finished one then counts as intact."""
     with open(path, "rb") as file:
         size = file.seek(0, 2)
         if size < _FOOTER.size:
@@ -127,11 +123,7 @@ def _table(sums: Mapping[str, str], extents: Mapping[str, Extent], end: int) -> 
 
 
 def _read_table(table: bytes, end: int) -> tuple[dict[str, str], dict[str, Extent]]:
-    """Returns the sums and the extents of a table.
-
-    Raises:
-        ValueError: It is no such table, or names bytes that are not there or twice.
-    """
+    """Returns sums and extents of a table; ValueError where it is none, or names bytes that are not there or twice."""
     sums: dict[str, str] = {}
     extents: dict[str, Extent] = {}
     for line in filter(None, table.decode("ascii").split("\n")):

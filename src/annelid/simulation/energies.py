@@ -1,11 +1,11 @@
-"""The 3D worm's energies: what its muscles have done and where it went, step by step, and what its strands hold.
+"""The 3D worm's energies: what its muscles have done and where it went, step by step, and what its strands store.
 
 The engine moves the body by the step h times the new velocity v', and the work of a generalised force f in a step is
 ``h f . v'``. With the mass matrix M constant, as it is for point masses on slides,
 
     change of kinetic energy = work of all forces - 1/2 |v' - v|^2_M
 
-holds to rounding. Forces are the engine's own: weight, constraints, dampers, springs, actuators. The integrator
+is exact to rounding. Forces are the engine's own: weight, constraints, dampers, springs, actuators. The integrator
 `discrete` takes springs, dampers and actuators at the end of the step to first order, with simpler matrices than
 theirs. What that takes beyond the true change of elastic energy and the dampers' own work, and the square above, is the
 numerical loss. It is what is left of the muscles' work when everything else is subtracted (docs/gait.md).
@@ -13,7 +13,7 @@ numerical loss. It is what is left of the muscles' work when everything else is 
 The engine gives no elastic energy of rods. A rod is the engine's discrete elastic rod (Bergou et al. 2008, "Discrete
 elastic rods"). An edge e carries a unit tangent t and a reference direction u across it, which the engine transports
 along in time without twist and keeps as "plastic" state; its material frame is that direction turned by the angle q of
-its twist hinge. Between two edges of rest lengths l and l', the rod holds
+its twist hinge. Between two edges of rest lengths l and l', the rod stores
 
     E I / (l + l') * mean over both edges of |k - k0|^2  +  G J / (l + l') * (q' - q + w)^2
 

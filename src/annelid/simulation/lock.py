@@ -1,4 +1,4 @@
-"""One writer a folder: a lock of the operating system's, which ends with the process that holds it.
+"""One writer per folder: a lock of the operating system's, which ends with the process that holds it.
 
 The lock is on a file in the folder, in which the holder says who it is. The file goes when the lock ends; one that a
 killed process leaves behind locks nothing.
@@ -179,10 +179,10 @@ def _holder() -> bytes:
 
 def _taken(folder: Path, holder: bytes) -> str:
     try:
-        told = json.loads(holder)
+        said = json.loads(holder)
         # The file may be anybody's, and the sentence is one line.
-        since, command = (shortened(ascii(str(told[key]))[1:-1]) for key in ("since", "command"))
-        who = f"process {shortened(str(int(told['pid'])))} (since {since}: {command})"
+        since, command = (shortened(ascii(str(said[key]))[1:-1]) for key in ("since", "command"))
+        who = f"process {shortened(str(int(said['pid'])))} (since {since}: {command})"
     except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         who = "another process"
     return f"{who} writes into the folder {folder}: name another, or wait for its end"

@@ -16,19 +16,9 @@ import numpy as np
 
 from annelid.config import RunConfig
 from annelid.protocols import Array, Recordable, Sensation, Signal, Values
-from annelid.simulation import container
+from annelid.simulation import container, runfile
 from annelid.simulation.checkpoint import slot_capacity, to_slot
 from annelid.simulation.container import RawWriter, Variable
-from annelid.simulation.runfile import (
-    CPU_TIME,
-    MESSAGE_BYTES,
-    SCHEMA,
-    SCHEMA_VERSION,
-    SLOTS,
-    STATUSES,
-    WARNING_BYTES,
-    WARNINGS,
-)
 
 _BLOCK_BYTES = 4_194_304
 
@@ -106,7 +96,7 @@ def loop_signals(n_muscles: int) -> Recordable:
 def global_attributes(config: RunConfig, parts: Sequence[Recordable]) -> dict[str, Any]:
     """Returns the file's global attributes: what the parts add, the whole configuration, and versions."""
     return {name: value for part in parts for name, value in part.attrs.items()} | {
-        SCHEMA: SCHEMA_VERSION,
+        runfile.SCHEMA: runfile.SCHEMA_VERSION,
         "config": config.model_dump_json(),
         # The format's integers have 64 bits, a seed may have more.
         "seed": config.seed if config.seed < 2**63 else str(config.seed),
@@ -142,18 +132,20 @@ def layout(
     # A dimension of size 0 would be an unlimited one, so a spare row stays NaN where there is no instant.
     times = {dim: values if values.size else np.array([np.nan]) for dim, values in times.items()}
     sizes = {dim: values.size for dim, values in times.items()}
-    sizes |= {"message_character": MESSAGE_BYTES, "warning_character": WARNING_BYTES}
+    sizes |= {"message_character": runfile.MESSAGE_BYTES, "warning_character": runfile.WARNING_BYTES}
     sizes |= dict(zip(("segment", "sensor"), rest_stretch_m.shape, strict=True))
-    flags = {"flag_values": np.arange(len(STATUSES), dtype="i1"), "flag_meanings": " ".join(STATUSES)}
+    flags = {"flag_values": np.arange(len(runfile.STATUSES), dtype="i1"), "flag_meanings": " ".join(runfile.STATUSES)}
     text = {"_Encoding": "utf-8"}
-    message, warning = "why the run ended before its time", "what is doubtful about the run, a sentence a line"
+    message, warning = "why the run ended before its time", "what is doubtful about the run, one sentence per line"
     variables = [
         Variable("samples_written", (), "1", "samples of the signals that hold data", "<i8"),
         Variable("frames_written", (), "1", "frames that hold data", "<i8"),
         Variable("status_code", (), "1", "how the run ended", "i1", attrs=flags),
         Variable("status_message", ("message_character",), "1", message, "S1", attrs=text),
-        Variable(WARNINGS, ("warning_character",), "1", warning, "S1", attrs=text),
-        Variable(CPU_TIME, (), "s", "processor time that the process spent from the start to the end of the run"),
+        Variable(runfile.WARNINGS, ("warning_character",), "1", warning, "S1", attrs=text),
+        Variable(
+            runfile.CPU_TIME, (), "s", "processor time that the process spent from the start to the end of the run"
+        ),
         Variable("time", ("time",), "s", "simulated time", data=times["time"]),
         Variable("frame_time", ("frame",), "s", "simulated time of a frame", data=times["frame"]),
     ]
@@ -176,7 +168,7 @@ def layout(
     if checkpoint is not None:
         sizes["checkpoint_byte"] = slot_capacity(checkpoint)
         slot = "state of the simulation at a checkpoint, written in turn with the other slot"
-        variables += [Variable(name, ("checkpoint_byte",), "1", slot, dtype="u1") for name in SLOTS]
+        variables += [Variable(name, ("checkpoint_byte",), "1", slot, dtype="u1") for name in runfile.SLOTS]
     names = [variable.name for variable in variables]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -252,7 +244,7 @@ class Recorder:
         self._samples.put({name: value for source in sources for name, value in source.items()}, self._writer)
 
     def frame(self, *sources: Values) -> None:
-        """Takes one frame, in the same way."""
+        """Takes one frame likewise."""
         self._frames.put({name: value for source in sources for name, value in source.items()}, self._writer)
 
     def flush(self) -> None:
@@ -267,12 +259,12 @@ class Recorder:
         slot = to_slot(self._sequence, payload)
         if len(slot) > self._slot_bytes:
             raise ValueError(f"the state has grown from below {self._slot_bytes} to {len(slot)} bytes during the run")
-        self._writer.write(SLOTS[self._sequence % len(SLOTS)], slot)
+        self._writer.write(runfile.SLOTS[self._sequence % len(runfile.SLOTS)], slot)
 
     def warn(self, doubts: tuple[str, ...]) -> None:
         """Writes what is doubtful about the run so far, a sentence each, instead of what was written before."""
         if doubts != self._doubts:
-            self._writer.write(WARNINGS, _padded("\n".join(doubts), WARNING_BYTES))
+            self._writer.write(runfile.WARNINGS, _padded("\n".join(doubts), runfile.WARNING_BYTES))
             self._doubts = doubts
 
     def finish(self, status: str, message: str = "", *, whole: bool = True) -> None:
@@ -292,9 +284,9 @@ class Recorder:
                 self.finish(status, message, whole=False)
             raise
         try:
-            writer.write("status_message", _padded(message, MESSAGE_BYTES))
-            writer.write(CPU_TIME, np.array(process_time() - self._began_cpu_s, dtype="<f8"))
-            writer.write("status_code", np.array(STATUSES.index(status), dtype="i1"))
+            writer.write("status_message", _padded(message, runfile.MESSAGE_BYTES))
+            writer.write(runfile.CPU_TIME, np.array(process_time() - self._began_cpu_s, dtype="<f8"))
+            writer.write("status_code", np.array(runfile.STATUSES.index(status), dtype="i1"))
             writer.finish()
         finally:
             writer.close()

@@ -45,7 +45,7 @@ _BOOKKEEPING = ("samples_written", "frames_written", "status_code", "status_mess
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A run as its file holds it.
+    """A run as its file has it.
 
     Attributes:
         path: The run file.

@@ -1,8 +1,9 @@
-"""What the skin feels of the ground, and how it slides: touch on four sides of every segment, slip and its loss.
+"""What the skin senses of the ground, and how it slides: touch on four sides of every segment, slip and its loss.
 
-The skin is the geoms that can touch: one sphere a vertex for rods, one capsule an element for chains. A geom belongs to
-the segment and the side that it is nearest to at rest, and slides by what its centre is displaced between two movements
-of the body. For rods that is the displacement of the point that touches; a chain's capsules also turn a little.
+The skin is the geoms that can touch: one sphere per vertex for rods, one capsule per element for chains. A geom belongs
+to the segment and the side that it is nearest to at rest, and slides by what its centre is displaced between two
+movements of the body. For rods that is the displacement of the point that touches; a chain's capsules also turn a
+little.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from annelid.protocols import SIDES, State
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """What every segment feels of the ground, and how far it has slid; ``(n_segments,)`` unless said otherwise."""
+    """What every segment senses of the ground, and how far it has slid; ``(n_segments,)`` unless said otherwise."""
 
     normal: Array  # normal force on each side during the last physics step, N, (n_segments, 4) in the order of SIDES
     count: Array  # number of geoms that touched then
@@ -63,15 +64,11 @@ class Skin:
     def touch(
         self, so_far: Touch, ground_N: Array, before_m: Array, after_m: Array, axis: Array, time_s: float
     ) -> Touch:
-        """Adds a movement of the body to what was sensed so far.
+        """Adds a movement of the body, which took a time, to what was sensed so far.
 
-        Args:
-            so_far: What was sensed before the movement.
-            ground_N: Force of the ground on each geom during the movement's last physics step, N, ``(n_geoms, 3)``.
-            before_m: Centres of the geoms before the movement, m, ``(n_geoms, 3)``.
-            after_m: The same after it.
-            axis: Unit vectors along the body towards its front at each segment, ``(n_segments, 3)``.
-            time_s: How long it took, s.
+        Given are the force of the ground on each geom during the last physics step, N, ``(n_geoms, 3)``, their centres
+        before and after the movement, m, and unit vectors along the body towards its front at each segment,
+        ``(n_segments, 3)``.
         """
         # A few belly vertices touch, of hundreds.
         touching = np.flatnonzero(_dot(ground_N, ground_N))
@@ -105,7 +102,7 @@ def _dot(first: Array, second: Array) -> Array:
 
 
 def sides_of(left_right_m: Array, up_m: Array) -> NDArray[np.int64]:
-    """Returns the side that points of a cross-section lie on, as indices of `SIDES`: the quarter that holds them.
+    """Returns the side that points of a cross-section lie on, as indices of `SIDES`: the quarter that they are in.
 
     Points are so far right of the axis (left is negative) and above it, m. One between two quarters counts to belly or
     back, the same on the left and the right.

@@ -167,7 +167,7 @@ class Simulation:
         return tuple(doubt for part in parts if isinstance(part, Doubtful) for doubt in part.doubts())
 
     def observed(self) -> Sensation:
-        """Returns what the controller is told: the sensation with noise on the stretch sensors."""
+        """Returns what the controller observes: the sensation with noise on the stretch sensors."""
         true = self.sensation
         if not self._noise_m:
             return true

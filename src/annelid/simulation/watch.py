@@ -43,20 +43,6 @@ class Energies(NamedTuple):
     numerical: float  # what the integrator has taken of it; negative where it has given
 
 
-class _Extreme:
-    """The largest value of a quantity so far, when it was reached, and where."""
-
-    def __init__(self) -> None:
-        self.value, self.time_s, self.place = -math.inf, 0.0, 0
-
-    def take(self, value: float, time_s: float) -> bool:
-        """Keeps a value if it is a new extreme, and returns whether it is."""
-        if not value > self.value:
-            return False
-        self.value, self.time_s = value, time_s
-        return True
-
-
 class Watch:
     """Looks at one worm, and keeps what is worth a warning."""
 
@@ -70,7 +56,8 @@ class Watch:
         self._deep_m, self._gap_m = DEEP * body.mesh.radius_m, WIDE_GAP * shape.side_m
         self._idle_N = IDLE_SHARE * np.repeat(rings.forces(n), self._per_segment)
         self._force_field = rings.force_field
-        self._closing, self._depth, self._gap, self._spring = self._extremes = [_Extreme() for _ in range(4)]
+        # The largest values so far, when they were reached, s, and where.
+        self._extremes = dict.fromkeys(("closing", "depth", "gap", "spring"), (-math.inf, 0.0, 0))
         # Of every muscle: whether it is active; since when, s; its longest contraction, s; its largest force since it
         # is active, N; in how many contractions it has pulled nothing; and when the first of these began, s.
         self._muscles = np.zeros((6, len(self._idle_N)))
@@ -92,14 +79,8 @@ class Watch:
     ) -> str | None:
         """Takes note of one movement; returns why the run cannot go on, in a sentence, or None.
 
-        Args:
-            time_s: Simulated time, s.
-            ring_length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
-            spring_length_m: Lengths of the axial springs, m, ``(n_springs,)``.
-            depth_m: Depth of the deepest vertex in the ground, m; negative above it.
-            gap_m: Largest gap between two pinned strands, m.
-            activation: Of the movement, ``(n_muscles,)``.
-            force_N: Of the actuators in its last physics step, N, ``(n_muscles,)``.
+        Rings, activation and force are ``(n_muscles,)``, springs ``(n_springs,)``; the depth is that of the deepest
+        vertex in the ground, negative above it, the gap the largest between two pinned strands.
         """
         active = activation > ACTIVATED
         if active.tobytes() != self._active_bytes:
@@ -108,15 +89,13 @@ class Watch:
         np.maximum(most_N, force_N, out=most_N)
         rings = ring_length_m.reshape(-1, 2).sum(axis=1) if self._per_segment == 2 else ring_length_m
         ring_m, spring_m = float(np.minimum.reduce(rings)), float(np.maximum.reduce(spring_length_m))
-        if self._closing.take(-ring_m, time_s):
-            self._closing.place = int(rings.argmin()) + 1
-        self._depth.take(depth_m, time_s)
-        self._gap.take(gap_m, time_s)
-        self._spring.take(spring_m, time_s)
+        for name, value in (("closing", -ring_m), ("depth", depth_m), ("gap", gap_m), ("spring", spring_m)):
+            if value > self._extremes[name][0]:
+                self._extremes[name] = value, time_s, int(rings.argmin()) + 1 if name == "closing" else 0
         guard = self._guard
         if ring_m < guard.ring_closure * self._ring_least_m:
             return (
-                f"ring {self._closing.place} is {ring_m:.3g} m long, below the limit guard.ring_closure = "
+                f"ring {self._extremes['closing'][2]} is {ring_m:.3g} m long, below the limit guard.ring_closure = "
                 f"{guard.ring_closure:g} times the {self._ring_least_m:.3g} m at which its crossings touch"
             )
         if spring_m > guard.stretch * self._spring_most_m:
@@ -150,26 +129,27 @@ class Watch:
     def warnings(self, time_s: float, energies: Energies) -> tuple[str, ...]:
         """Returns a sentence for everything doubtful up to a time, s."""
         found: list[str] = []
-        ring_m, rest_m = -self._closing.value, self._ring_rest_m
+        (closing_m, closed_s, ring), depth, gap, spring = self._extremes.values()
+        ring_m, rest_m = -closing_m, self._ring_rest_m
         if ring_m < COLLAPSED * rest_m:
             found.append(
-                f"ring {self._closing.place} was {ring_m:.3g} m long at {self._closing.time_s:.4g} s, "
+                f"ring {ring} was {ring_m:.3g} m long at {closed_s:.4g} s, "
                 f"{100 * ring_m / rest_m:.0f} % of its length at rest: the mesh has collapsed under "
                 f"body.rings.{self._force_field}, or by itself"
             )
-        if self._spring.value > LONG * self._spring_rest_m:
+        if spring[0] > LONG * self._spring_rest_m:
             found.append(
-                f"an axial spring was {self._spring.value:.3g} m long at {self._spring.time_s:.4g} s, "
-                f"{self._spring.value / self._spring_rest_m:.1f} times its length in the mesh at rest"
+                f"an axial spring was {spring[0]:.3g} m long at {spring[1]:.4g} s, "
+                f"{spring[0] / self._spring_rest_m:.1f} times its length in the mesh at rest"
             )
-        if self._depth.value > self._deep_m:
+        if depth[0] > self._deep_m:
             found.append(
-                f"a vertex was {self._depth.value:.3g} m deep in the ground at {self._depth.time_s:.4g} s: the "
+                f"a vertex was {depth[0]:.3g} m deep in the ground at {depth[1]:.4g} s: the "
                 "contacts are too soft for what presses on them, see arena.contact_time_constant_s"
             )
-        if self._gap.value > self._gap_m:
+        if gap[0] > self._gap_m:
             found.append(
-                f"the strands of a crossing were {self._gap.value:.3g} m apart at {self._gap.time_s:.4g} s, over half "
+                f"the strands of a crossing were {gap[0]:.3g} m apart at {gap[1]:.4g} s, over half "
                 "the side of a rhombus: the pins are too soft for what pulls at them"
             )
         longest_s, _, idle, first_idle_s = self._judged(self._active, time_s)
@@ -197,13 +177,12 @@ class Watch:
 
     def get_state(self) -> State:
         """Returns what has been kept so far."""
-        extremes = [(each.value, each.time_s, each.place) for each in self._extremes]
-        return {"watch_extremes": np.array(extremes), "watch_contractions": self._muscles.copy()}
+        return {"watch_extremes": np.array(list(self._extremes.values())), "watch_contractions": self._muscles.copy()}
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned."""
         extremes = np.asarray(state["watch_extremes"], dtype=float).tolist()
-        for each, (value, time_s, place) in zip(self._extremes, extremes, strict=True):
-            each.value, each.time_s, each.place = value, time_s, int(place)
+        values = ((value, time_s, int(place)) for value, time_s, place in extremes)
+        self._extremes = dict(zip(self._extremes, values, strict=True))
         self._muscles[:] = state["watch_contractions"]
         self._active_bytes = self._active.tobytes()

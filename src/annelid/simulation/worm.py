@@ -1,4 +1,4 @@
-"""The 3D worm as a Plant: MuJoCo steps the body, annelid reads what it feels."""
+"""The 3D worm as a Plant: MuJoCo steps the body, annelid reads what it senses."""
 
 from __future__ import annotations
 
@@ -123,10 +123,10 @@ def _has_damper_rows(body: WormBody) -> bool:
 
 
 class Worm(ABC):
-    """What a 3D worm feels, records and is alarmed by, whoever steps it.
+    """What a 3D worm senses, records and is alarmed by, whoever steps it.
 
     Lengths and positions are those at the end of the step; forces and edge strains are those that acted during
-    the last physics step, since the engine computes them on the way.
+    the last physics step, since the engine computes them before it moves the body.
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.
@@ -144,7 +144,7 @@ class Worm(ABC):
     engine: Engine  # the engine's arrays that a step is read from
     warned: NDArray[np.int32]  # how often the engine has given each of its warnings
     posture: Posture  # where the body is
-    touch: Touch  # what the skin feels of the ground, and how far it has slid
+    touch: Touch  # what the skin senses of the ground, and how far it has slid
     energies: EnergyTotals  # what the muscles have done so far, and where it went
 
     def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
@@ -194,7 +194,7 @@ class Worm(ABC):
         """Reads the posture from the engine's coordinates."""
 
     def elastic_energy_J(self) -> float:
-        """Energy that strands, joints and springs hold, J."""
+        """Energy that strands, joints and springs store, J."""
         return self.anatomy.elasticity.energy_J(self.qpos, self.plastic, self.posture.spring_length)
 
     def potential_energy_J(self) -> float:
@@ -236,7 +236,7 @@ class Worm(ABC):
         return self.observe()
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step under an activation in [0, 1], ``(n_muscles,)``; returns what the body feels.
+        """Advances by one control step under an activation in [0, 1], ``(n_muscles,)``; returns what the body senses.
 
         Raises:
             SimulationStopped: The engine gave up on the step.

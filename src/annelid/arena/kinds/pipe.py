@@ -67,30 +67,22 @@ class Pipe(ArenaKind):
 
     @model_validator(mode="after")
     def _a_pipe_that_can_be(self) -> Self:
+        def refuse(field: str, problem: str) -> None:
+            raise ValueError(f"arena.{field} = {getattr(self, field):g}: {problem}")
+
         if self.profile != "even" and self.narrowest_m >= self.bore_m:
-            raise ValueError(
-                f"arena.narrowest_m = {self.narrowest_m:g}: must be less than arena.bore_m = {self.bore_m:g}"
-            )
-        widest = self.bore_m + self.entry_clearance_m
-        if self.course == "bend" and abs(self.turn_deg) > 180:
-            raise ValueError(f"arena.turn_deg = {self.turn_deg:g}: a bend must be in -180 .. 180; a helix may go on")
-        if self.course == "s" and abs(self.turn_deg) > 135:
-            raise ValueError(f"arena.turn_deg = {self.turn_deg:g}: each curve of an s must be in -135 .. 135")
-        if self.course in ("bend", "s") and abs(self.turn_deg) > 135 and self.radius_m <= widest:
-            raise ValueError(
-                f"arena.radius_m = {self.radius_m:g}: must be more than {widest:g}, or the legs of the bend overlap"
-            )
-        if self.course == "helix":
-            if self.radius_m <= widest:
-                raise ValueError(
-                    f"arena.radius_m = {self.radius_m:g}: must be more than {widest:g} for a helix, or the pipe "
-                    "overlaps itself"
-                )
-            if abs(self.turn_deg) > 270 and self.pitch_m <= 2.2 * widest:
-                raise ValueError(
-                    f"arena.pitch_m = {self.pitch_m:g}: must be more than {2.2 * widest:g} for turns that lie above "
-                    "each other"
-                )
+            refuse("narrowest_m", f"must be less than arena.bore_m = {self.bore_m:g}")
+        widest, turn_deg = self.bore_m + self.entry_clearance_m, abs(self.turn_deg)
+        if self.course == "bend" and turn_deg > 180:
+            refuse("turn_deg", "a bend must be in -180 .. 180; a helix may go on")
+        if self.course == "s" and turn_deg > 135:
+            refuse("turn_deg", "each curve of an s must be in -135 .. 135")
+        if self.course in ("bend", "s") and turn_deg > 135 and self.radius_m <= widest:
+            refuse("radius_m", f"must be more than {widest:g}, or the legs of the bend overlap")
+        if self.course == "helix" and self.radius_m <= widest:
+            refuse("radius_m", f"must be more than {widest:g} for a helix, or the pipe overlaps itself")
+        if self.course == "helix" and turn_deg > 270 and self.pitch_m <= 2.2 * widest:
+            refuse("pitch_m", f"must be more than {2.2 * widest:g} for turns that lie above each other")
         return self
 
     @property

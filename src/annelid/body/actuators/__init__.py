@@ -55,14 +55,14 @@ class ActuatorKind(Kind):
     )
     length_range_m: Range | tuple[Range, ...] = Field(
         default=(0.566, 1.067),
-        description="operating range of a whole ring, one pair for all or one pair a segment",
+        description="operating range of a whole ring, one pair for all or one pair per segment",
     )
 
     @field_validator("length_range_m")
     @classmethod
     def _ordered(cls, value: Any) -> Any:
         if not value:
-            raise ValueError("needs one pair for all rings or one pair a segment")
+            raise ValueError("needs one pair for all rings or one pair per segment")
         for low, high in value if isinstance(value[0], tuple) else (value,):
             if low >= high:
                 raise ValueError("each length range needs its lower bound below its upper bound")
@@ -81,7 +81,7 @@ class ActuatorKind(Kind):
         return list(value) if isinstance(value, tuple) else [value] * n_segments
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Holds its lengths and forces against the mesh, before anything runs; by default nothing is doubted."""
+        """Checks its lengths and forces against the mesh, before anything runs; by default nothing is doubted."""
         yield from ()
 
     @abstractmethod

@@ -37,7 +37,7 @@ class Rings(ActuatorKind):
     force_field: ClassVar[str] = "peak_force_N"
     kind: Literal["muscle"] = "muscle"
     peak_force_N: PerSegment = Field(
-        default=117.57, description="isometric force at the optimal length, F0, one number for all or one a segment"
+        default=117.57, description="isometric force at the optimal length, F0, one number for all or one per segment"
     )
     minimum_length: Annotated[float, Field(gt=0, lt=1)] = Field(
         default=0.58, description="lmin, relative to the optimal length"
@@ -58,7 +58,7 @@ class Rings(ActuatorKind):
         return self
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Holds the muscles' lengths without force against the ring at rest, and their force against the mesh."""
+        """Checks the muscles' lengths without force against the ring at rest, and their force against the mesh."""
         for low, high, force_N in strongest(self, body.n_segments):
             yield from _findings(body, self, low, high, force_N)
 

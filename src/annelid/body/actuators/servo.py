@@ -34,17 +34,17 @@ class ServoRings(ActuatorKind):
     length_range_m: Range | tuple[Range, ...] = Field(
         default=(0.62, 0.96),
         description="shortest and longest cable of a whole ring (half-rings have half of it each), one pair for all or "
-        "one pair a segment",
+        "one pair per segment",
     )
     force_limit_N: PerSegment = Field(
-        default=13.0, description="tension at which a servo stalls, one number for all or one a segment"
+        default=13.0, description="tension at which a servo stalls, one number for all or one per segment"
     )
     speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
     stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
     damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Holds the cables' range against the ring at rest, and their force against the mesh."""
+        """Checks the cables' range against the ring at rest, and their force against the mesh."""
         for low, high, force_N in strongest(self, body.n_segments):
             yield from _findings(body, self, low, high, force_N)
 

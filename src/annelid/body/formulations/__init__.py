@@ -58,7 +58,7 @@ class FormulationKind(Kind):
         """
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Holds the physics step against what the formulation must resolve, before a run; by default finds nothing."""
+        """Checks the physics step against what the formulation must resolve, before a run; by default finds nothing."""
         yield from ()
 
     @abstractmethod

@@ -68,8 +68,7 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
                 panels[1].plot(*track[-1, :2], marker="o", markersize=4, color=color)
         if any(seen):
             panel_title(panels[1], "Track of the middle from above (cm)")
-            panels[1].set_xlabel("x, front towards the left (heading 0)")
-            panels[1].set_ylabel("y")
+            panels[1].set(xlabel="x, front towards the left (heading 0)", ylabel="y")
             panels[1].set_aspect("equal", adjustable="datalim")
         _legend(figure, labels, drawn)
         return save(figure, path)

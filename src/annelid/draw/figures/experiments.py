@@ -32,8 +32,8 @@ def load_frame_figure(loops: Mapping[str, tuple[ArrayLike, ArrayLike]], stem: st
         draw_lines(axes, {name: (_MM * np.asarray(x), y) for name, (x, y) in loops.items()}, markers=False)
         for order, line in enumerate(axes.lines):
             line.set(zorder=3 - order, linewidth=0.9 if order else 1.6)
-        axes.set_xlabel("displacement of the cable (mm); a third of it is the change of diameter")
-        axes.set_ylabel("force of the cable (N)")
+        displacement = "displacement of the cable (mm); a third of it is the change of diameter"
+        axes.set(xlabel=displacement, ylabel="force of the cable (N)")
         axes.legend(loc="upper left")
         return save_both(figure, stem)
 
@@ -65,8 +65,7 @@ def progress_figure(marks: Sequence[Mark], label: str, more_is_better: bool, ste
         if failed:
             floor = axes.get_xaxis_transform()
             axes.plot(failed, np.zeros(len(failed)), "|", color="0.5", transform=floor, clip_on=False, label="no gait")
-        axes.set_xlabel("trial")
-        axes.set_ylabel(label)
+        axes.set(xlabel="trial", ylabel=label)
         figure.legend(loc="outside upper center", ncols=4)
         return save_both(figure, stem)
 
@@ -91,8 +90,7 @@ def pareto_figure(
             axes.annotate(str(mark.number), (x, y), (5, -9), textcoords="offset points", fontsize=7, color=_BEST)
         axes.margins(0.08)
         axes.plot(*begun, "D", color=_START, markersize=7, label="start")
-        axes.set_xlabel(labels[0])
-        axes.set_ylabel(labels[1])
+        axes.set(xlabel=labels[0], ylabel=labels[1])
         figure.legend(loc="outside upper center", ncols=3)
         return save_both(figure, stem)
 

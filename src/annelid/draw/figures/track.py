@@ -67,9 +67,7 @@ def _draw_track(axes: Axes, track: Track) -> None:
         axes.annotate(f"{track.time_s[sample]:.0f} s", (x, y), color=shade, fontsize=7, ha="center", va="center")
     axes.plot(*track.front_m.T, color=FRONT, linewidth=0.7, label="foremost ring")
     axes.plot(*track.middle_m.T, color=LAST, linewidth=1.6, label="middle of the body")
-    axes.set_aspect("equal")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
 
 
 def _draw_marks(axes: Axes, config: RunConfig) -> None:

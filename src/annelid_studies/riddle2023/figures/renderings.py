@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from annelid.analysis.rhombi import nearest_frame
 from annelid.body import mesh_of
-from annelid.body.formulations.rods.net import PIN_RGBA, STRAND_RGBA
+from annelid.body.actuation import PIN_RGBA
+from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points

@@ -58,7 +58,7 @@ class Chain(FormulationKind):
         return 2e-6 * n_elements**2, 5e-5 * n_elements
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Holds the step against the joints', the springs' and the pins' own rates."""
+        """Checks the step against the joints', the springs' and the pins' own rates."""
         from annelid.body.worm import WormBody
 
         body, step = config.body, config.clock.physics_timestep_s

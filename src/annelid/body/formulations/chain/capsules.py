@@ -15,8 +15,9 @@ import mujoco
 import numpy as np
 
 from annelid.arena.geoms import contact_options
-from annelid.body.actuation import crossing_site
-from annelid.body.formulations.rods.net import AXES, HIDDEN_GROUP, PIN_RGBA, STRAND_RGBA, add_touch
+from annelid.body.actuation import crossing_site, mark_crossing
+from annelid.body.damping import add_row
+from annelid.body.formulations.rods.net import AXES, STRAND_RGBA, add_touch
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
@@ -73,17 +74,9 @@ def add_chain(
 ) -> None:
     """Adds one chain of capsules; element ``e`` is body ``<name>_<e>`` between vertices ``e`` and ``e + 1``.
 
-    Args:
-        spec: The spec to add to.
-        name: Name of the strand.
-        vertices_m: Rest positions, shape ``(n_vertices, 3)``.
-        strands: Material.
-        formulation: Kind of joint and its numerical inertia.
-        contact: Contact attributes; None for a chain that touches nothing.
-        vertices_touch: A sphere at each vertex touches instead of the capsules.
-        rgba: Colour.
-        root: Element that the tree grows from, by default the middle one.
-        fixed_root: Welds the root element to the world (a cantilever).
+    The tree grows from a root element, by default the middle one, which may be welded to the world (a cantilever).
+    Without contact attributes the chain touches nothing, else by its capsules or by spheres at its vertices,
+    ``(n_vertices, 3)``.
     """
     n_elements = len(vertices_m) - 1
     middle = _middle_element(len(vertices_m)) if root is None else root
@@ -163,28 +156,11 @@ def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: W
         pin, joint = links[0], vertex if vertex >= _middle_element(geometry.vertices_m.shape[1]) else vertex + 1
         place = position - geometry.vertices_m[geometry.crossing_strands[crossing, 0], joint]
         pairs = [(pin.name, links[1].name)]
-    pin.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        pos=place,
-        size=[body.pins.radius_m, 0.0, 0.0],
-        mass=body.pins.mass_kg,
-        contype=0,
-        conaffinity=0,
-        rgba=PIN_RGBA,
-    )
-    pin.add_site(name=name, pos=place, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
-    for k, (first, second) in enumerate(pairs):
-        spec.add_equality(
-            name=f"pin_{crossing}_{k}",
-            type=mujoco.mjtEq.mjEQ_CONNECT,
-            objtype=mujoco.mjtObj.mjOBJ_BODY,
-            name1=first,
-            name2=second,
-            data=[*place, *([0.0] * 9)],
-            solref=[formulation.pin_time_constant_s, 1.0],
-            solimp=[*formulation.pin_impedance, 0.5, 2.0],
-        )
+    mark_crossing(pin, name, body.pins.radius_m, body.pins.mass_kg, place)
+    solver = {"solref": [formulation.pin_time_constant_s, 1.0], "solimp": [*formulation.pin_impedance, 0.5, 2.0]}
+    connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
+    for k, pair in enumerate(pairs):
+        add_row(spec, connect, bodies, f"pin_{crossing}_{k}", *pair, data=[*place, *([0.0] * 9)], **solver)
 
 
 def _middle_element(n_vertices: int) -> int:

@@ -82,7 +82,7 @@ class Rods(FormulationKind):
             )
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Holds the step against the edges and the material's damping."""
+        """Checks the step against the edges and the material's damping."""
         from annelid.body.worm import WormBody
 
         body, step = config.body, config.clock.physics_timestep_s

@@ -2,7 +2,7 @@
 
 Every mesh vertex is a body on three slides; a crossing is ONE such body for both of its strands, so a pin costs
 no constraint and cannot part. Each strand is a 1D flex through its vertices' bodies, a discrete elastic rod with
-bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge an edge, found by its
+bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
 Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by a spring
@@ -22,8 +22,8 @@ import mujoco
 import numpy as np
 
 from annelid.arena.geoms import contact_options
-from annelid.body.actuation import crossing_site
-from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, twist_name
+from annelid.body.actuation import crossing_site, mark_crossing
+from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, add_row, twist_name
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 AXES = np.eye(3)
 ORIGIN = np.zeros(3)
 STRAND_RGBA = ((0.12, 0.35, 0.75, 1.0), (0.25, 0.5, 0.85, 1.0))
-PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
 EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
 HIDDEN_GROUP = 4
 STRAIGHT_RAD = 1e-4
@@ -75,16 +74,7 @@ def _add_vertices(
         name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
         place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
         pin = add_vertex(spec, name, place, body.pins.mass_kg + (2 * masses[vertex] if shared else 0.0))
-        pin.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[body.pins.radius_m, 0.0, 0.0],
-            mass=0.0,
-            contype=0,
-            conaffinity=0,
-            rgba=PIN_RGBA,
-        )
-        pin.add_site(name=name, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
+        mark_crossing(pin, name, body.pins.radius_m, 0.0, ORIGIN)
         if shared:
             add_touch(pin, body.strands.radius_m, contact)
             for strand in strands:
@@ -127,22 +117,13 @@ def vertex_name(strand: int, vertex: int | str) -> str:
 def _tie(spec: mujoco.MjSpec, pin: mujoco.MjsBody, point: mujoco.MjsBody, formulation: Rods) -> None:
     """Ties a strand's vertex to its pin by a spring and a dashpot at one place."""
     stiffness, damping = formulation.pin_stiffness_N_per_m, formulation.pin_damping_Ns_per_m
-    row = spring_row(1.0 / pin.mass + 1.0 / point.mass, stiffness, damping, formulation.pin_inertance_kg)
-    spec.add_equality(
-        name=f"tie_{point.name}",
-        type=mujoco.mjtEq.mjEQ_CONNECT,
-        objtype=mujoco.mjtObj.mjOBJ_BODY,
-        name1=pin.name,
-        name2=point.name,
-        data=[0.0] * 12,
-        solref=row[0],
-        solimp=row[1],
-    )
+    inverse_kg = 1.0 / pin.mass + 1.0 / point.mass
+    row = spring_row(inverse_kg, stiffness, damping, formulation.pin_inertance_kg)
+    connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
+    add_row(spec, connect, bodies, f"tie_{point.name}", pin.name, point.name, **row)
 
 
-def spring_row(
-    inverse_mass: float, stiffness: float, damping: float, inertance: float
-) -> tuple[list[float], list[float]]:
+def spring_row(inverse_mass: float, stiffness: float, damping: float, inertance: float) -> dict[str, list[float]]:
     """Returns the engine's ``solref`` and ``solimp`` of a constraint row that acts as spring, dashpot and inerter.
 
     A row's force is ``(-b v - k r - a) / R`` for a violation r, its rate v and its acceleration a, where
@@ -151,10 +132,10 @@ def spring_row(
     """
     impedance = inertance * inverse_mass / (1.0 + inertance * inverse_mass)
     compliance = inverse_mass * (1.0 - impedance) / impedance
-    return (
-        [-stiffness * compliance * impedance, -damping * compliance * impedance],
-        [impedance, impedance, 0.001, 0.5, 2.0],
-    )
+    return {
+        "solref": [-stiffness * compliance * impedance, -damping * compliance * impedance],
+        "solimp": [impedance, impedance, 0.001, 0.5, 2.0],
+    }
 
 
 def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> mujoco.MjsBody:
@@ -198,7 +179,7 @@ def add_rod(
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
     Args:
-        spec: The spec that holds the bodies.
+        spec: The spec that has the bodies.
         name: Name of the flex; the twist hinges are named after it.
         vertices_m: Rest positions, shape ``(n_vertices, 3)``.
         bodies: Body of each vertex, at the vertex's place; "world" fixes the vertex.
@@ -273,16 +254,8 @@ def _add_lateral_damper(
             if abs(share) > 1e-6:
                 tendon.wrap_joint(f"{body}_{letter}", float(weight * share))
     # An inertance as small as the vertices' own, and next to no stiffness: the engine wants both numbers.
-    solref, solimp = spring_row(inverse_inertia, 1e-12, damping, 1.0 / inverse_inertia)
-    spec.add_equality(
-        name=name,
-        type=mujoco.mjtEq.mjEQ_TENDON,
-        objtype=mujoco.mjtObj.mjOBJ_TENDON,
-        name1=name,
-        data=[0.0] * 12,
-        solref=solref,
-        solimp=solimp,
-    )
+    row = spring_row(inverse_inertia, 1e-12, damping, 1.0 / inverse_inertia)
+    add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, name, name, **row)
 
 
 def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float) -> Array:

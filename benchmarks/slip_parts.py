@@ -15,7 +15,7 @@ from annelid.analysis.gait import slip_cost
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store
 from annelid.output import write_csv
-from annelid_studies.slip.feedback import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
+from annelid_studies.slip import EXTENSION, PLAIN, PRESET, PRESSURE, TUNED_AT, case, percent
 
 HALF_STEP = {"clock.physics_timestep_s": 0.005, "duration_s": 10.0}
 

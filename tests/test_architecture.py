@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,10 @@ import annelid
 from annelid.config.kinds import every_kind
 
 SOURCE = Path(annelid.__file__).parent
-BASE = {"errors", "markdown", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
+BASE = {"errors", "lazy", "markdown", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
 MAY_IMPORT = {
     "errors": {"text"},
+    "lazy": set(),
     "markdown": {"text"},
     "protocols": set(),
     "clock": set(),
@@ -116,6 +118,21 @@ def test_nervous_system_and_geometry_know_numpy_only(module: Path) -> None:
     assert packages <= {"numpy"} | OPTIONAL.get(str(module.relative_to(SOURCE)), set())
 
 
+STUDIES = SOURCE.with_name("annelid_studies")
+
+
+@pytest.mark.parametrize("module", sorted(STUDIES.rglob("*.py")), ids=lambda path: str(path.relative_to(STUDIES)))
+def test_the_studies_see_only_public_names(module: Path) -> None:
+    """They are written against annelid as anybody's code is: names in the ``__all__`` of it and of its rooms."""
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            assert not [alias.name for alias in node.names if alias.name.split(".")[0] == "annelid"]
+        elif isinstance(node, ast.ImportFrom) and node.module is not None and node.module.split(".")[0] == "annelid":
+            assert node.module.count(".") <= 1, f"line {node.lineno}: {node.module} is no room"
+            public = import_module(node.module).__all__
+            assert {alias.name for alias in node.names} <= set(public), f"line {node.lineno}"
+
+
 def modules_of(package: Path) -> dict[str, Path]:
     """Every module of a package, by its full name."""
     names = {path: path.relative_to(package.parent).with_suffix("").parts for path in package.rglob("*.py")}
@@ -123,7 +140,7 @@ def modules_of(package: Path) -> dict[str, Path]:
 
 
 def test_no_circle_of_imports() -> None:
-    modules = modules_of(SOURCE) | modules_of(SOURCE.with_name("annelid_studies"))
+    modules = modules_of(SOURCE) | modules_of(STUDIES)
     needed: dict[str, set[str]] = {name: set() for name in modules}
     for name, path in modules.items():
         for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
@@ -184,5 +201,7 @@ def test_simulating_needs_neither_opengl_nor_matplotlib_nor_torch() -> None:
     assert loaded & {"OpenGL", "torch", "matplotlib", "sns_toolbox"} == set()
 
 
-def test_every_public_name_can_be_had() -> None:
-    assert all(getattr(annelid, name) is not None for name in annelid.__all__)
+@pytest.mark.parametrize("room", ["", *sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))])
+def test_every_public_name_can_be_had(room: str) -> None:
+    package = import_module(f"annelid.{room}" if room else "annelid")
+    assert all(getattr(package, name) is not None for name in getattr(package, "__all__", ()))

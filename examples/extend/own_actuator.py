@@ -8,7 +8,6 @@ Takes a few seconds.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, ClassVar, Literal
@@ -24,8 +23,6 @@ from annelid.body.actuators import PerSegment
 
 if TYPE_CHECKING:
     from annelid.body.actuators import Slopes
-    from annelid.body.estimates import Finding
-    from annelid.body.worm import WormBody
 
 
 class Winch(ActuatorKind):
@@ -34,10 +31,6 @@ class Winch(ActuatorKind):
     force_field: ClassVar[str] = "pull_N"
     kind: Literal["winch"] = "winch"
     pull_N: PerSegment = Field(default=2.0, description="tension at full activation")
-
-    def findings(self, body: WormBody) -> Iterator[Finding]:
-        """Doubts nothing."""
-        yield from ()
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
         """Adds one cable: MuJoCo's plainest actuator on the ring's tendon."""

@@ -11,13 +11,11 @@ The names below are loaded on first use, so that ``import annelid`` is quick and
 
 from __future__ import annotations
 
-from importlib import import_module
+from annelid.lazy import lazy
 
 # typing takes longer to load than all else here.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import Any
-
     from annelid.analysis import gait, summary
     from annelid.body.estimates import Finding
     from annelid.config import RunConfig, load_config, preset_names
@@ -29,28 +27,6 @@ if TYPE_CHECKING:
     from annelid.simulation.batch import BatchResult, simulate_batch
 
 __version__ = "0.1.0"
-
-_HOME = {
-    "BatchResult": "simulation.batch",
-    "Controller": "protocols",
-    "Finding": "plausibility",
-    "Network": "nervous",
-    "Plant": "protocols",
-    "Run": "simulation",
-    "RunConfig": "config",
-    "Sensation": "protocols",
-    "build_controller": "simulation",
-    "build_plant": "simulation",
-    "check": "plausibility",
-    "gait": "analysis",
-    "load_config": "config",
-    "open_run": "simulation",
-    "preset_names": "config",
-    "simulate": "simulation",
-    "simulate_batch": "simulation.batch",
-    "summary": "analysis",
-    "sweep": "experiment.sweep",
-}
 
 __all__ = [
     "BatchResult",
@@ -75,12 +51,4 @@ __all__ = [
     "sweep",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(f"annelid.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'annelid' has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__ = lazy(__name__)

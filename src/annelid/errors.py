@@ -10,6 +10,20 @@ from typing import Any
 
 from annelid.text import printable
 
+__all__ = [
+    "AnnelidError",
+    "ClusterError",
+    "ConfigError",
+    "MissingDependency",
+    "MixedEngine",
+    "RenderingUnavailable",
+    "RunFileError",
+    "RunKilled",
+    "SimulationStopped",
+    "UnreadableText",
+    "suggest",
+]
+
 MOST_SHOWN = 80
 """Characters of a value in an error sentence."""
 MOST_LISTED = 300

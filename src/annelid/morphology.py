@@ -21,6 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Array", "Indices", "MeshGeometry", "helical_mesh"]
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 

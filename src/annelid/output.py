@@ -13,6 +13,8 @@ from typing import Any
 from annelid.errors import RunFileError
 from annelid.text import printable
 
+__all__ = ["whole_file", "with_suffix", "write_csv", "write_json", "write_text"]
+
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:

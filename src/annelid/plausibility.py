@@ -16,6 +16,8 @@ from annelid.errors import ConfigError
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
+__all__ = ["check", "refuse_nonsense", "tolerance_window_m"]
+
 NUMERICAL_SHARE = 1 / 3
 """Share of the muscles' work lost to the integrator above which a run is doubtful."""
 IDLE_SHARE = 1e-3

@@ -15,6 +15,24 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "SIDES",
+    "Array",
+    "Controller",
+    "Doubtful",
+    "MultiRatePlant",
+    "Plant",
+    "Recordable",
+    "Records",
+    "Sensation",
+    "Signal",
+    "State",
+    "Stateful",
+    "StridingController",
+    "Values",
+    "Watched",
+]
+
 Array = NDArray[np.float64]
 State = dict[str, NDArray[np.generic]]
 """Named arrays whose shapes and dtypes never change during a run."""
@@ -72,7 +90,14 @@ class Plant(Protocol):
         ...
 
     def step(self, activation: Array) -> Sensation:
-        """Advances by one control step under ``activation``, shape ``(n_muscles,)``, each in [0, 1]."""
+        """Advances by one control step.
+
+        Args:
+            activation: Muscle activation, each in [0, 1], shape ``(n_muscles,)``.
+
+        Returns:
+            What the body senses at the end of the step.
+        """
         ...
 
 
@@ -84,7 +109,14 @@ class Controller(Protocol):
         ...
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step; returns activation in [0, 1], shape ``(n_muscles,)``."""
+        """Advances by one control step.
+
+        Args:
+            sensation: What the body senses at its beginning.
+
+        Returns:
+            Muscle activation in [0, 1], shape ``(n_muscles,)``.
+        """
         ...
 
 

@@ -14,6 +14,8 @@ from typing import Any
 from annelid.errors import UnreadableText, shortened
 from annelid.text import printable
 
+__all__ = ["read_json", "read_text", "read_toml", "toml_text", "toml_value"]
+
 MOST_BYTES = 8_000_000
 """Of a text that is read; the longest one that annelid writes, a network of 200 segments, has 6 MB."""
 MOST_LEVELS = 64

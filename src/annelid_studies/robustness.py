@@ -9,30 +9,26 @@ random states in turn; the paper's from its own start, its best case. The first 
 
 from __future__ import annotations
 
-import csv
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.resources import files
-from math import sqrt
 from pathlib import Path
 from typing import Any
 
-from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
-from annelid.analysis.rhythm import DESIGN_INTERVAL_S
+import numpy as np
+
+from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
-from annelid.experiment.fingerprint import code_fingerprint
-from annelid.experiment.store import Store, case_key
-from annelid.experiment.workers import Workers
-from annelid.markdown import plain_table
-from annelid.output import whole_file
+from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, Workers, case_key, code_fingerprint
+from annelid.markdown import Table, plain_table
+from annelid.output import write_text
 from annelid.plausibility import tolerance_window_m
-from annelid.simulation.lock import locks
+from annelid.simulation import locks
 from annelid.textfiles import read_json
-from annelid_studies.tables import tabulated
+from annelid_studies.tables import grouped
 from annelid_studies.worms import RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
@@ -46,34 +42,22 @@ CYCLES = 2.3
 STARTS = ("design", "silent", "random")
 """How the robust network starts, in turn."""
 TOGETHER = 8
-"""Points computed as one lot for each process, so that no process waits long for the lot's last run."""
+"""Points computed as one lot for each core, so that no process waits long for the lot's last run."""
 PERIOD_TOLERANCE = 0.1
 TIMED = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 0.0, "interval_s": DESIGN_INTERVAL_S}
 """A wave of the paper's turns: its muscles' rhythm is in time by construction, its segments' lengthening is not."""
 
-Progress = Callable[[str, int, int, float], object]
-"""Called with the stage, the number of points done, their total, and the share of the work that is done."""
-
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One point of the sample.
+    """One point of the sample."""
 
-    Attributes:
-        noise_m: Standard deviation of the noise on every reading of a stretch sensor, m.
-        friction: Friction of the floor.
-        physics_timestep_ms: Step of the body, whole ms.
-        n_segments: Number of segments.
-        young_modulus_Pa: Of the strands, Pa.
-        seed: Of the noise, and of the network's start.
-    """
-
-    noise_m: float
-    friction: float
-    physics_timestep_ms: int
-    n_segments: int
-    young_modulus_Pa: float
-    seed: int
+    noise_m: float  # Standard deviation of the noise on every reading of a stretch sensor, m
+    friction: float  # Friction of the floor
+    physics_timestep_ms: int  # Step of the body, whole ms
+    n_segments: int  # Number of segments
+    young_modulus_Pa: float  # Of the strands, Pa
+    seed: int  # Of the noise, and of how the network starts
 
     @property
     def design_period_s(self) -> float:
@@ -113,57 +97,30 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """How one point went under one controller.
+    """How one point went under one controller."""
 
-    Attributes:
-        point: Number of the point, from 0 in the order drawn.
-        controller: Kind of the controller.
-        n_segments: Segments of the worm that was run.
-        reason: What the score says, or why the run ended before its time.
-        period_s: Mean period, s; None if no segment repeats.
-        walked: Ordered, in one wave from front to rear, to the end.
-        in_time: Walked, with a period within 10 % of design.
-        lengthened: The segments lengthened in one wave from front to rear as well.
-        code: Digests of its run, with its configuration, code and engine, and of the code that judged it.
-    """
-
-    point: int
-    controller: str
-    n_segments: int
-    reason: str
-    period_s: float | None
-    walked: bool
-    in_time: bool
-    lengthened: bool
-    code: str
+    point: int  # Number of the point, from 0 in the order drawn
+    controller: str  # One of `CONTROLLERS`
+    n_segments: int  # Segments of the worm that was run
+    reason: str  # What the score says, or why the run ended before its time
+    period_s: float | None  # Mean period, s; None if no segment repeats
+    walked: bool  # Ordered, in one wave from front to rear, to the end
+    in_time: bool  # Walked, with a period within 10 % of design
+    lengthened: bool  # The segments lengthened in one wave from front to rear as well
+    code: str  # Digests of its run, with its configuration, code and engine, and of the code that judged it
 
 
 def points() -> tuple[Point, ...]:
     """Returns the sample as it was drawn once."""
-    text = files("annelid_studies").joinpath(TABLE).read_text(encoding="utf-8")
-    whole = {"physics_timestep_ms", "n_segments", "seed"}
-    rows: list[dict[str, Any]] = [
-        {name: int(value) if name in whole else float(value) for name, value in row.items()}
-        for row in csv.DictReader(text.splitlines())
-    ]
-    return tuple(Point(**row) for row in rows)
+    lines = files("annelid_studies").joinpath(TABLE).read_text(encoding="utf-8").splitlines()
+    return tuple(Point(*row) for row in np.genfromtxt(lines, delimiter=",", names=True, dtype=None).tolist())
 
 
 def judge(
     number: int, point: Point, controller: str, rhythm: RhythmScore, lengthening: RhythmScore, message: str = ""
 ) -> Judged:
-    """Judges the scores of one run.
-
-    Args:
-        number: Number of the point.
-        point: The point.
-        controller: Kind of the controller.
-        rhythm: The score of its activation.
-        lengthening: The score of its segments' lengthening.
-        message: Why the run ended before its time; empty if it did not.
-    """
-    walked = not message and rhythm.is_one_wave
-    period = rhythm.period_s
+    """Judges one run by the scores of its activation and of its segments' lengthening, and why it ended too early."""
+    walked, period = not message and rhythm.is_one_wave, rhythm.period_s
     return Judged(
         point=number,
         controller=controller,
@@ -189,22 +146,20 @@ def robustness(
     controllers: Sequence[str] = CONTROLLERS,
     n_segments: int | None = None,
     keep: bool = False,
-    jobs: int | None = None,
     workers: Workers | None = None,
-    progress: Progress | None = None,
+    progress: StudyProgress | None = None,
 ) -> list[Judged]:
-    """Walks the first points of the sample under each controller, as far as the folder does not tell how that goes.
+    """Walks the first points of the sample under each controller, as far as the folder does not have their judgement.
 
     Args:
         folder: Folder of the results; runs go to ``runs`` within it. Written after every run, so that a stopped study
             shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
         n_points: How many points, in the order drawn.
-        controllers: Kinds of controllers, of `CONTROLLERS`.
+        controllers: Some of `CONTROLLERS`.
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
             that costs less; None for the sample as it is.
         keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
-        jobs: Processes; default: one a core.
-        workers: Who computes the runs instead of processes of this machine.
+        workers: Who computes the runs; default: a process for each core.
         progress: Called before the first and after every run.
 
     Returns:
@@ -232,32 +187,30 @@ def robustness(
     cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
     store, total_s, before_s = Store(folder / "runs", workers), sum(case.cost_s for case in cases.values()), 0.0
 
-    def judge_what_is_there() -> None:
+    def in_order() -> list[Judged]:
+        return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
+
+    def judge_what_is_there(lot_s: float, _: int, __: int, share: float) -> None:
         for (kind, i), case in cases.items():
             if (kind, i) not in judged and case in store:
-                judged[kind, i] = _judged_run(store, case, i, chosen[i], kind)
-        _write(_sorted(judged), folder)
-
-    def tell(lot_s: float, _: int, __: int, share: float) -> None:
-        judge_what_is_there()
+                run = store.run(case)
+                scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+                judged[kind, i] = judge(i, chosen[i], kind, *scores, store[case].message)
+        found = shares(in_order())
+        write_text(
+            folder / RESULTS, json.dumps({"shares": found, "judged": [*map(asdict, in_order())]}, indent=1) + "\n"
+        )
+        write_text(folder / "robustness.md", shares_table(found) + "\n")
         if progress is not None:
             done = sum(key in judged for key in cases)
             progress("robustness", done, len(cases), (before_s + share * lot_s) / total_s)
 
-    in_order = list(cases.values())
-    size = TOGETHER * (jobs or os.cpu_count() or 1)
-    for lot in (in_order[first : first + size] for first in range(0, len(in_order), size)):
+    waiting, size = list(cases.values()), TOGETHER * (os.cpu_count() or 1)
+    for lot in (waiting[first : first + size] for first in range(0, len(waiting), size)):
         lot_s = sum(case.cost_s for case in lot)
-        store.compute(lot, jobs=jobs, progress=partial(tell, lot_s))
+        store.compute(lot, progress=partial(judge_what_is_there, lot_s))
         before_s += lot_s
-    return _sorted(judged)
-
-
-def _judged_run(store: Store, case: Case, number: int, point: Point, controller: str) -> Judged:
-    """Judges a point whose run the store has."""
-    run = store.run(case)
-    scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
-    return judge(number, point, controller, *scores, store[case].message)
+    return in_order()
 
 
 def read_judged(folder: Path) -> list[Judged]:
@@ -280,57 +233,30 @@ def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
 
     Returns:
         For every controller the number of points, of those walked, in time, and in time with their segments lengthening
-        in the same order, and the share in time with its 95 % interval after Wilson.
+        in the same order, and the share in time with its 95 % interval after Wilson 1927.
     """
+    from scipy.stats import binomtest
+
     found: dict[str, dict[str, Any]] = {}
-    for controller in dict.fromkeys(one.controller for one in judged):
-        of_it = [one for one in judged if one.controller == controller]
-        n, good = len(of_it), sum(one.in_time for one in of_it)
-        low, high = wilson(good, n)
-        walked = sum(one.walked for one in of_it)
+    for controller, own in grouped(judged, lambda one: one.controller).items():
+        n, good = len(own), sum(one.in_time for one in own)
         found[controller] = {
             "points": n,
-            "walked": walked,
+            "walked": sum(one.walked for one in own),
             "in_time": good,
-            "lengthened": sum(one.in_time and one.lengthened for one in of_it),
+            "lengthened": sum(one.in_time and one.lengthened for one in own),
             "share": good / n,
-            "interval": [low, high],
+            "interval": [*map(float, binomtest(good, n).proportion_ci(method="wilson"))],
         }
     return found
 
 
-def wilson(successes: int, n: int, z: float = 1.959964) -> tuple[float, float]:
-    """Interval of a share of ``successes`` out of ``n``, after Wilson 1927; by default of 95 %."""
-    share, z2 = successes / n, z * z / n
-    middle = (share + z2 / 2.0) / (1.0 + z2)
-    half = z * sqrt(share * (1.0 - share) / n + z2 / (4.0 * n)) / (1.0 + z2)
-    return max(middle - half, 0.0), min(middle + half, 1.0)
-
-
 def shares_table(found: Mapping[str, Mapping[str, Any]]) -> str:
     """Returns what `shares` counted as a Markdown table."""
-    columns: Mapping[str, Callable[[tuple[str, Mapping[str, Any]]], str]] = {
-        "controller": lambda row: f"`{row[0]}`",
-        "points": lambda row: str(row[1]["points"]),
-        "walked 1-2-..-N": lambda row: str(row[1]["walked"]),
-        "in time: within 10 % of the period": lambda row: str(row[1]["in_time"]),
-        "and so lengthened": lambda row: str(row[1]["lengthened"]),
-        "share in time (%)": lambda row: "{:.0f} ({:.0f} .. {:.0f})".format(
-            *(100 * share for share in (row[1]["share"], *row[1]["interval"]))
-        ),
-    }
-    return plain_table(tabulated(found.items(), columns))
-
-
-def _sorted(judged: Mapping[tuple[str, int], Judged]) -> list[Judged]:
-    return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
-
-
-def _write(judged: Sequence[Judged], folder: Path) -> None:
-    found = shares(judged)
-    content = {"shares": found, "judged": [asdict(one) for one in judged]}
-    folder.mkdir(parents=True, exist_ok=True)
-    texts = {RESULTS: json.dumps(content, indent=1), "robustness.md": shares_table(found)}
-    for name, text in texts.items():
-        with whole_file(folder / name) as draft:
-            draft.write_text(text + "\n", encoding="utf-8")
+    rows = []
+    for controller, of in found.items():
+        share, low, high = (100 * share for share in (of["share"], *of["interval"]))
+        counts = [str(of[name]) for name in ("points", "walked", "in_time", "lengthened")]
+        rows.append([f"`{controller}`", *counts, f"{share:.0f} ({low:.0f} .. {high:.0f})"])
+    counted = ["points", "walked 1-2-..-N", "in time: within 10 % of the period", "and so lengthened"]
+    return plain_table(Table(["controller", *counted, "share in time (%)"], rows))

@@ -1,42 +1,35 @@
-"""One way to lay readings out as a table: for the terminal, and for a report."""
+"""Readings grouped, and laid out as a table for the terminal, for a report, and as CSV."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
+
+from rich.table import Table as TerminalTable
 
 from annelid.markdown import Table
 from annelid.output import write_csv
 
-if TYPE_CHECKING:
-    from rich.table import Table as TerminalTable
+T, K = TypeVar("T"), TypeVar("K")
 
-T = TypeVar("T")
+
+def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
+    """Groups things by what a function returns for them, in the order in which they come."""
+    found: dict[K, list[T]] = {}
+    for item in items:
+        found.setdefault(key(item), []).append(item)
+    return found
 
 
 def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
-    """Makes a table from what stands in each column of a row.
-
-    Args:
-        rows: What was read, one thing a row.
-        columns: What each column writes of a row, by its head.
-    """
+    """Makes a table of things, one a row, from what each column writes of a row, by its head."""
     return Table(list(columns), [[cell(row) for cell in columns.values()] for row in rows])
 
 
 def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str = "") -> TerminalTable:
-    """Returns a table for the terminal.
-
-    Args:
-        table: Its head and cells.
-        title: What stands above it.
-        n_words: Columns of words, set flush left, before those of numbers.
-        caption: What stands below it.
-    """
-    from rich.table import Table as TerminalTable
-
+    """Returns a table for the terminal, of columns of words, set flush left, and then columns of numbers."""
     shown = TerminalTable(title=title, caption=caption or None)
     for i, head in enumerate(table.header):
         # Heads of numbers stand one word a line: on a narrow terminal words fold before numbers do.
@@ -48,17 +41,5 @@ def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str =
 
 
 def write_fields(kind: type[Any], readings: Iterable[Any], path: Path) -> Path:
-    """Writes readings as CSV, a column for every field and a row each.
-
-    Args:
-        kind: Their dataclass, with slots.
-        readings: What was read.
-        path: The file to write.
-
-    Returns:
-        The path.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
+    """Writes readings, of a dataclass with slots, as CSV, a column for every field and a row each."""
     return write_csv(path, kind.__slots__, map(astuple, readings))

@@ -6,20 +6,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from rich.table import Table as TerminalTable
 
-from annelid.analysis.track import Track, track_of, turn_of
-from annelid.draw.canvas import canvas, draw_lines, panel_title, save_both, segment_colors
-from annelid.experiment.case import Case
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store
-from annelid_studies.tables import tabulated, terminal_table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from rich.table import Table as TerminalTable
+from annelid.analysis import Track, track_of, turn_of
+from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
+from annelid.experiment import Case, Store
+from annelid_studies.tables import grouped, tabulated, terminal_table
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
@@ -31,23 +26,14 @@ LARGEST_RADIUS_M = 20.0
 
 @dataclass(frozen=True)
 class Gait:
-    """A pattern on a body.
+    """A pattern on a body."""
 
-    Attributes:
-        name: What tables and figures call it.
-        preset: Preset of body and pattern.
-        cycle_s: Time of a cycle; of a nervous system about that, which its rhythm then tells.
-        cycles: Cycles that a run takes; the first is left out.
-        changes: Fields that differ from the preset.
-        shares: Shares of the segments in the modulation; None for all alike.
-    """
-
-    name: str
-    preset: str
-    cycle_s: float
-    cycles: int
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    shares: tuple[float, ...] | None = None
+    name: str  # What tables and figures call it
+    preset: str  # Preset of body and pattern
+    cycle_s: float  # Time of a cycle; of a nervous system about that, and its rhythm has the exact one
+    cycles: int  # Cycles that a run takes; the first is left out
+    changes: Mapping[str, Any] = field(default_factory=dict)  # Fields that differ from the preset
+    shares: tuple[float, ...] | None = None  # Shares of the segments in the modulation; None for all alike
 
     def case(self, modulation: float) -> Case:
         """Returns its run under a constant modulation."""
@@ -69,64 +55,35 @@ GAITS = (
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What one run says.
+    """What one run under a constant modulation says."""
 
-    Attributes:
-        gait: Name of the gait.
-        modulation: The constant modulation, positive to the left.
-        wave: Whether segments contracted in the order 1-2-..-N throughout; None if the run is too short to tell.
-        cycle_s: Time of a cycle.
-        speed_m_per_s: Way of the body's middle from cycle to cycle, over time.
-        turn_deg_per_cycle: Change of the heading, positive to the left.
-        curvature_per_m: The same over the way.
-        radius_m: Radius of the circle; infinite for a straight way.
-        command: The command line that makes the run.
-    """
-
-    gait: str
-    modulation: float
+    gait: str  # Name of the gait
+    modulation: float  # Positive to the left, and so are the turn and its curvature
+    # Whether segments contracted in the order 1-2-..-N throughout; None if the run is too short to tell
     wave: bool | None
-    cycle_s: float
-    speed_m_per_s: float
-    turn_deg_per_cycle: float
-    curvature_per_m: float
-    radius_m: float
-    command: str
-
-
-@dataclass(frozen=True)
-class Turned:
-    """All readings, and the tracks that they were read from, in the same order."""
-
-    readings: tuple[Reading, ...]
-    tracks: tuple[Track, ...]
+    cycle_s: float  # Time of a cycle
+    speed_m_per_s: float  # Path of the body's middle from cycle to cycle, over time
+    turn_deg_per_cycle: float  # Change of the heading
+    curvature_per_m: float  # The same over the path
+    radius_m: float  # Radius of the circle; infinite for a straight path
+    command: str  # The command line that makes the run
 
 
 def turning(
-    store: Store,
-    modulations: Sequence[float] = MODULATIONS,
-    *,
-    gaits: Sequence[Gait] = GAITS,
-    jobs: int | None = None,
-    progress: StudyProgress | None = None,
-) -> Turned:
+    store: Store, modulations: Sequence[float] = MODULATIONS, gaits: Sequence[Gait] = GAITS
+) -> tuple[list[Reading], list[Track]]:
     """Runs every gait under every modulation, and measures the turns.
 
-    Args:
-        store: Where runs are kept.
-        modulations: Constant modulations.
-        gaits: Patterns on bodies.
-        jobs: Runs at a time, by default as many as there are cores.
-        progress: Called as the runs go on.
+    Returns:
+        The readings, and the tracks that they were read from, in the same order.
 
     Raises:
         RunFileError: A run ended before its second cycle.
-        KeyboardInterrupt: Runs in progress are dropped, all others kept.
     """
-    work = [(gait, modulation, gait.case(modulation)) for gait in gaits for modulation in modulations]
-    store.compute([case for _, _, case in work], jobs=jobs, progress=in_stage(progress, "turning"))
+    cases = [(gait, modulation, gait.case(modulation)) for gait in gaits for modulation in modulations]
+    store.compute([case for _, _, case in cases], "turning")
     readings, tracks = [], []
-    for gait, modulation, case in work:
+    for gait, modulation, case in cases:
         track, found = track_of(store.run(case)), store[case].summary
         timed = case.config.controller.kind == "timed"
         cycle_s = gait.cycle_s if timed or found.period_s is None else found.period_s
@@ -145,7 +102,7 @@ def turning(
             )
         )
         tracks.append(track)
-    return Turned(tuple(readings), tuple(tracks))
+    return readings, tracks
 
 
 def turning_table(readings: Sequence[Reading]) -> TerminalTable:
@@ -162,26 +119,19 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
     return terminal_table(tabulated(readings, columns), "Turning")
 
 
-def turning_picture(turned: Turned, stem: str | Path) -> Path:
+def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: Path) -> Path:
     """Draws curvature and radius of every gait against modulation, and the tracks of the second gait.
 
-    Args:
-        turned: What `turning` found.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
-
-    Raises:
-        RunFileError: A file cannot be written.
+    The tracks are the middles of the body, every one from the same start, with the outline at the end.
     """
-    curvatures = {}
-    for gait in dict.fromkeys(one.gait for one in turned.readings):
-        own = [(one.modulation, one.curvature_per_m) for one in turned.readings if one.gait == gait]
-        curvatures[gait] = tuple(np.array(own).T)
+    curvatures = {
+        gait: ([one.modulation for one in own], np.array([one.curvature_per_m for one in own]))
+        for gait, own in grouped(readings, lambda one: one.gait).items()
+    }
     radii = {gait: (x, 1.0 / np.maximum(np.abs(bend), 1e-9)) for gait, (x, bend) in curvatures.items()}
     shown = list(curvatures)[min(1, len(curvatures) - 1)]
-    pairs = zip(turned.readings, turned.tracks, strict=True)
+    pairs = zip(readings, tracks, strict=True)
+    of_shown = {one.modulation: track for one, track in pairs if one.gait == shown}
     with canvas(5.6) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.25])
         curvature, radius = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
@@ -193,20 +143,15 @@ def turning_picture(turned: Turned, stem: str | Path) -> Path:
         radius.set(ylabel="m", xlabel="modulation", yscale="log")
         radius.set_ylim(top=LARGEST_RADIUS_M)
         from_above = figure.add_subplot(grid[:, 1])
-        _draw_tracks(from_above, {one.modulation: track for one, track in pairs if one.gait == shown})
+        for (modulation, track), color in zip(sorted(of_shown.items()), segment_colors(len(of_shown)), strict=True):
+            start = track.middle_m[0]
+            from_above.plot(*(track.middle_m - start).T, color=color, linewidth=1.4)
+            from_above.plot(*(track.outline_m(-1) - start).T, color=color, linewidth=0.6)
+            x, y = track.front_m[-1] - start
+            from_above.annotate(f"{modulation:g}", (x, y), color=color, fontsize=7, ha="center", va="center")
+        from_above.set_aspect("equal")
+        from_above.set(xlabel="x (m)", ylabel="y (m)")
         panel_title(from_above, f"Tracks: {shown}")
         handles, labels = curvature.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         return save_both(figure, stem)
-
-
-def _draw_tracks(axes: Axes, tracks: Mapping[float, Track]) -> None:
-    """Middles of the body, every one from the same start, with the outline at the end, by modulation."""
-    for (modulation, track), color in zip(sorted(tracks.items()), segment_colors(len(tracks)), strict=True):
-        start = track.middle_m[0]
-        axes.plot(*(track.middle_m - start).T, color=color, linewidth=1.4)
-        axes.plot(*(track.outline_m(-1) - start).T, color=color, linewidth=0.6)
-        x, y = track.front_m[-1] - start
-        axes.annotate(f"{modulation:g}", (x, y), color=color, fontsize=7, ha="center", va="center")
-    axes.set_aspect("equal")
-    axes.set(xlabel="x (m)", ylabel="y (m)")

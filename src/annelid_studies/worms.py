@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
-from annelid.experiment.case import Case
+from annelid.experiment import Case
 
+Effort = Literal["quick", "full"]
+"""Coarse and within minutes, or the whole."""
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, rigid crossings, soft crossings in seconds."""
 PLANAR = "riddle2022-planar"
@@ -36,18 +38,9 @@ def fast(changes: Mapping[str, Any] | None = None) -> Case:
 
 
 def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: float = REST_S) -> dict[str, Any]:
-    """Returns the changes that make a run open-loop: each segment contracted in turn, the others at rest.
-
-    Args:
-        n_segments: Segments of the worm.
-        hold_s: How long each is contracted, s.
-        rest_s: How long all rest before the next, s.
-    """
+    """Returns the changes that make a run open-loop: each segment contracted in turn, then all at rest for a while."""
     starts = [round(i * (hold_s + rest_s), 9) for i in range(n_segments)]
     contractions = [
         {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
     ]
-    return {
-        "controller": {"kind": "program", "contractions": contractions},
-        "duration_s": contractions[-1]["stop_s"],
-    }
+    return {"controller": {"kind": "program", "contractions": contractions}, "duration_s": contractions[-1]["stop_s"]}

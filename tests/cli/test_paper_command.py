@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -11,14 +12,15 @@ import pytest
 from outcome import Command
 
 from annelid.errors import ConfigError
+from annelid.experiment import Workers
 from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
-from annelid_studies.riddle2023.contents import Claim, Report
-from annelid_studies.riddle2023.examination import Effort, Table
+from annelid_studies.riddle2023.contents import Claim, Report, Table
+from annelid_studies.worms import Effort
 
 CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")
 REPORT = Report("full", ["It walks."], Table(["period, s"], [["2.629"]]), [], [CLAIM], [], {"annelid": "0"})
 
-Asked = list[tuple[Path, Effort, Sequence[str] | None, int | None]]
+Asked = list[tuple[Path, Effort, Sequence[str] | None, int]]
 
 
 @pytest.fixture
@@ -27,9 +29,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
     calls: Asked = []
 
     def reproduce(
-        folder: Path, effort: Effort, *, only: Sequence[str] | None, jobs: int | None, workers: None, progress: Any
+        folder: Path, effort: Effort, *, only: Sequence[str] | None, workers: Workers, progress: Any
     ) -> Report:
-        calls.append((folder, effort, only, jobs))
+        calls.append((folder, effort, only, workers.slots()))
         if progress is not None:
             progress("running worms", 1, 2, 0.5)
         return REPORT
@@ -50,7 +52,7 @@ def test_writes_the_report_and_prints_its_paths(annelid: Command, asked: Asked) 
     assert done.exit_code == 0, done.err
     assert done.out.split() == ["report/report.html", "report/report.md"]
     assert all(Path(path).stat().st_size > 0 for path in done.out.split())
-    assert asked == [(Path("report"), "full", None, None)]
+    assert asked == [(Path("report"), "full", None, os.cpu_count())]
 
 
 def test_hands_its_options_on(annelid: Command, asked: Asked) -> None:

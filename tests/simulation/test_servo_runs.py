@@ -10,8 +10,7 @@ import pytest
 from small_robot import assert_equal, small_config
 
 from annelid import open_run, simulate, simulate_batch
-from annelid.analysis import summary
-from annelid.analysis.paper import ROBOT_ELONGATION_M
+from annelid.analysis import ROBOT_ELONGATION_M, summary
 
 
 def test_a_continued_run_is_the_whole_run_bit_for_bit(tmp_path: Path) -> None:

@@ -12,16 +12,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.body.worm import WormBody
 from annelid.config import LEVELS, load_config
 from annelid.errors import ConfigError
+from annelid_studies.bench import benchmark as store_module
 from annelid_studies.bench import peer as peer_module
-from annelid_studies.bench import store as store_module
-from annelid_studies.bench.benchmark import JSON_NAME, bench, errors, exponent, front, judge
+from annelid_studies.bench.benchmark import (
+    JSON_NAME,
+    MeasurementFailed,
+    Measurements,
+    bench,
+    errors,
+    exponent,
+    front,
+    judge,
+)
 from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
 from annelid_studies.bench.measure import measure, peak_memory_bytes
 from annelid_studies.bench.report import bench_figure, bench_table
-from annelid_studies.bench.store import MeasurementFailed, Measurements
 from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
 from annelid_studies.worms import CHAIN, RODS
 
@@ -322,8 +329,7 @@ def test_peak_memory_grows_by_what_is_allocated() -> None:
 
 class TestPeer:
     def test_the_step_is_the_stability_limit_of_a_section_turning_against_shear(self) -> None:
-        body = load_config(CHAIN).body
-        assert isinstance(body, WormBody)
+        body = peer_module.papers_body()
         strands = body.strands
         area, inertia = math.pi * strands.radius_m**2, math.pi * strands.radius_m**4 / 4
         stiffness = peer_module.SHEAR_CORRECTION * strands.shear_modulus_Pa * area
@@ -338,12 +344,12 @@ class TestPeer:
                 angle += 0.5 * step * speed
             return abs(angle) > 100.0
 
-        limit = peer_module.stable_step_s(strands)
+        limit = peer_module.stable_step_s(body)
         assert not grows(0.99 * limit)
         assert grows(1.01 * limit)
 
     def test_a_missing_peer_is_told_with_the_line_that_installs_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(peer_module, "find_spec", lambda name: None)
+        monkeypatch.setattr(peer_module, "PACKAGE", "annelid-has-no-such-peer")
         assert peer_module.peer() == {"installed": False, "install": "pip install pyelastica"}
 
     def test_a_missing_peer_is_asked_for_again(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

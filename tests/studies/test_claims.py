@@ -8,19 +8,18 @@ from math import nan
 from pathlib import Path
 
 import pytest
-from test_examinations_a import WAVE, results, synthetic
+from test_examinations_a import WAVE, Made, results, synthetic
 
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome, outcome
-from annelid.experiment.store import Store, case_key
+from annelid.experiment.store import case_key
 from annelid.simulation.loop import simulate
-from annelid_studies.riddle2023.claims.behaviour import cost_claim
-from annelid_studies.riddle2023.claims.discussion import cause_claim, friction_claim, noise_claim
+from annelid_studies.riddle2023.claims.discussion import cause_claim, cost_claim, friction_claim, noise_claim
 from annelid_studies.riddle2023.claims.evidence import Evidence, judged, near
 from annelid_studies.riddle2023.claims.model import elements_claim, pins_claim, velocity_claim
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
+from annelid_studies.riddle2023.contents import Examination, Findings, Table
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
-from annelid_studies.worms import FAST, rods
+from annelid_studies.worms import FAST, Effort, rods
 
 SIX_SPRINGS = (0.392, 0.302, 0.284, 0.334, 0.285, 0.322)
 """How far segment 2 stays below segment 1 by each of the springs; the paper says 39.4 %."""
@@ -35,9 +34,9 @@ class Told(Evidence):
     """Evidence of one run that stands for all."""
 
     def __init__(
-        self, findings: Mapping[str, Findings], effort: Effort, made: Outcome, results: Results | None = None
+        self, findings: Mapping[str, Findings], effort: Effort, made: Outcome, store: Made | None = None
     ) -> None:
-        super().__init__(Store(Path("unused")), results or Results({}, case_key), effort, dict(findings))
+        super().__init__(store or Made({}), effort, dict(findings))
         self.__dict__["runs"] = [(made, None)]
 
 
@@ -71,7 +70,7 @@ def test_a_property_holds_where_all_have_it() -> None:
 def test_no_time_of_computing_enters_a_verdict(made: Outcome) -> None:
     for seconds in (0.0, 1.0, 1e5):
         timed = replace(made, cpu_time_s=seconds)
-        fast = Results({case_key(Case(FAST)): timed}, case_key)
+        fast = Made({case_key(Case(FAST)): timed})
         assert cost_claim(Told({}, "quick", timed, fast)).verdict == "not testable here"
 
 

@@ -11,15 +11,13 @@ from annelid.analysis.gait import Gait
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
 from annelid.experiment.tune import Judged
 from annelid_studies.crawling import (
     VALUES,
-    Point,
     Reading,
     changes_for,
     crawling_table,
-    points,
+    runs,
     write_figure,
     write_readings,
 )
@@ -48,11 +46,11 @@ def test_a_ground_changes_nothing_but_friction() -> None:
 
 def test_planar_worms_are_refused() -> None:
     with pytest.raises(ConfigError, match="needs a 3D worm"):
-        points(["riddle2022-planar"], "quick")
+        runs(["riddle2022-planar"], "quick")
 
 
 def test_both_quantities_pass_through_the_gait_s_own_worm() -> None:
-    chosen = points([MUSCLES, SERVOS], "full")
+    chosen = runs([MUSCLES, SERVOS], "full")
     assert len(chosen) == 2 * sum(len(of["full"]) for of in VALUES.values())
     for gait in (MUSCLES, SERVOS):
         own = load_config(gait)
@@ -60,17 +58,17 @@ def test_both_quantities_pass_through_the_gait_s_own_worm() -> None:
         assert own.arena is not None
         present = {"friction": own.arena.friction, "segments": float(own.body.mesh.n_segments)}
         for quantity, value in present.items():
-            point = next(one for one in chosen if (one.gait, one.quantity, one.value) == (gait, quantity, value))
-            assert load_config(gait, dict(point.case.changes)) == own
+            [case] = [case for point, case in chosen.items() if point == (gait, quantity, value)]
+            assert load_config(gait, dict(case.changes)) == own
 
 
 def readings() -> list[Reading]:
     """Of two gaits; the second does not walk with few segments."""
     found = []
-    for point in points([MUSCLES, SERVOS], "quick"):
-        walks = point.gait == MUSCLES or point.value != 3
-        gait = Gait(cycles=3, speed_m_per_s=0.1 * point.value, cost_of_transport=1.5, slip_ratio=0.3)
-        found.append(Reading(point, Judged(gait, "" if walks else "silent: stalled")))
+    for name, quantity, value in runs([MUSCLES, SERVOS], "quick"):
+        walks = name == MUSCLES or value != 3
+        gait = Gait(cycles=3, speed_m_per_s=0.1 * value, cost_of_transport=1.5, slip_ratio=0.3)
+        found.append(Reading(name, quantity, value, Judged(gait, "" if walks else "silent: stalled")))
     return found
 
 
@@ -79,15 +77,11 @@ def test_every_point_is_a_row_and_what_does_not_walk_has_no_numbers(tmp_path: Pa
     rows = list(csv.DictReader((tmp_path / "speed.csv").open()))
     assert len(rows) == len(readings())
     for row, reading in zip(rows, readings(), strict=True):
-        assert (row["gait"], row["quantity"], float(row["value"])) == (
-            reading.point.gait,
-            reading.point.quantity,
-            reading.point.value,
-        )
+        assert (row["gait"], row["quantity"], float(row["value"])) == reading[:3]
         if reading.judged.problem:
             assert (row["speed_m_per_s"], row["slip_ratio"], row["problem"]) == ("", "", "silent: stalled")
         else:
-            assert float(row["speed_m_per_s"]) == pytest.approx(0.1 * reading.point.value)
+            assert float(row["speed_m_per_s"]) == pytest.approx(0.1 * reading.value)
 
 
 def test_the_figure_and_the_tables_take_gaits_that_do_not_walk(tmp_path: Path) -> None:
@@ -99,8 +93,8 @@ def test_the_figure_and_the_tables_take_gaits_that_do_not_walk(tmp_path: Path) -
 
 
 def test_a_reading_s_number_is_its_gait_s() -> None:
-    point = Point(MUSCLES, "friction", 0.7, Case(MUSCLES))
     gait = Gait(cycles=3, speed_m_per_s=0.1, cost_of_transport=1.5)
-    assert Reading(point, Judged(gait, "")).number("cost_of_transport") == 1.5
-    assert Reading(point, Judged(gait, "")).number("slip_ratio") is None
-    assert Reading(point, Judged(gait, "does not advance")).number("cost_of_transport") is None
+    walks, rests = (Reading(MUSCLES, "friction", 0.7, Judged(gait, problem)) for problem in ("", "does not advance"))
+    assert walks.number("cost_of_transport") == 1.5
+    assert walks.number("slip_ratio") is None
+    assert rests.number("cost_of_transport") is None

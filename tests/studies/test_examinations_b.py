@@ -12,7 +12,7 @@ from annelid.analysis import RhythmScore
 from annelid.config import load_config
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store, case_key
-from annelid_studies.riddle2023.examination import Effort, Examination, Results
+from annelid_studies.riddle2023.contents import Examination
 from annelid_studies.riddle2023.examinations.design import RIGID
 from annelid_studies.riddle2023.examinations.discretization import DISCRETIZATION, convergence_order
 from annelid_studies.riddle2023.examinations.gate import FLAT, GATE, read_beat
@@ -33,7 +33,7 @@ from annelid_studies.riddle2023.examinations.timestep import (
     start_case,
     velocity_limit,
 )
-from annelid_studies.worms import CHAIN, chain, rods
+from annelid_studies.worms import CHAIN, Effort, chain, rods
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -120,8 +120,8 @@ def test_no_order_is_told_where_there_is_none() -> None:
 def test_tight_rods_keep_within_the_muscles_limit(tmp_path: Path) -> None:
     case = start_case(RIGID, 0.005)
     store = Store(tmp_path)
-    outcomes = store.compute([case], jobs=1)
-    outcome = Results(outcomes, case_key)[case]
+    store.compute([case])
+    outcome = store[case]
     assert 0.3 < read_start(outcome).times_limit(EARLY_S) < 1.0
     assert outcome.message == ""
 
@@ -131,15 +131,15 @@ def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytes
 
     pairs = (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler"))
     monkeypatch.setattr(gate, "VARIANTS", {"quick": {FLAT: pairs}})
-    outcomes = Store(tmp_path).compute(GATE.cases("quick"), jobs=1)
-    results = Results(outcomes, case_key)
-    findings = GATE.examine(results, "quick", tmp_path / "gate")
+    store = Store(tmp_path)
+    store.compute(GATE.cases("quick"))
+    findings = GATE.examine(store, "quick", tmp_path / "gate")
     # Measured independently on the authors' network: forward Euler, and SNS-Toolbox's order.
     assert findings.numbers["period_planar_toolbox_euler_s"] == pytest.approx(2.625, abs=0.001)
     assert findings.numbers["period_planar_toolbox_toolbox_s"] == pytest.approx(2.631, abs=0.001)
     assert {"gate.svg", "gate.png"} <= {path.name for path in tmp_path.iterdir()}
     cases = {start: gate.variant(FLAT, start, "euler") for start in gate.STARTS}
-    long, short = (read_beat(FLAT, start, "euler", results[case]).first_s for start, case in cases.items())
+    long, short = (read_beat(FLAT, start, "euler", store[case]).first_s for start, case in cases.items())
     assert long > 5 * short
 
 

@@ -25,7 +25,7 @@ COMPUTING = sorted(
 
 def test_the_key_of_a_run_covers_all_that_computes_it_and_nothing_else() -> None:
     modules = modules_behind(*PHYSICS)
-    others = ("engine", "errors", "plausibility", "protocols", "registry", "text", "textfiles")
+    others = ("engine", "errors", "output", "plausibility", "protocols", "registry", "text", "textfiles")
     rooms = {".".join(name.split(".")[:2]) for name in modules}
     assert rooms == {*PHYSICS, *(f"annelid.{room}" for room in others)}
     assert {name_of(path) for path in COMPUTING} <= modules
@@ -37,6 +37,12 @@ def test_the_key_of_an_outcome_covers_all_that_reads_it() -> None:
     readers = ("experiment.outcome", "analysis.summary", "analysis.gait", "analysis.rhythm", "simulation.runfile")
     assert {f"annelid.{name}" for name in readers} <= modules
     assert not {name for name in modules if name.split(".")[1] in ("draw", "live", "cli", "export")}
+
+
+def test_a_module_is_found_where_a_package_loads_its_names_on_first_use() -> None:
+    modules = modules_behind("annelid_studies.robustness")
+    assert {"annelid.analysis.rhythm", "annelid.experiment.store", "annelid_studies.tables"} <= modules
+    assert "annelid.experiment.tune" not in modules
 
 
 def test_a_module_is_found_by_its_import_wherever_it_stands(copied: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from annelid import load_config, open_run, simulate
-from annelid.analysis.passage import Passage, passage_of
+from annelid.analysis import Passage, passage_of
 from annelid.arena.kinds.pipe import Pipe
 from annelid.control.robust import RobustSns
 from annelid.errors import RunFileError
@@ -20,9 +20,8 @@ from annelid_studies.pipes import (
     NARROW_ARENAS,
     PRESET,
     RADII_M,
-    Passages,
+    Course,
     Reading,
-    Way,
     pipes_picture,
     pipes_table,
     trials,
@@ -91,10 +90,10 @@ def test_readings_are_written_and_told(tmp_path: Path) -> None:
 
 def test_the_picture_shows_whatever_there_is(tmp_path: Path) -> None:
     front = np.linspace(0.0, 1.0, 20)
-    way = Way(front, np.full(20, 0.15), 0.01 + 0.0 * front, front, 0.9 - 0.2 * front)
-    some = Passages((reading(), reading(radius_m=0.3, passed=False)), {("taper", FIXED): way})
-    for found in (some, Passages((), {})):
-        path = pipes_picture(found, tmp_path / "pipes")
+    course = Course(front, np.full(20, 0.15), 0.01 + 0.0 * front, front, 0.9 - 0.2 * front)
+    some = [reading(), reading(radius_m=0.3, passed=False), reading(radius_m=0.9, speed_m_per_s=np.nan)]
+    for readings, courses in ((some, {("taper", FIXED): course}), ([], {})):
+        path = pipes_picture(readings, courses, tmp_path / "pipes")
         assert path.stat().st_size > 1000
         assert path.with_suffix(".svg").exists()
 

@@ -15,8 +15,7 @@ from annelid.draw.canvas import canvas, save_both
 from annelid.errors import RunFileError
 from annelid.markdown import anchors, cell, code, words
 from annelid.text import printable
-from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, Verdict
-from annelid_studies.riddle2023.examination import Examination, Findings, Table
+from annelid_studies.riddle2023.contents import Claim, Examination, Examined, Figure, Findings, Report, Table, Verdict
 from annelid_studies.riddle2023.report import CLAIMS_COMMAND, claims_page, write_report
 
 COMMAND = """annelid run riddle2023 --set 'controller={kind = "program", ramp_s = 0.1}' --set arena.friction=0.3"""

@@ -8,11 +8,12 @@ import pytest
 
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
+from annelid.experiment.store import Store
 from annelid_studies.riddle2023 import paper
 from annelid_studies.riddle2023.claims import claim_cases
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results, Table
+from annelid_studies.riddle2023.contents import Examination, Findings, Table
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
-from annelid_studies.worms import PLANAR, RODS, one_after_the_other
+from annelid_studies.worms import PLANAR, RODS, Effort, one_after_the_other
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -20,9 +21,9 @@ SHORT = Case(PLANAR, {"duration_s": 0.2})
 SLOWER = Case(PLANAR, {"duration_s": 0.2, "controller.gate_time_constant_ms": 250})
 
 
-def examine(results: Results, effort: Effort, stem: Path) -> Findings:
+def examine(store: Store, effort: Effort, stem: Path) -> Findings:
     stem.with_suffix(".png").write_bytes(b"drawn")
-    names = [results[case].summary.name for case in (SHORT, SLOWER)]
+    names = [store[case].summary.name for case in (SHORT, SLOWER)]
     return Findings(f"Two runs of {names[0]}.", "Nothing.", Table(["run"], [[name] for name in names]))
 
 
@@ -35,24 +36,11 @@ def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paper, "MAIN", SHORT)
     monkeypatch.setattr(paper, "VARIANTS", {PLANAR: SHORT})
     monkeypatch.setattr(paper, "_QUICK", (PLANAR,))
-    monkeypatch.setattr(paper, "published", lambda config: THEIRS)
-
-
-class _Value:
-    def __init__(self, value: object) -> None:
-        self.value = value
-
-
-THEIRS = {
-    "elongation_first_helix_pp_m": _Value((0.0420, 0.0255, 0.0402)),
-    "middle_deficit": _Value(0.394),
-    "end_difference": _Value(0.0445),
-}
 
 
 @pytest.mark.usefixtures("tiny")
 def test_one_examination_alone_makes_a_report_of_its_own(tmp_path: Path) -> None:
-    report = paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1)
+    report = paper.reproduce(tmp_path, "quick", only=["tiny"])
     assert [each.examination.name for each in report.examinations] == ["tiny"]
     assert report.claims == []
     assert report.figures == []
@@ -64,15 +52,15 @@ def test_one_examination_alone_makes_a_report_of_its_own(tmp_path: Path) -> None
 
 @pytest.mark.usefixtures("tiny")
 def test_a_second_call_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1)
+    first = paper.reproduce(tmp_path, "quick", only=["tiny"])
     monkeypatch.setattr("annelid.experiment.workers.ProcessPoolExecutor", None)
-    assert paper.reproduce(tmp_path, "quick", only=["tiny"], jobs=1).main_table == first.main_table
+    assert paper.reproduce(tmp_path, "quick", only=["tiny"]).main_table == first.main_table
 
 
 @pytest.mark.usefixtures("tiny")
 def test_progress_tells_stage_and_ends_at_the_whole(tmp_path: Path) -> None:
     told: list[tuple[str, int, int, float]] = []
-    paper.reproduce(tmp_path, only=["tiny"], jobs=1, progress=lambda *step: told.append(step))
+    paper.reproduce(tmp_path, only=["tiny"], progress=lambda *step: told.append(step))
     assert told[0][0] == "running worms"
     assert told[-1][1:] == (1, 1, 1.0)
     assert all(0 <= share <= 1 for *_, share in told)

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from annelid.analysis.detector import DetectionScore
-from annelid.analysis.gait import SlipCost
+from annelid.analysis import DetectionScore, SlipCost
 from annelid.config import load_config
 from annelid.control.sns import PressureSns, Sns
 from annelid.errors import ConfigError
 from annelid.experiment.store import Store
-from annelid_studies.slip.detection import CASES, write_scores
-from annelid_studies.slip.feedback import (
+from annelid_studies.slip import (
+    CASES,
     DURATION_S,
     EXTENSION,
     FEEDBACKS,
@@ -28,6 +27,7 @@ from annelid_studies.slip.feedback import (
     feedback_table,
     slip_feedback,
     write_readings,
+    write_scores,
 )
 
 
@@ -49,7 +49,7 @@ def test_only_the_feedback_differs(preset: str) -> None:
 
 def test_a_gait_of_another_robot_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="preset is 'riddle2023': must be one of riddle2025-muscles, crawler"):
-        slip_feedback(Store(tmp_path), [1.0], preset="riddle2023")
+        slip_feedback(Store(tmp_path), [1.0], "riddle2023")
 
 
 def reading(feedback: str, friction: float, speed: float, loss: float) -> Reading:
@@ -88,7 +88,7 @@ def test_scores_are_written_under_their_names(tmp_path: Path) -> None:
 def test_pressure_feedback_saves_slip_at_no_less_speed(tmp_path: Path, friction: float) -> None:
     """On frictions that it was not tuned on."""
     assert friction not in TUNED_AT
-    readings = slip_feedback(Store(tmp_path), [friction], jobs=1)
+    readings = slip_feedback(Store(tmp_path), [friction])
     pressure = next(one for one in readings if one.feedback == PRESSURE)
     assert pressure.one_wave
     gains = compared(readings, pressure)

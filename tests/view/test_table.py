@@ -70,7 +70,7 @@ def test_a_reproduction_is_claimed_if_and_only_if_order_period_and_each_elongati
     agrees = not swapped and abs(period - 1.0) < 0.01 and max(apart) < 0.05
     sentence = closing_sentence(numbers, FAST)
     assert ("does not reproduce" not in sentence) == agrees
-    assert ("reproduces order, period and elongation" in sentence) == agrees
+    assert ("reproduces order, period and mean elongation" in sentence) == agrees
     assert ("order 3-2-1" in sentence) == swapped
     for segment, one in enumerate(apart, start=1):
         assert (f"elongation of segment {segment} " in sentence) == (one > 0.05)

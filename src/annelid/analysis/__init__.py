@@ -1,7 +1,82 @@
-"""From a run to numbers: rhythm, elongation, forces, travel, gait."""
+"""From a run to numbers: rhythm, elongation, forces, travel, turns, slip, gait.
+
+What reads a whole run is loaded at once; the names below it, parts of such readings, on first use.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from annelid.analysis.gait import Gait, gait
 from annelid.analysis.rhythm import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.summary import Summary, summary
+from annelid.lazy import lazy
 
-__all__ = ["Gait", "RhythmScore", "Summary", "gait", "lengthening_score", "rhythm_score", "summary"]
+if TYPE_CHECKING:
+    from annelid.analysis.detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
+    from annelid.analysis.gait import SlipCost, slip_cost
+    from annelid.analysis.paper import (
+        PAPER_ELONGATION_M,
+        PAPER_END_DIFFERENCE,
+        PAPER_MIDDLE_DEFICIT,
+        ROBOT_ELONGATION_M,
+    )
+    from annelid.analysis.passage import Passage, passage_of
+    from annelid.analysis.rhombi import (
+        Deformation,
+        actuated,
+        deformation,
+        distance_from_ring_m,
+        nearest_frame,
+        plane_means,
+        rhombus_diagonals,
+        rhombus_plane,
+    )
+    from annelid.analysis.rhythm import CONTRACTED, DESIGN_INTERVAL_S, SHORTEST_S, contractions, segment_activation
+    from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
+    from annelid.analysis.track import Track, forward_position, track_of, turn_of
+
+__all__ = [
+    "CONTRACTED",
+    "DESIGN_INTERVAL_S",
+    "PAPER_ELONGATION_M",
+    "PAPER_END_DIFFERENCE",
+    "PAPER_MIDDLE_DEFICIT",
+    "ROBOT_ELONGATION_M",
+    "SHORTEST_S",
+    "Deformation",
+    "Detection",
+    "DetectionScore",
+    "Gait",
+    "Passage",
+    "RhythmScore",
+    "SlipCost",
+    "Summary",
+    "Track",
+    "actuated",
+    "contractions",
+    "deformation",
+    "detect_slip",
+    "distance_from_ring_m",
+    "end_difference",
+    "forward_position",
+    "gait",
+    "interior_deficit",
+    "lengthening_score",
+    "middle_deficit",
+    "nearest_frame",
+    "passage_of",
+    "plane_means",
+    "precision_recall",
+    "rhombus_diagonals",
+    "rhombus_plane",
+    "rhythm_score",
+    "score_detections",
+    "segment_activation",
+    "slip_cost",
+    "summary",
+    "track_of",
+    "turn_of",
+]
+
+__getattr__, __dir__ = lazy(__name__)

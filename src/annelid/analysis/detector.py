@@ -32,7 +32,7 @@ class Detection:
     bears: Bools  # where the detector finds enough load for slip
 
     def alarms(self, limit_m_per_s: float) -> Bools:
-        """Returns where the detector reports slip with this limit."""
+        """Returns where the detector reports slip with this limit, ``(n_times, n_segments)``."""
         return (np.abs(self.estimated_m_per_s) > limit_m_per_s) & self.bears
 
 
@@ -51,7 +51,11 @@ class DetectionScore:
 
 
 def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
-    """Has a detector (default: `SlipDetector` as it is) read a run sample by sample, with the true slip beside it.
+    """Has a detector read a run sample by sample, with the true slip beside it.
+
+    Args:
+        run: The run of a 3D worm.
+        detector: The detector; default: `annelid.control.slip_detector.SlipDetector` as it is.
 
     Raises:
         RunFileError: The run has no touch.
@@ -83,7 +87,12 @@ def _windowed(signal: Array, width: int) -> Array:
 
 
 def score_detections(detections: list[Detection], limit_m_per_s: float) -> DetectionScore:
-    """Scores a detector, which reports slip above an estimated speed, over the runs of some detections together."""
+    """Scores a detector over several runs together.
+
+    Args:
+        detections: What it made of each run.
+        limit_m_per_s: Estimated speed above which it reports slip, m/s.
+    """
     n_false = episodes = 0
     delays = list[float]()
     alarms = [one.alarms(limit_m_per_s) for one in detections]
@@ -118,6 +127,14 @@ def _share(part: float, whole: float) -> float:
 
 
 def precision_recall(detections: list[Detection], limits_m_per_s: Array) -> tuple[Array, Array]:
-    """Returns recall and precision over some runs together for every limit, ``(n_limits,)`` each."""
+    """Scores a detector over several runs together for every limit.
+
+    Args:
+        detections: What it made of each run.
+        limits_m_per_s: Estimated speeds above which it reports slip, m/s, ``(n_limits,)``.
+
+    Returns:
+        Recall and precision, each ``(n_limits,)``.
+    """
     scores = [score_detections(detections, float(limit)) for limit in limits_m_per_s]
     return np.array([one.recall for one in scores]), np.array([one.precision for one in scores])

@@ -16,8 +16,14 @@ from annelid.config.run import published_worms
 from annelid.control.sns import paper_controller
 from annelid.textfiles import parse_json
 
-ROBOT_ELONGATION_M: tuple[float, ...] = tuple(published_worms()["wang"][0]["numbers"]["elongation_mean_max_m"][0])
+_ROBOT, _WORM = (published_worms()[name][0]["numbers"] for name in ("wang", "riddle2023"))
+ROBOT_ELONGATION_M: tuple[float, ...] = tuple(_ROBOT["elongation_mean_max_m"][0])
 """Largest elongation of the robot's segments 1-4 while it walks straight on flat ground, m."""
+PAPER_ELONGATION_M: tuple[float, ...] = tuple(_WORM["elongation_first_helix_pp_m"][0])
+"""Largest elongation of the segments of the paper's worm of three, m."""
+PAPER_MIDDLE_DEFICIT: float = _WORM["middle_deficit"][0]
+PAPER_END_DIFFERENCE: float = _WORM["end_difference"][0]
+"""How far segment 2 stays below segment 1 by these, and segment 3, as the paper states them."""
 FORMULATION = "riddle2023"
 """The preset that rebuilds the paper's worm in the paper's own formulation, and the name of what it publishes."""
 

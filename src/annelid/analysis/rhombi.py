@@ -66,7 +66,15 @@ def actuated(geometry: MeshGeometry) -> NDArray[np.bool_]:
 
 
 def distance_from_ring_m(geometry: MeshGeometry, segment: int) -> Array:
-    """Distance along the resting body from a segment's ring (from 0) to each rhombus' middle, m, negative forwards."""
+    """Distance along the resting body from the ring of a segment to the middle of each rhombus.
+
+    Args:
+        geometry: The mesh at rest.
+        segment: The segment, from 0.
+
+    Returns:
+        Distances, m, negative towards the front, ``(n_rhombi,)``.
+    """
     return geometry.plane_x_m[rhombus_plane(geometry)] - geometry.plane_x_m[geometry.ring_planes[segment]]
 
 

@@ -39,11 +39,25 @@ class Surface(ABC):
         """
 
     def distance_m(self, points_m: Array) -> Array:
-        """Returns signed distances, m, ``(...)``, of points, m, ``(..., 3)``, as `nearest` does."""
+        """Finds signed distances of points from the surface.
+
+        Args:
+            points_m: Points, m, ``(..., 3)``.
+
+        Returns:
+            Distances, m, ``(...)``: positive in free space, negative inside the ground.
+        """
         return self.nearest(points_m)[0]
 
     def normal(self, points_m: Array) -> Array:
-        """Returns unit normals, ``(..., 3)``, nearest to points, m, ``(..., 3)``, as `nearest` does."""
+        """Finds the surface's unit normals nearest to points.
+
+        Args:
+            points_m: Points, m, ``(..., 3)``.
+
+        Returns:
+            Unit vectors, ``(..., 3)``, which face free space.
+        """
         return self.nearest(points_m)[1]
 
 
@@ -111,7 +125,14 @@ class Implicit(Surface):
 
     @abstractmethod
     def level(self, points_m: Array) -> Level:
-        """Returns the function at points, m, ``(n, 3)``."""
+        """Evaluates the function.
+
+        Args:
+            points_m: Points, m, ``(n, 3)``.
+
+        Returns:
+            Its values, gradients, and where it is the distance itself.
+        """
 
     def nearest(self, points_m: Array, *, first_order: bool = False) -> tuple[Array, Array]:
         """Follows the normal from the point to the surface and takes the normal found there, until both agree."""

@@ -8,13 +8,15 @@ without the engine, which is loaded on first use of the names below.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from annelid.engine import refuse_mixed_engine
+from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.body.actuators import ActuatorKind
+    from annelid.body.actuators.muscle import Rings, muscle_force
+    from annelid.body.actuators.servo import ServoRings
     from annelid.body.assemble import build_spec, compile_spec, mesh_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
@@ -23,20 +25,17 @@ if TYPE_CHECKING:
 # Every use of the engine begins here, and a mixed one fails with errors that explain nothing.
 refuse_mixed_engine()
 
-_HOME = {
-    "ActuatorKind": "actuators",
-    "FormulationKind": "formulations",
-    "Rods": "formulations.rods",
-    "WormBody": "worm",
-    "build_spec": "assemble",
-    "compile_spec": "assemble",
-    "mesh_of": "assemble",
-}
+__all__ = [
+    "ActuatorKind",
+    "FormulationKind",
+    "Rings",
+    "Rods",
+    "ServoRings",
+    "WormBody",
+    "build_spec",
+    "compile_spec",
+    "mesh_of",
+    "muscle_force",
+]
 
-__all__ = ["ActuatorKind", "FormulationKind", "Rods", "WormBody", "build_spec", "compile_spec", "mesh_of"]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'annelid.body' has no attribute {name!r}")
-    return getattr(import_module(f"annelid.body.{_HOME[name]}"), name)
+__getattr__, __dir__ = lazy(__name__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -80,30 +80,29 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output file tha
 @contextmanager
 def study_runs(
     output: Path, *, jobs: int | None, cluster: str | None, quiet: bool
-) -> Iterator[tuple[Workers | None, StudyProgress | None]]:
+) -> Iterator[tuple[Workers, StudyProgress | None]]:
     """Gives the workers of a study and its progress display, and keeps other writers out of its folder.
 
-    Runs are kept in ``runs`` below it. The workers are None, for processes of this machine, where no cluster is named.
+    Runs are kept in ``runs`` below it. The workers are processes of this machine where no cluster is named.
     """
     from annelid.config import find_cluster
     from annelid.experiment.cluster import workers_of
     from annelid.experiment.progress import study_progress
+    from annelid.experiment.workers import Processes
 
     lock(output)
-    named = nullcontext() if cluster is None else workers_of(find_cluster(cluster), jobs)
+    named = Processes(jobs) if cluster is None else workers_of(find_cluster(cluster), jobs)
     with going_on(output / "runs"), named as workers, study_progress(quiet=quiet) as progress:
         yield workers, progress
 
 
 @contextmanager
-def kept_runs(
-    output: Path, *, jobs: int | None, cluster: str | None, quiet: bool
-) -> Iterator[tuple[Store, StudyProgress | None]]:
-    """Gives the store of a study's runs and its progress display, otherwise as `study_runs`."""
+def kept_runs(output: Path, *, jobs: int | None, cluster: str | None, quiet: bool) -> Iterator[Store]:
+    """Gives the store of a study's runs, which has its workers and its progress display, otherwise as `study_runs`."""
     from annelid.experiment.store import Store
 
     with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
-        yield Store(output / "runs", workers), progress
+        yield Store(output / "runs", workers, progress=progress)
 
 
 @contextmanager

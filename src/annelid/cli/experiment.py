@@ -58,11 +58,9 @@ def speed_command(
     """
     from annelid_studies import crawling
 
-    points = crawling.points(gaits or crawling.GAITS, "quick" if quick else "full")
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        readings = crawling.crawl(store, points, jobs=jobs, progress=progress)
-    path = output / "speed.csv"
-    crawling.write_readings(readings, path)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = crawling.crawl(store, gaits or crawling.GAITS, "quick" if quick else "full")
+    path = crawling.write_readings(readings, output / "speed.csv")
     tables = (crawling.crawling_table(readings, quantity) for quantity in crawling.VALUES)
     print_results((path, crawling.write_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)
 
@@ -87,15 +85,14 @@ def slip_command(
     annelid experiment slip --quick
     annelid experiment slip --preset crawler -o slip-crawler
     """
-    from annelid_studies.slip import feedback
+    from annelid_studies import slip
 
-    frictions = feedback.QUICK if quick else feedback.FRICTIONS
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        readings = feedback.slip_feedback(store, frictions, preset=preset, jobs=jobs, progress=progress)
-    path = output / "slip.csv"
-    feedback.write_readings(readings, path)
-    written = path, feedback.feedback_figure(readings, preset, path.with_suffix(""))
-    print_results(written, feedback.feedback_table(readings, preset), quiet=quiet)
+    frictions = slip.QUICK_FRICTIONS if quick else slip.FRICTIONS
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = slip.slip_feedback(store, frictions, preset)
+    path = slip.write_readings(readings, output / "slip.csv")
+    written = path, slip.feedback_figure(readings, preset, path.with_suffix(""))
+    print_results(written, slip.feedback_table(readings, preset), quiet=quiet)
 
 
 @study("slip-detector")
@@ -117,15 +114,14 @@ def slip_detector_command(
     annelid experiment slip-detector --quick
     annelid experiment slip-detector -o slip
     """
-    from annelid_studies.slip import detection
+    from annelid_studies import slip
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        found = detection.slip_detection(store, detection.QUICK if quick else None, jobs=jobs, progress=progress)
-    scores = detection.scores(found)
-    path = output / "slip_detector.csv"
-    detection.write_scores(scores, path)
-    written = path, detection.detector_figure(found, path.with_suffix(""))
-    print_results(written, detection.detection_table(scores), quiet=quiet)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        found = slip.slip_detection(store, slip.QUICK_CASES if quick else tuple(slip.CASES))
+    scores = slip.scores(found)
+    path = slip.write_scores(scores, output / "slip_detector.csv")
+    written = path, slip.detector_figure(found, path.with_suffix(""))
+    print_results(written, slip.detection_table(scores), quiet=quiet)
 
 
 @study("turning")
@@ -152,11 +148,11 @@ def turning_command(
     from annelid_studies.tables import write_fields
     from annelid_studies.turning import MODULATIONS, QUICK, Reading, turning, turning_picture, turning_table
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        turned = turning(store, QUICK if quick else MODULATIONS, jobs=jobs, progress=progress)
-    path = write_fields(Reading, turned.readings, output / "turning.csv")
-    written = path, turning_picture(turned, path.with_suffix(""))
-    print_results(written, turning_table(turned.readings), quiet=quiet)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings, tracks = turning(store, QUICK if quick else MODULATIONS)
+    path = write_fields(Reading, readings, output / "turning.csv")
+    written = path, turning_picture(readings, tracks, path.with_suffix(""))
+    print_results(written, turning_table(readings), quiet=quiet)
 
 
 @study("pipes")
@@ -185,11 +181,11 @@ def pipes_command(
     from annelid_studies.pipes import Reading, pass_pipes, pipes_picture, pipes_table, trials
     from annelid_studies.tables import write_fields
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        found = pass_pipes(store, trials(quick), jobs=jobs, progress=progress)
-    path = write_fields(Reading, found.readings, output / "pipes.csv")
-    written = path, pipes_picture(found, path.with_suffix(""))
-    print_results(written, pipes_table(found.readings), quiet=quiet)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings, courses = pass_pipes(store, trials(quick))
+    path = write_fields(Reading, readings, output / "pipes.csv")
+    written = path, pipes_picture(readings, courses, path.with_suffix(""))
+    print_results(written, pipes_table(readings), quiet=quiet)
 
 
 @study("load-frame")
@@ -269,16 +265,14 @@ def weak_middle_command(
     annelid experiment weak-middle -o weak-middle
     """
     from annelid_studies.weak_middle import results
-    from annelid_studies.weak_middle.asymmetry import asymmetry
-    from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, weak_middle
+    from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, asymmetry, weak_middle
 
     found = None
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        set_to, readings = weak_middle(store, "quick" if quick else "full", jobs=jobs, progress=progress)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        set_to, readings = weak_middle(store, "quick" if quick else "full")
         if not quick:
-            found = asymmetry(store, set_to[BASE_KEY].force_N, jobs=jobs, progress=progress)
+            found = asymmetry(store, set_to[BASE_KEY].force_N)
     tables = [results.settings_table(set_to), *(results.sweep_table(readings, quantity) for quantity in QUANTITIES)]
     tables += [results.checks_table(readings), results.asymmetry_table(found)] if found else []
-    path = output / "weak_middle.csv"
-    results.write_readings([*readings, *(found.readings if found else ())], path)
+    path = results.write_readings([*readings, *(found.readings if found else ())], output / "weak_middle.csv")
     print_results((path, results.weak_middle_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)

@@ -132,7 +132,7 @@ def paper_command(
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
     with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
         effort = "quick" if quick else "full"
-        report = reproduce(output, effort, only=only or None, jobs=jobs, workers=workers, progress=progress)
+        report = reproduce(output, effort, only=only or None, workers=workers, progress=progress)
         html = write_report(report, output)
     written = [html, html.with_suffix(".md")]
     if claims is not None:
@@ -226,7 +226,6 @@ def robustness_command(
             controllers=tuple(controller or CONTROLLERS),
             n_segments=segments,
             keep=keep,
-            jobs=jobs,
             workers=workers,
             progress=progress,
         )
@@ -341,8 +340,8 @@ def tune_command(
     task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed)
     found: list[tune.Trial] = []
     written: list[Path] = []
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (store, progress):
-        for generation in tune.search(task, store, jobs=jobs, progress=progress):
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        for generation in tune.search(task, store, progress=store.progress):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)
     print_results(written, tune.results_table(task, found), quiet=quiet)

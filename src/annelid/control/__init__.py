@@ -1,7 +1,6 @@
 """Everything that turns sensation into activation."""
 
-from annelid.control.base import OpenLoopController, SegmentController
-from annelid.control.callable import CallableController
+from annelid.control.base import CallableController, OpenLoopController, SegmentController
 from annelid.control.open_loop import ProgramController, SineController, TimedController
 from annelid.control.oscillators import HeteroclinicController, PhaseChainController
 from annelid.control.sns import AdaptiveController, CopySettings, SnsController

@@ -1,14 +1,14 @@
-"""What controllers share: what they record, and how their segments' activation goes to the muscles."""
+"""What controllers share: what they record, how they drive the muscles; and a user's own function as a controller."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Annotated, ClassVar, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from annelid.config.kinds import ControllerKind
@@ -202,3 +202,61 @@ class NeuralController(SegmentController):
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         return {"neuron": list(self._stepper.arrays.neurons), "segment": list(range(1, self._n_segments + 1))}
+
+
+class CallableController:
+    """Wraps a plain function from sensation to activation.
+
+    Attributes:
+        name: Name of the function, for the run file.
+
+    Example::
+
+        controller = CallableController(lambda s: 0.5 + 0.5 * np.sin(s.time_s - np.arange(3)), n_muscles=3)
+    """
+
+    def __init__(
+        self, function: Callable[[Sensation], ArrayLike], n_muscles: int, on_reset: Callable[[int], None] | None = None
+    ) -> None:
+        """Wraps a function.
+
+        Args:
+            function: Takes the present `Sensation`; returns activation in [0, 1], shape ``(n_muscles,)``, or
+                one number for all muscles. Called once per control step.
+            n_muscles: Number of muscles of the worm.
+            on_reset: Called with the seed at every reset, for functions that keep a state.
+        """
+        self.name = getattr(function, "__name__", type(function).__name__)
+        self._function = function
+        self._n_muscles = n_muscles
+        self._on_reset = on_reset
+
+    def reset(self, seed: int) -> None:
+        """Passes the seed on to ``on_reset``."""
+        if self._on_reset is not None:
+            self._on_reset(seed)
+
+    def step(self, sensation: Sensation) -> Array:
+        """Calls the function and checks what it returns.
+
+        Raises:
+            ConfigError: The activation is no number, has another shape, or leaves [0, 1].
+        """
+        result, n, time = self._function(sensation), self._n_muscles, f"at {sensation.time_s:g} s; it must"
+        returned = "the controller function returned"
+        try:
+            activation = np.array(result, dtype=np.float64)
+        except (TypeError, ValueError):
+            problem = f"{returned} {type(result).__name__} {time} return {n} numbers in [0, 1]"
+            raise ConfigError(problem) from None
+        if activation.ndim == 0:
+            activation = np.full(n, activation)
+        if activation.shape != (n,):
+            raise ConfigError(f"{returned} shape {activation.shape} {time} return shape ({n},)")
+        within = (activation >= 0.0) & (activation <= 1.0)
+        if not within.all():
+            worst = int(np.argmin(within))
+            raise ConfigError(
+                f"{returned} activation {activation[worst]:g} for muscle {worst + 1} {time} lie in [0, 1]"
+            )
+        return activation

@@ -73,7 +73,18 @@ def save(figure: Figure, path: str | Path) -> Path:
 
 
 def save_both(figure: Figure, stem: str | Path) -> Path:
-    """Writes ``<stem>.svg`` and ``<stem>.png``; returns the latter's path."""
+    """Writes a figure as vectors and as pixels.
+
+    Args:
+        figure: The figure.
+        stem: Path without suffix; ``<stem>.svg`` and ``<stem>.png`` are written.
+
+    Returns:
+        The path of the PNG.
+
+    Raises:
+        RunFileError: A file cannot be written.
+    """
     stem = Path(stem)
     save(figure, stem.with_name(f"{stem.name}.svg"))
     # All is in its place: another layout would take as long as to draw it.

@@ -288,14 +288,14 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     within = f"{100 * ELONGATION_WITHIN:g} %"
     if found:
         return (
-            f"{config.name} reproduces order, period and elongation of the paper's formulation within {within}; "
+            f"{config.name} reproduces order, period and mean elongation of the paper's formulation within {within}; "
             f"next: {NEXT}"
         )
     order, theirs = ("-".join(map(str, one.order)) or "none" for one in (numbers, formulation()))
     apart = [] if found.order else [f"order {order} in place of {theirs}"]
     apart += [] if found.period_agrees else [f"period {_percents(found.period, _signed) or 'unknown'}"]
     apart += [
-        f"elongation of segment {segment} {_percents(share, _signed) or 'unknown'}"
+        f"mean elongation of segment {segment} {_percents(share, _signed) or 'unknown'}"
         for segment, (share, agrees) in enumerate(zip(found.elongation, found.elongation_agrees, strict=True), start=1)
         if not agrees
     ]

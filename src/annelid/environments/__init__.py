@@ -11,10 +11,10 @@ Importing this module registers them, which Gymnasium can do itself (``"annelid.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import MissingDependency
+from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.environments.episode import Layout
@@ -29,7 +29,6 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
     "WormPipe-v0": {"arena": "pipe.taper", "episode_s": PIPE_EPISODE_S},
 }
 """Names within the namespace, and what they set beyond the defaults of `WormEnv`."""
-_HOME = {"Layout": "episode", "Weights": "task", "WormEnv": "single", "WormVectorEnv": "vector"}
 
 __all__ = ["ENVIRONMENTS", "Layout", "Weights", "WormEnv", "WormVectorEnv"]
 
@@ -46,8 +45,4 @@ for _name, _kwargs in ENVIRONMENTS.items():
         kwargs=_kwargs,
     )
 
-
-def __getattr__(name: str) -> Any:
-    if name in _HOME:
-        return getattr(import_module(f"annelid.environments.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'annelid.environments' has no attribute {name!r}")
+__getattr__, __dir__ = lazy(__name__)

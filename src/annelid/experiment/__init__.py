@@ -1,1 +1,45 @@
-"""From a design to runs to numbers: sweeps, searches, calibration, error bars, and the store of runs."""
+"""From a design to runs to numbers: sweeps, searches, calibration, error bars, and the store of runs.
+
+A study of your own lays out its runs as `Case`, has a `Store` compute them, and reads their `Outcome` or their run::
+
+    store = Store(Path("runs"))
+    cases = [Case("riddle2023-rods", {"arena.friction": friction}) for friction in (0.1, 0.5, 1.0)]
+    store.compute(cases)
+    periods_s = [store[case].rhythm.period_s for case in cases]
+
+The names below are loaded on first use.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from annelid.lazy import lazy
+
+if TYPE_CHECKING:
+    from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
+    from annelid.experiment.fingerprint import code_fingerprint
+    from annelid.experiment.lifeline import end_after
+    from annelid.experiment.outcome import Hold, Outcome
+    from annelid.experiment.progress import StudyProgress, in_stage
+    from annelid.experiment.store import Store, case_key
+    from annelid.experiment.tune import Judged, judge
+    from annelid.experiment.workers import Workers
+
+__all__ = [
+    "SHEAR_OVER_YOUNG",
+    "Case",
+    "Hold",
+    "Judged",
+    "Outcome",
+    "Store",
+    "StudyProgress",
+    "Workers",
+    "case_key",
+    "code_fingerprint",
+    "end_after",
+    "in_stage",
+    "judge",
+]
+
+__getattr__, __dir__ = lazy(__name__)

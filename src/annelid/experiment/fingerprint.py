@@ -1,7 +1,8 @@
 """Digests of annelid's code and of the engine: what runs, numbers and pictures are made by.
 
-Only what computes counts. Comments, docstrings, the layout of the text, descriptions of a configuration's fields and
-imports for type checkers do not. Which modules are meant is found by following their imports, so none is forgotten.
+Only what computes counts. Comments, docstrings, the layout of the text, descriptions of a configuration's fields, lists
+of public names and imports for type checkers do not. Which modules are meant is found by following their imports, so
+none is forgotten.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import annelid
+from annelid.lazy import offered
 
 SOURCE = Path(annelid.__file__).parent.parent
 PACKAGES = ("annelid", "annelid_studies")
@@ -27,8 +29,8 @@ PHYSICS = tuple(
 """The code that computes runs, with all that it imports."""
 READERS = ("annelid.experiment.outcome",)
 """The code that reads a run's outcome: where it has changed, the outcome is read again, and the run kept."""
-_NO_RESULT = {*PACKAGES, "annelid.simulation.progress"}
-"""Modules that no number depends on: the list of public names, and the progress bar."""
+_NO_RESULT = {*PACKAGES, "annelid.lazy", "annelid.simulation.progress"}
+"""Modules that no number depends on: the list of public names, how they are loaded, and the progress bar."""
 
 
 @cache
@@ -93,7 +95,11 @@ def _counted(parts: Iterable[Any], of: ast.AST) -> Iterator[Any]:
     """Those parts of some code that something depends on."""
     for part in parts:
         match part, of:
-            case (ast.Expr(ast.Constant()), _) | (ast.keyword("description"), ast.Call(ast.Name("Field"))):
+            case (
+                (ast.Expr(ast.Constant()), _)
+                | (ast.keyword("description"), ast.Call(ast.Name("Field")))
+                | (ast.Assign([ast.Name("__all__")]), ast.Module())
+            ):
                 pass
             case ast.If(ast.Name("TYPE_CHECKING")), _:
                 yield from _counted(part.orelse, part)
@@ -129,13 +135,22 @@ def _imported(name: str) -> frozenset[str]:
     for statement in _statements(_parsed(name)):
         if not isinstance(statement, ast.Import | ast.ImportFrom):
             continue
-        base = [statement.module or ""] if isinstance(statement, ast.ImportFrom) else []
         for alias in statement.names:
-            parts = ".".join([*base, alias.name]).split(".")
+            named = isinstance(statement, ast.Import)
+            parts = (alias.name if named else _home(statement.module or "", alias.name)).split(".")
             for end in range(1, len(parts) + 1) if parts[0] in PACKAGES else ():
                 if _path(inner := ".".join(parts[:end])).exists():
                     found.add(inner)
     return frozenset(found)
+
+
+def _home(module: str, name: str) -> str:
+    """Full name of what a statement imports, also where a package loads it from another module on first use."""
+    if module.split(".")[0] in PACKAGES and SOURCE.joinpath(*module.split(".")).is_dir():
+        home = offered(_parsed(module)).get(name)
+        if home not in (None, module):
+            return _home(home, name)
+    return f"{module}.{name}"
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:

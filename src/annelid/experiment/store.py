@@ -33,7 +33,7 @@ from annelid.experiment.attempt import (
 from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
-from annelid.experiment.progress import StudyProgress
+from annelid.experiment.progress import StudyProgress, in_stage
 from annelid.experiment.workers import Processes, Result, Workers
 from annelid.plausibility import refuse_nonsense
 from annelid.simulation.runfile import Run, open_run
@@ -78,15 +78,18 @@ class Done:
 class Store:
     """A folder of runs, which is made when the first run is computed."""
 
-    def __init__(self, folder: Path, workers: Workers | None = None, keep: Keep = "runs") -> None:
+    def __init__(
+        self, folder: Path, workers: Workers | None = None, keep: Keep = "runs", progress: StudyProgress | None = None
+    ) -> None:
         """Opens a store.
 
         Args:
             folder: The folder.
             workers: Who computes its runs; None for processes of this machine.
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
+            progress: Called as runs go on, with what `compute` names their stage; None for nothing.
         """
-        self.folder, self._workers = folder, workers
+        self.folder, self.progress, self._workers = folder, progress, workers
         self._keep: Keep = keep
 
     def path(self, case: Case) -> Path:
@@ -113,6 +116,7 @@ class Store:
     def compute(
         self,
         cases: Iterable[Case],
+        stage: str = "",
         *,
         jobs: int | None = None,
         progress: Progress | None = None,
@@ -122,8 +126,9 @@ class Store:
 
         Args:
             cases: The cases; a case given twice runs once.
+            stage: What is done, in a few words, for the store's ``progress``.
             jobs: Processes, by default as many as there are cores; has no effect on workers given to the store.
-            progress: Called at the start and after every run.
+            progress: Called at the start and after every run, in place of the store's own.
             failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
                 end the call.
 
@@ -141,6 +146,7 @@ class Store:
         missing = sorted((wanted[key] for key in wanted if key not in found), key=lambda case: -case.cost_s)
         total_s = sum(case.cost_s for case in missing)
         left_s, done = total_s, len(found)
+        progress = progress or in_stage(self.progress, stage)
 
         def report() -> None:
             if progress is not None:
@@ -171,9 +177,10 @@ class Store:
     ) -> list[Done]:
         """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
 
-        ``stage`` is what ``progress`` is called with as they are run. Returns what became of each case, in their order.
+        ``stage`` is what ``progress``, by default the store's, is called with as they are run. Returns what became of
+        each case, in their order.
         """
-        report: StudyProgress = progress or (lambda *_: None)
+        report: StudyProgress = progress or self.progress or (lambda *_: None)
         refused: dict[int, ConfigError] = {}
         for i, case in enumerate(cases):
             report("checking the runs", i, len(cases), i / len(cases))

@@ -1,9 +1,32 @@
-"""The loop of plant, controller and clock, and the run file it writes."""
+"""The loop of plant, controller and clock, and the run file it writes.
+
+The 3D worm and the lock of a folder are loaded on first use.
+"""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from annelid.lazy import lazy
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run, open_run
-from annelid.simulation.stepping import build_controller, build_plant
+from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 
-__all__ = ["Run", "build_controller", "build_plant", "open_run", "simulate"]
+if TYPE_CHECKING:
+    from annelid.simulation.lock import locks
+    from annelid.simulation.worm import WormPlant, compile_worm
+
+__all__ = [
+    "Run",
+    "Simulation",
+    "WormPlant",
+    "build_controller",
+    "build_plant",
+    "compile_worm",
+    "locks",
+    "open_run",
+    "simulate",
+    "start",
+]
+
+__getattr__, __dir__ = lazy(__name__)

@@ -214,10 +214,11 @@ def _seen(product: Array, scale: Array, angle: Array) -> NDArray[np.complex128]:
 
     The real part is that along the direction turned by the edge's angle, the imaginary part that across it.
     """
-    turned = np.exp(-1j * angle)
+    turned: NDArray[np.complex128] = np.exp(-1j * angle)
     front = (1j * product[1, 0] - product[2, 0]) * turned[:, :-1]
     rear = (product[0, 2] - 1j * product[0, 1]) * turned[:, 1:]
-    return np.stack([front, rear]) * (2.0 * scale)
+    seen: NDArray[np.complex128] = np.stack([front, rear])
+    return seen * (2.0 * scale)
 
 
 def _dot(a: Array, b: Array) -> Array:

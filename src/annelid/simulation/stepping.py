@@ -77,7 +77,7 @@ def as_controller(
         return build_controller(config, plant)
     if hasattr(controller, "step"):
         return cast(Controller, controller)
-    from annelid.control.callable import CallableController
+    from annelid.control.base import CallableController
 
     return CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)
 

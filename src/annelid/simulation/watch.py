@@ -57,7 +57,8 @@ class Watch:
         self._idle_N = IDLE_SHARE * np.repeat(rings.forces(n), self._per_segment)
         self._force_field = rings.force_field
         # The largest values so far, when they were reached, s, and where.
-        self._extremes = dict.fromkeys(("closing", "depth", "gap", "spring"), (-math.inf, 0.0, 0))
+        names = "closing", "depth", "gap", "spring"
+        self._extremes: dict[str, tuple[float, float, int]] = dict.fromkeys(names, (-math.inf, 0.0, 0))
         # Of every muscle: whether it is active; since when, s; its longest contraction, s; its largest force since it
         # is active, N; in how many contractions it has pulled nothing; and when the first of these began, s.
         self._muscles = np.zeros((6, len(self._idle_N)))

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import platform
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from annelid.output import write_json
-from annelid.simulation.lock import locks
+from annelid.errors import AnnelidError
+from annelid.experiment import StudyProgress, case_key, code_fingerprint
+from annelid.output import write_json, write_text
+from annelid.simulation import locks
+from annelid.textfiles import read_json
 from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
-from annelid_studies.bench.store import MeasurementFailed, Measurements
-from annelid_studies.riddle2023.examination import Effort
-from annelid_studies.worms import CHAIN, RODS
+from annelid_studies.worms import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"
@@ -42,8 +49,11 @@ SCHEMA = {
     "peer": "free rods without joints, contact or muscles; step_limit_us is the closed form of the largest stable step",
 }
 
-Progress = Callable[[str, int, int, float], object]
-"""Called with what is being done, the number of cases done, their total, and the share of the work."""
+MEASURING, PEER_CODE = "annelid_studies.bench.measure", "annelid_studies.bench.peer"
+"""The code that a measurement depends on beside the physics, and that of the peer."""
+
+Share = Callable[[float], object]
+"""Called with the share of a case that is done."""
 
 _PEER_COST_S = 15.0
 # Importing, compiling, and the pass with the engine's timers.
@@ -54,7 +64,7 @@ _GROWTH = {"chain": 2.0, "rods": 0.4}
 
 @locks("folder")
 def bench(
-    folder: Path, effort: Effort = "full", *, lines: Sequence[str] | None = None, progress: Progress | None = None
+    folder: Path, effort: Effort = "full", *, lines: Sequence[str] | None = None, progress: StudyProgress | None = None
 ) -> Path:
     """Times closed loops one after the other, as far as they have not been timed into the folder before.
 
@@ -73,23 +83,39 @@ def bench(
         KeyboardInterrupt: The case in progress is dropped, all others kept.
     """
     cases = bench_cases(effort, lines)
-    with_peer = "peer" in check_lines(lines)
-    measured = _measure_all(cases, with_peer, Measurements(folder / CASES_FOLDER), progress)
-    report = {
+    wanted: dict[str, BenchCase | None] = {case.name: case for case in cases}
+    if "peer" in check_lines(lines):
+        wanted["peer"] = None
+    store = Measurements(folder / CASES_FOLDER)
+    measured = {name: kept for name, case in wanted.items() if (kept := store.find(case)) is not None}
+    costs_s = {name: _cost_s(case) for name, case in wanted.items() if name not in measured}
+    total_s, done_s = sum(costs_s.values()) or 1.0, 0.0
+
+    def report(within_s: float) -> None:
+        if progress is not None:
+            progress("timing worms", len(measured), len(wanted), min(1.0, (done_s + within_s) / total_s))
+
+    for name, cost_s in costs_s.items():
+        report(0.0)
+        try:
+            measured[name] = store.measure(wanted[name], lambda share, cost_s=cost_s: report(share * cost_s))
+        except MeasurementFailed as failure:
+            measured[name] = {"failed": str(failure)}
+        done_s += cost_s
+    content = {
         "effort": effort,
         "machine": f"{os.cpu_count()} cores, one of them used",
         "versions": {name: version(name) for name in ("annelid", "mujoco-core", "numpy")}
         | {"python": platform.python_version()},
         "schema": SCHEMA,
         **judge(cases, measured),
-        "peer": measured.get(None),
+        "peer": measured.get("peer"),
     }
-    folder.mkdir(parents=True, exist_ok=True)
-    return write_json(folder / JSON_NAME, report)
+    return write_json(folder / JSON_NAME, content)
 
 
-def judge(cases: Sequence[BenchCase], measured: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
-    """Lays measurements side by side: errors, fronts, exponents, levels.
+def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Compares measurements: errors, fronts, exponents, levels.
 
     Args:
         cases: The cases.
@@ -98,41 +124,23 @@ def judge(cases: Sequence[BenchCase], measured: Mapping[str | None, Mapping[str,
     references = {case.name: measured[case.name] for case in cases if case.kind == "converged"}
     entries = [_entry(case, measured[case.name], references) for case in cases]
     usable = [entry for entry in entries if "failed" not in entry]
-    judged = [entry for entry in usable if entry["kind"] == "judged"]
+    # The period of a run that is not ordered is no measure of it.
+    ordered = [entry for entry in usable if entry["kind"] == "judged" and entry["rhythm"]["verdict"] == "ordered"]
+    fronts = {}
+    for name, run in references.items():
+        if "failed" not in run:
+            points = {
+                entry["name"]: (entry["real_time_factor"], error)
+                for entry in ordered
+                if (error := entry["errors"][name]["largest"]) is not None
+            }
+            fronts[name] = front(points)
     return {
         "cases": entries,
         "cost_exponents": {preset: _exponents(usable, line) for preset, line in ((RODS, "segments"), (CHAIN, "chain"))},
-        "fronts": {name: _front(judged, name) for name, run in references.items() if "failed" not in run},
+        "fronts": fronts,
         "levels": {entry["level"]: entry["name"] for entry in entries if entry["level"]},
     }
-
-
-def _measure_all(
-    cases: Sequence[BenchCase], with_peer: bool, store: Measurements, progress: Progress | None
-) -> dict[str | None, dict[str, Any]]:
-    wanted: list[BenchCase | None] = [*cases, *([None] if with_peer else [])]
-    found = {_name(case): stored for case in wanted if (stored := store.find(case)) is not None}
-    missing = [case for case in wanted if _name(case) not in found]
-    total_s = sum(map(_cost_s, missing)) or 1.0
-    done_s = 0.0
-
-    def report(within_s: float) -> None:
-        if progress is not None:
-            progress("timing worms", len(found), len(wanted), min(1.0, (done_s + within_s) / total_s))
-
-    for case in missing:
-        cost_s = _cost_s(case)
-        report(0.0)
-        try:
-            found[_name(case)] = store.measure(case, lambda share, cost_s=cost_s: report(share * cost_s))
-        except MeasurementFailed as failure:
-            found[_name(case)] = {"failed": str(failure)}
-        done_s += cost_s
-    return found
-
-
-def _name(case: BenchCase | None) -> str | None:
-    return None if case is None else case.name
 
 
 def _cost_s(case: BenchCase | None) -> float:
@@ -144,7 +152,7 @@ def _cost_s(case: BenchCase | None) -> float:
 
 def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     config = case.case.config
-    known = {
+    entry = {
         "name": case.name,
         "kind": case.kind,
         "lines": list(case.lines),
@@ -156,15 +164,15 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
         "physics_step_ms": round(1e3 * config.clock.physics_timestep_s, 9),
         "duration_s": config.duration_s,
         "command": case.case.command,
+        **measured,
     }
-    if case.kind == "speed" or "failed" in measured:
-        return {**known, **measured}
-    compared = {
-        name: errors(measured["summary"], reference["summary"])
-        for name, reference in references.items()
-        if name != case.name and "failed" not in reference
-    }
-    return {**known, **measured, "errors": compared}
+    if case.kind != "speed" and "failed" not in measured:
+        entry["errors"] = {
+            name: errors(measured["summary"], reference["summary"])
+            for name, reference in references.items()
+            if name != case.name and "failed" not in reference
+        }
+    return entry
 
 
 def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, float | None]:
@@ -175,23 +183,12 @@ def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, flo
     }
     if len(points) < 2:
         return {}
-    ranges = dict.fromkeys([(min(points), max(points)), SCALED_SEGMENTS])
     found = {}
-    for low, high in ranges:
+    for low, high in dict.fromkeys([(min(points), max(points)), SCALED_SEGMENTS]):
         within = [n for n in sorted(points) if low <= n <= high]
         if within and (within[0], within[-1]) == (low, high):
             found[f"{low}-{high}"] = exponent(within, [points[n] for n in within])
     return found
-
-
-def _front(entries: Sequence[Mapping[str, Any]], reference: str) -> list[str]:
-    """The front of the ordered runs: the period of any other is no measure of it."""
-    points = {
-        entry["name"]: (entry["real_time_factor"], entry["errors"][reference]["largest"])
-        for entry in entries
-        if entry["rhythm"]["verdict"] == "ordered" and entry["errors"][reference]["largest"] is not None
-    }
-    return front(points)
 
 
 def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[str, Any]:
@@ -203,9 +200,9 @@ def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[st
 
     Returns:
         Relative errors, as fractions, of the shortest ring, of each segment's elongation and the largest of these, and
-        of the period; ``travel_m``, the difference of the travel, m; and ``largest``, of the
-        largest elongation's and the period's, which decides. Each is None where
-        one of the two runs lacks the quantity, or the reference's is zero.
+        of the period; ``travel_m``, the difference of the travel, m; and ``largest``, of the largest elongation's and
+        the period's, which decides. Each is None where one of the two runs lacks the quantity, or the reference's is
+        zero.
     """
     elongations = measured["elongation_mean_max_m"], reference["elongation_mean_max_m"]
     elongation = None if None in elongations else [_relative(*pair) for pair in zip(*elongations, strict=True)]
@@ -236,8 +233,7 @@ def front(points: Mapping[str, tuple[float, float]]) -> list[str]:
     Returns:
         Names of those for which no other point is at least as good in both and better in one.
     """
-    best = []
-    least = float("inf")
+    best, least = [], float("inf")
     for name, (_, error) in sorted(points.items(), key=lambda item: (-item[1][0], item[1][1])):
         if error < least:
             best.append(name)
@@ -253,3 +249,80 @@ def _largest(values: Sequence[float | None] | None) -> float | None:
     """The largest, or None where one is missing: an error that is not known is not small."""
     known = [value for value in values or () if value is not None]
     return max(known) if values and len(known) == len(values) else None
+
+
+class MeasurementFailed(AnnelidError):
+    """A case could not be measured; the text says why."""
+
+
+class Measurements:
+    """A folder of measurements of cases, and of the peer for None; it is made with the first."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def find(self, case: BenchCase | None) -> dict[str, Any] | None:
+        """Returns what was measured before with the same configuration, code and engine, or None."""
+        try:
+            return read_json(self._path(case))
+        except (OSError, ValueError):
+            return None
+
+    def measure(self, case: BenchCase | None, progress: Share) -> dict[str, Any]:
+        """Measures a case, and keeps the numbers.
+
+        Raises:
+            MeasurementFailed: The process died, or the case cannot be built.
+        """
+        request = {} if case is None else {"config": case.case.config.model_dump(mode="json")}
+        measured = _in_a_process(request, progress)
+        # A peer that is missing may be installed before the next call.
+        if measured.get("installed", True):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_text(self._path(case), json.dumps(measured, indent=1, allow_nan=False))
+        return measured
+
+    def _path(self, case: BenchCase | None) -> Path:
+        code = code_fingerprint(PEER_CODE) if case is None else case_key(case.case) + code_fingerprint(MEASURING)
+        stem = "peer" if case is None else case.name.replace(", ", "-").replace(" ", "-")
+        return self.folder / f"{stem}-{hashlib.sha256(code.encode()).hexdigest()[:12]}.json"
+
+
+def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as complaints:
+        child = subprocess.Popen(
+            [sys.executable, "-m", MEASURING],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
+            text=True,
+            encoding="utf-8",
+        )
+        assert child.stdin is not None
+        assert child.stdout is not None
+        answer: dict[str, Any] = {}
+        try:
+            # A process that dies at once leaves its reason on stderr. Its stdin stays open: it ends when that closes.
+            with suppress(BrokenPipeError):
+                child.stdin.write(json.dumps(request) + "\n")
+                child.stdin.flush()
+            for line in child.stdout:
+                # A library may print too.
+                if line.startswith("{"):
+                    answer = json.loads(line)
+                    if "share" in answer:
+                        progress(answer["share"])
+            child.wait()
+        except BaseException:
+            child.kill()
+            child.wait()
+            raise
+        finally:
+            child.stdout.close()
+            with suppress(BrokenPipeError):
+                child.stdin.close()
+        if "measured" in answer:
+            return answer["measured"]
+        complaints.seek(0)
+        last = (complaints.read().strip().splitlines() or [f"the process ended with status {child.returncode}"])[-1]
+        raise MeasurementFailed(answer.get("error", last))

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Literal
 
-from annelid.body.worm import WormBody
+from annelid.body import WormBody
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
-from annelid.experiment.case import Case
-from annelid_studies.riddle2023.examination import Effort
-from annelid_studies.worms import CHAIN, RODS
-
-Kind = Literal["judged", "converged", "speed"]
+from annelid.experiment import Case
+from annelid_studies.worms import CHAIN, RODS, Effort
 
 LINES = {
     "levels": "the levels of --fidelity, and the paper's own worm beside them",
@@ -47,19 +44,13 @@ _LEAST_INTERVAL_S = 0.005
 
 @dataclass(frozen=True)
 class BenchCase:
-    """One run of the benchmark.
+    """One run of the benchmark."""
 
-    Attributes:
-        name: What it is, in a few words; no two cases share it.
-        kind: ``"judged"`` is compared with the ``"converged"`` runs, ``"speed"`` only timed.
-        case: Its preset and what is changed in it.
-        lines: The lines that it lies on.
-    """
-
-    name: str
-    kind: Kind
-    case: Case
-    lines: tuple[str, ...]
+    name: str  # What it is, in a few words; no two cases share it
+    # ``"judged"`` is compared with the ``"converged"`` runs, ``"speed"`` only timed
+    kind: Literal["judged", "converged", "speed"]
+    case: Case  # Its preset and what is changed in it
+    lines: tuple[str, ...]  # The lines that it lies on
 
     @property
     def body(self) -> WormBody:
@@ -79,26 +70,22 @@ def bench_cases(effort: Effort, lines: Sequence[str] | None = None) -> list[Benc
     """
     chosen = check_lines(lines)
     found: dict[str, BenchCase] = {}
-    for line in LINES:
-        if line in chosen:
-            for case in _cases_of(line, effort):
-                before = found.get(case.name)
-                found[case.name] = case if before is None else _joined(before, case)
+    for case in (case for line in LINES if line in chosen for case in _cases_of(line, effort)):
+        before = found.setdefault(case.name, case)
+        found[case.name] = replace(before, lines=tuple(dict.fromkeys((*before.lines, *case.lines))))
     if any(case.kind == "judged" for case in found.values()):
         meshes = (PAPER_ELEMENTS, FINE_ELEMENTS) if effort == "full" else (PAPER_ELEMENTS,)
         found |= {case.name: case for case in map(converged, meshes)}
     return list(found.values())
 
 
-def check_lines(lines: Iterable[str] | None) -> list[str]:
+def check_lines(lines: Sequence[str] | None) -> list[str]:
     """Returns the lines asked for, all for None.
 
     Raises:
         ConfigError: There is no such line.
     """
-    if lines is None:
-        return list(LINES)
-    chosen = list(lines)
+    chosen = list(LINES if lines is None else lines)
     for line in chosen:
         if line not in LINES:
             raise ConfigError(f"there are no cases {line!r}: {suggest(line, LINES)}")
@@ -123,7 +110,9 @@ def judged(elements: int, step_ms: float, line: str) -> BenchCase:
 
 def timed(preset: str, n_segments: int, duration_s: float, line: str) -> BenchCase:
     """A preset as it is, with other numbers of segments."""
-    changes: dict[str, Any] = {"body.mesh.n_segments": n_segments, "duration_s": duration_s, **_recorded_as_in(preset)}
+    changes: dict[str, Any] = {"body.mesh.n_segments": n_segments, "duration_s": duration_s}
+    # A study's cases are recorded sparsely unless they say otherwise.
+    changes |= {f"record.{name}": value for name, value in load_config(preset).record.model_dump().items()}
     if preset == CHAIN and n_segments != 3:
         # The paper's file gives one range for each of three segments; the rods' preset has their mean.
         changes["body.rings.length_range_m"] = _worm_body(load_config(RODS)).rings.length_range_m
@@ -133,17 +122,20 @@ def timed(preset: str, n_segments: int, duration_s: float, line: str) -> BenchCa
 
 def level_of(config: RunConfig) -> str | None:
     """Name of the level of fidelity that a configuration of three segments resolves like, or None."""
-    for name, level in LEVELS.items():
-        like = load_config(RODS, {**level.changes, "duration_s": config.duration_s})
-        if like == config:
-            return name
-    return None
+    same = (
+        name
+        for name, level in LEVELS.items()
+        if load_config(RODS, {**level.changes, "duration_s": config.duration_s}) == config
+    )
+    return next(same, None)
 
 
 def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
     match line:
         case "levels":
-            return [timed(CHAIN, 3, CHAIN_S, line), *map(_level_case, LEVELS)]
+            configs = [load_config(RODS, level.changes) for level in LEVELS.values()]
+            meshes = [(_worm_body(one).mesh.elements_per_side, 1e3 * one.clock.physics_timestep_s) for one in configs]
+            return [timed(CHAIN, 3, CHAIN_S, line), *(judged(*mesh, line) for mesh in meshes)]
         case "steps":
             return [judged(elements, step, line) for elements in (2, 3) for step in _STEPS_MS[effort]]
         case "elements":
@@ -157,12 +149,6 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
             return [timed(RODS, 3, duration, line) for duration in _DURATIONS_S[effort]]
         case _:
             return []
-
-
-def _level_case(name: str) -> BenchCase:
-    config = load_config(RODS, LEVELS[name].changes)
-    elements = _worm_body(config).mesh.elements_per_side
-    return judged(elements, 1e3 * config.clock.physics_timestep_s, "levels")
 
 
 def _worm_body(config: RunConfig) -> WormBody:
@@ -179,14 +165,3 @@ def _resolution(elements: int, step_s: float) -> dict[str, float | int]:
         "record.signals_interval_s": round(signals, 9),
         "record.frames_interval_s": round(frames, 9),
     }
-
-
-def _recorded_as_in(preset: str) -> dict[str, float]:
-    """States the preset's own intervals, since a study's cases are recorded sparsely unless they say otherwise."""
-    record = load_config(preset).record
-    return {f"record.{name}": value for name, value in record.model_dump().items()}
-
-
-def _joined(first: BenchCase, second: BenchCase) -> BenchCase:
-    lines = tuple(dict.fromkeys((*first.lines, *second.lines)))
-    return BenchCase(first.name, first.kind, first.case, lines)

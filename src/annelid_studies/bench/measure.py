@@ -15,7 +15,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from annelid.errors import AnnelidError, SimulationStopped
-from annelid.experiment.lifeline import end_after
+from annelid.experiment import end_after
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -31,7 +31,14 @@ def main() -> None:
     request: dict[str, Any] = json.loads(sys.stdin.readline())
     end_after(lambda: os.read(sys.stdin.fileno(), 1))
     try:
-        _say(measured=_measured(request))
+        if "config" in request:
+            from annelid.config import load_config
+
+            _say(measured=measure(load_config(request["config"])))
+        else:
+            from annelid_studies.bench.peer import peer
+
+            _say(measured=peer())
     except AnnelidError as error:
         _say(error=str(error))
 
@@ -43,10 +50,7 @@ def keep_to_one_core() -> None:
 
 
 def measure(config: RunConfig) -> dict[str, Any]:
-    """Runs a closed loop with its recording and returns its times, shares, memory and results.
-
-    Args:
-        config: A 3D worm.
+    """Runs the closed loop of a 3D worm with its recording and returns its times, shares, memory and results.
 
     Returns:
         Numbers with their units in the keys, ready for JSON. A run that a guard stopped is measured as far as it came.
@@ -56,11 +60,9 @@ def measure(config: RunConfig) -> dict[str, Any]:
     """
     import numpy as np
 
-    from annelid.experiment.outcome import outcome
-    from annelid.simulation.loop import simulate
-    from annelid.simulation.runfile import open_run
-    from annelid.simulation.stepping import build_controller, start
-    from annelid.simulation.worm import WormPlant
+    from annelid.analysis import rhythm_score, summary
+    from annelid.body import build_spec, compile_spec
+    from annelid.simulation import WormPlant, build_controller, open_run, simulate, start
     from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares
 
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
@@ -68,46 +70,52 @@ def measure(config: RunConfig) -> dict[str, Any]:
     controller = build_controller(config, plant)
     stepping = Stopwatch(plant, "step", "stride", reading=lambda: plant.data.time)
     watching, controlling = Stopwatch(plant, "alarm"), Stopwatch(controller, "step", "stride")
-
-    def progress(simulated_s: float, _: float) -> None:
-        _say(share=0.9 * simulated_s / config.duration_s)
-
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run"
         try:
-            run = simulate(config, path, plant=plant, controller=controller, progress=progress)
+            run = simulate(
+                config,
+                path,
+                plant=plant,
+                controller=controller,
+                progress=lambda simulated_s, _: _say(share=0.9 * simulated_s / config.duration_s),
+            )
         except SimulationStopped:
             run = open_run(path)
         peak = peak_memory_bytes()
         if run.status == "interrupted":
             raise KeyboardInterrupt
-        read = outcome(run)
+        numbers, rhythm = summary(run), rhythm_score(run)
     total_s = run.wall_time_s
     plant_s, control_s = stepping.seconds + watching.seconds, controlling.seconds
-    simulated_s = read.summary.duration_s or 0.0
+    simulated_s = numbers.duration_s or 0.0
     # From one movement to the next the whole loop goes round, recording included.
     laps_ms = 1e3 * laps_s(stepping.ends, stepping.readings, config.clock.physics_timestep_s)
     again = start(config, plant, controller, None)
     engine = engine_times(again, plant, stepping, min(ENGINE_S, config.duration_s), ENGINE_WALL_S)
-    build_s, compile_s = _building(config)
+    began = perf_counter()
+    spec = build_spec(config)
+    built = perf_counter()
+    compile_spec(spec)
+    compiled = perf_counter()
     return {
         "status": run.status,
-        "message": read.message,
+        "message": run.message,
         "wall_s": total_s,
-        "real_time_factor": read.summary.real_time_factor,
+        "real_time_factor": numbers.real_time_factor,
         "simulated_s": simulated_s,
         "step_median_ms": float(np.median(laps_ms)) if laps_ms.size else None,
         "step_mean_ms": float(np.mean(laps_ms)) if laps_ms.size else None,
         "shares": shares(total_s, plant_s, control_s, engine),
         "peak_memory_MB": None if peak is None else peak / _MB,
-        "build_s": build_s,
-        "compile_s": compile_s,
+        "build_s": built - began,
+        "compile_s": compiled - built,
         "velocities": int(plant.model.nv),
         "constraint_rows_mean": float(np.mean(engine.constraints or 0)),
         "solver_iterations_mean": float(np.mean(engine.iterations or 0)),
         "solver_iterations_max": max(engine.iterations, default=0),
-        "rhythm": {"verdict": read.rhythm.verdict, "reason": read.rhythm.reason},
-        "summary": read.summary.to_dict(),
+        "rhythm": {"verdict": rhythm.verdict, "reason": rhythm.reason},
+        "summary": numbers.to_dict(),
         "load_average_1min": load,
     }
 
@@ -128,27 +136,6 @@ def peak_memory_bytes() -> int | None:
     except ImportError:
         return None
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-
-
-def _measured(request: dict[str, Any]) -> dict[str, Any]:
-    if "config" not in request:
-        from annelid_studies.bench.peer import peer
-
-        return peer()
-    from annelid.config import load_config
-
-    return measure(load_config(request["config"]))
-
-
-def _building(config: RunConfig) -> tuple[float, float]:
-    """Times the making of the specification and its compilation by the engine, s."""
-    from annelid.body import build_spec, compile_spec
-
-    began = perf_counter()
-    spec = build_spec(config)
-    built = perf_counter()
-    compile_spec(spec)
-    return built - began, perf_counter() - built
 
 
 def _say(**content: Any) -> None:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import SubFigure
+from matplotlib.lines import Line2D
+from rich.table import Table as TerminalTable
 
-from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid_studies.tables import terminal_table
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import SubFigure
-    from rich.table import Table as TerminalTable
 
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""
@@ -29,14 +28,9 @@ _SHARE_COLORS = ("#1b2a6b", "#3658a7", "#5f8fd0", "#35b5a0", "#8fd3c5", "#c5cdd6
 
 
 def bench_table(report: Mapping[str, Any]) -> TerminalTable:
-    """Lays out the cases of a benchmark for the terminal, one a row.
-
-    Args:
-        report: The content of ``bench.json``.
-    """
+    """Lays out the cases of a benchmark, the content of ``bench.json``, for the terminal, one a row."""
     references = list(report["fronts"])
-    errors = [f"error, %, against {name}" for name in references]
-    header = ["case", "ms a step", "x real time", "memory, MB", *errors]
+    header = ["case", "ms a step", "x real time", "memory, MB", *(f"error, %, against {name}" for name in references)]
     rows = [_row(entry, references) for entry in report["cases"]]
     peer, caption = report["peer"] or {}, ""
     if peer.get("real_time_factor"):
@@ -54,7 +48,7 @@ def _row(entry: Mapping[str, Any], references: Sequence[str]) -> list[str]:
     compared = entry.get("errors", {})
     if compared and entry["rhythm"]["verdict"] != "ordered":
         name = f"{name}: {entry['rhythm']['reason']}"
-    percents = [_percent(compared[reference]["largest"]) if reference in compared else "" for reference in references]
+    percents = [_shown(compared[name]["largest"], ".2f", 100.0) if name in compared else "" for name in references]
     return [name, *_numbers(entry), _shown(entry["peak_memory_MB"], ".0f"), *percents]
 
 
@@ -62,55 +56,39 @@ def _numbers(entry: Mapping[str, Any]) -> list[str]:
     return [_shown(entry[key], ".3g") for key in ("step_mean_ms", "real_time_factor")]
 
 
-def _percent(error: float | None) -> str:
-    return _shown(None if error is None else 100.0 * error, ".2f")
+def _shown(value: float | None, digits: str, scale: float = 1.0) -> str:
+    return "-" if value is None else format(scale * value, digits)
 
 
-def _shown(value: float | None, digits: str) -> str:
-    return "-" if value is None else format(value, digits)
-
-
-def bench_figure(report: Mapping[str, Any], stem: str | Path) -> Path:
-    """Draws a benchmark.
+def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
+    """Draws a benchmark, the content of ``bench.json``.
 
     Above: error (the larger of elongation's and period's) against times real time, one panel for each converged run;
     one colour for each number of elements, one marker for each step, hollow where the rhythm is not ordered; the dotted
     line joins the cases that no other beats. Below: time of a step against the number of segments with the slope, and
     its shares by phase. Panels for which nothing was measured stay out.
-
-    Args:
-        report: The content of ``bench.json``.
-        stem: Path of both files without suffix.
-
-    Returns:
-        Path of the PNG.
-
-    Raises:
-        RunFileError: A file cannot be written.
     """
     measured = [entry for entry in report["cases"] if "failed" not in entry]
     judged = [entry for entry in measured if entry["kind"] == "judged"]
     scaled = [entry for entry in measured if {"segments", "chain"} & set(entry["lines"])]
     divided = _divided(measured)
-    panels: dict[Callable[[SubFigure], None], float] = {}
+    panels: list[tuple[float, Callable[[SubFigure], None]]] = []
     if judged and report["fronts"]:
-        panels[lambda part: _fronts(part, report, judged)] = 2.9
+        panels.append((2.9, lambda part: _fronts(part, report, judged)))
     if scaled:
-        panels[lambda part: _cost(part, scaled, report["cost_exponents"])] = 2.7
+        panels.append((2.7, lambda part: _cost(part, scaled, report["cost_exponents"])))
     if divided:
-        panels[lambda part: _shares(part, divided)] = 1.2 + 0.24 * len(divided)
-    heights = list(panels.values())
+        panels.append((1.2 + 0.24 * len(divided), lambda part: _shares(part, divided)))
+    heights = [height for height, _ in panels]
     with canvas(sum(heights) or 1.0) as figure:
         if panels:
             rows = figure.subfigures(len(panels), 1, height_ratios=heights, squeeze=False)[:, 0]
-            for part, draw in zip(rows, panels, strict=True):
+            for part, (_, draw) in zip(rows, panels, strict=True):
                 draw(part)
         return save_both(figure, stem)
 
 
 def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -> None:
-    from matplotlib.lines import Line2D
-
     references = list(report["fronts"])
     elements = sorted({entry["elements_per_side"] for entry in judged})
     steps = sorted({entry["physics_step_ms"] for entry in judged})
@@ -118,20 +96,26 @@ def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -
     markers = dict(zip(steps, _MARKERS, strict=False))
     panels = part.subplots(1, len(references), sharey=True, squeeze=False)[0]
     for axes, reference in zip(panels, references, strict=True):
-        points = {entry["name"]: _point(entry, reference) for entry in judged}
-        best = [points[name] for name in report["fronts"][reference] if points.get(name)]
-        axes.plot(*np.array(best).T if best else ((), ()), ":", color=_FADED, linewidth=1.0, zorder=1)
+        points = {
+            entry["name"]: (speed, max(100.0 * error, _LEAST_PERCENT))
+            for entry in judged
+            if (error := entry["errors"][reference]["largest"]) is not None
+            and (speed := entry["real_time_factor"]) is not None
+        }
+        best = [points[name] for name in report["fronts"][reference] if name in points]
+        axes.plot(*np.reshape(best, (-1, 2)).T, ":", color=_FADED, linewidth=1.0, zorder=1)
         for entry in judged:
-            point = points[entry["name"]]
-            if point is None:
-                continue
-            color = colors[entry["elements_per_side"]]
-            face = color if entry["rhythm"]["verdict"] == "ordered" else "none"
-            marker = markers[entry["physics_step_ms"]]
-            axes.plot(*point, marker, color=color, markerfacecolor=face, markersize=5.5, zorder=2)
+            if entry["name"] in points:
+                color = colors[entry["elements_per_side"]]
+                face = color if entry["rhythm"]["verdict"] == "ordered" else "none"
+                look = {"color": color, "markerfacecolor": face, "markersize": 5.5, "zorder": 2}
+                axes.plot(*points[entry["name"]], markers[entry["physics_step_ms"]], **look)
         _front_axes(axes, report, f"Against {reference} (0.5 ms)")
     panels[0].set_ylabel("error of elongation or period (%)")
-    meshes = [Line2D([], [], color=color, linewidth=4, label=_count(n)) for n, color in colors.items()]
+    meshes = [
+        Line2D([], [], color=color, linewidth=4, label=f"{n} element{'s' if n > 1 else ''}")
+        for n, color in colors.items()
+    ]
     grey: dict[str, Any] = {"color": _FADED, "linestyle": "", "markersize": 5}
     paces = [Line2D([], [], marker=marker, label=f"{step:g} ms", **grey) for step, marker in markers.items()]
     if any(entry["rhythm"]["verdict"] != "ordered" for entry in judged):
@@ -139,10 +123,6 @@ def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -
     spacing: dict[str, Any] = {"columnspacing": 1.2, "handletextpad": 0.5}
     part.legend(handles=meshes, loc="outside lower left", ncols=(len(meshes) + 1) // 2, **spacing)
     part.legend(handles=paces, loc="outside lower right", ncols=(len(paces) + 1) // 2, **spacing)
-
-
-def _count(elements: int) -> str:
-    return f"{elements} element{'s' if elements > 1 else ''}"
 
 
 def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
@@ -153,7 +133,10 @@ def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
     limit = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "right", "color": "#c2410c"}
     axes.annotate(f"{TOLERATED_PERCENT:g} %", (1.0, TOLERATED_PERCENT), **limit, **words)
     axes.axvline(1.0, color=_FADED, linewidth=0.8, zorder=0)
-    outsiders = sorted(_outsiders(report).items())
+    # Speeds to compare with that have no error of the same kind: the paper's formulation and the peer.
+    chains = [one for one in report["cases"] if one["formulation"] == "chain" and one["n_segments"] == 3]
+    named = [*((one, "paper's chain") for one in chains), (report.get("peer") or {}, "PyElastica, free rods")]
+    outsiders = sorted({speed: name for one, name in named if (speed := one.get("real_time_factor"))}.items())
     for speed, _ in outsiders:
         axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
     # Words stand to the left of their lines, but for the faster outsider's: the two lines may be close.
@@ -166,23 +149,6 @@ def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
     axes.margins(x=0.08, y=0.12)
     axes.set_xlabel("times real time (one core, recording on)")
     panel_title(axes, title)
-
-
-def _outsiders(report: Mapping[str, Any]) -> dict[float, str]:
-    """Speeds to compare with that have no error of the same kind: the paper's formulation and the peer."""
-    found: dict[float, str] = {}
-    for entry in report["cases"]:
-        if entry.get("real_time_factor") and entry["formulation"] == "chain" and entry["n_segments"] == 3:
-            found[entry["real_time_factor"]] = "paper's chain"
-    peer = report.get("peer") or {}
-    if peer.get("real_time_factor"):
-        found[peer["real_time_factor"]] = "PyElastica, free rods"
-    return found
-
-
-def _point(entry: Mapping[str, Any], reference: str) -> tuple[float, float] | None:
-    error, speed = entry["errors"][reference]["largest"], entry["real_time_factor"]
-    return None if error is None or speed is None else (speed, max(100.0 * error, _LEAST_PERCENT))
 
 
 def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mapping[str, float]]) -> None:

@@ -7,10 +7,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from annelid.draw.page import html_page
+from annelid.draw import html_page
 from annelid.markdown import anchors, code, emphasis, plain_table, strong, table, words
-from annelid.output import whole_file
+from annelid.output import write_text
 from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, tally
+from annelid_studies.riddle2023.words import capitalised
+from annelid_studies.tables import grouped
 
 TITLE = "The paper, reproduced and examined"
 PAPER = "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control"
@@ -34,57 +36,35 @@ def write_report(report: Report, folder: Path) -> Path:
         OSError: The folder cannot be made, or a picture cannot be read.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    head, sections = _head(report), _sections(report, folder)
-    contents, content = _contents(sections), "\n\n".join(sections)
-    _write(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
-    _write(folder / HTML_NAME, html_page(TITLE, head, contents, content, folder))
-    return folder / HTML_NAME
+    intro = f"Every figure and claim of {emphasis(PAPER)} (Riddle et al. 2023) from our own runs."
+    head = f"# {TITLE}\n\n{intro} {_provenance(report)}"
+    blocks = [
+        "## Summary",
+        *_summary(report),
+        *_main_numbers_and_claims(report),
+        *_figures(report.figures, folder),
+        *_examinations(report.examinations, folder),
+        *_how_to_reproduce(report),
+    ]
+    contents, content = _contents(blocks), "\n\n".join(blocks)
+    write_text(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
+    return write_text(folder / HTML_NAME, html_page(TITLE, head, contents, content, folder))
 
 
 def claims_page(report: Report) -> str:
-    """Returns the Markdown of the repository's page of claims.
-
-    Args:
-        report: A whole report.
-    """
+    """Returns the Markdown of the repository's page of claims, of a whole report."""
     intro = (
         f"What the paper, {emphasis(PAPER)} (Riddle et al. 2023), shows and claims, beside what annelid measures. "
         f"Every number of ours comes from a run; this page is written by {code(CLAIMS_COMMAND)}, together with the "
         f"whole report: its figures and its examinations."
     )
-    blocks = ["# The paper's claims", intro, *_paragraphs(report.summary), *_headlines(report.examinations)]
-    blocks += [_provenance(report), *_main_numbers(report)]
-    return "\n\n".join([*blocks, *_claims(report.claims, report.rule)]) + "\n"
-
-
-def _write(path: Path, text: str) -> None:
-    with whole_file(path) as draft:
-        draft.write_text(text, encoding="utf-8")
-
-
-def _head(report: Report) -> str:
-    intro = f"Every figure and claim of {emphasis(PAPER)} (Riddle et al. 2023) from our own runs."
-    return "\n\n".join([f"# {TITLE}", f"{intro} {_provenance(report)}"])
-
-
-def _sections(report: Report, folder: Path) -> list[str]:
-    """Returns the blocks of the report below its head, each a heading or what follows one."""
-    return [
-        "## Summary",
-        *_paragraphs(report.summary),
-        *_headlines(report.examinations),
-        *_main_numbers(report),
-        *_claims(report.claims, report.rule),
-        *_figures(report.figures, folder),
-        *_examinations(report.examinations, folder),
-        *_how_to_reproduce(report),
-    ]
+    blocks = ["# The paper's claims", intro, *_summary(report), _provenance(report), *_main_numbers_and_claims(report)]
+    return "\n\n".join(blocks) + "\n"
 
 
 def _contents(blocks: Iterable[str]) -> str:
-    headings = [
-        (len(marks), heading) for marks, _, heading in (block.partition(" ") for block in blocks) if set(marks) == {"#"}
-    ]
+    parts = (block.partition(" ") for block in blocks)
+    headings = [(len(marks), heading) for marks, _, heading in parts if set(marks) == {"#"}]
     links = anchors(heading.replace("\\", "") for _, heading in headings)
     rows = zip(headings, links, strict=True)
     return "\n".join(f"{'  ' * (level - 2)}- [{heading}](#{link})" for (level, heading), link in rows)
@@ -92,46 +72,34 @@ def _contents(blocks: Iterable[str]) -> str:
 
 def _provenance(report: Report) -> str:
     effort = "Quick report, with coarser maps than the full one" if report.effort == "quick" else "Full report"
-    facts = [effort, *(f"{words(label)} {words(value)}" for label, value in report.provenance.items())]
-    return " · ".join(facts)
+    return " · ".join([effort, *(f"{words(label)} {words(value)}" for label, value in report.provenance.items())])
 
 
 def _paragraphs(texts: Iterable[str]) -> list[str]:
     return [words(text) for text in texts if text.strip()]
 
 
-def _headlines(examinations: Sequence[Examined]) -> list[str]:
-    """A list of what each examination found."""
-    if not examinations:
-        return []
-    lines = [f"- {strong(each.examination.title + '.')} {words(each.findings.answer)}" for each in examinations]
-    return ["What the examinations found:", "\n".join(lines)]
+def _summary(report: Report) -> list[str]:
+    """The summary, and what each examination found."""
+    found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]
+    return [*_paragraphs(report.summary), *(["What the examinations found:", "\n".join(found)] if found else [])]
 
 
-def _main_numbers(report: Report) -> list[str]:
-    return ["## Main numbers", plain_table(report.main_table)]
-
-
-def _claims(claims: Sequence[Claim], rule: Sequence[str]) -> list[str]:
-    if not claims:
-        return []
-    blocks = ["## Claims", f"{len(claims)} claims. {tally(claims)}.", *_paragraphs(rule)]
-    topics = dict.fromkeys(claim.topic for claim in claims)
+def _main_numbers_and_claims(report: Report) -> list[str]:
+    blocks = ["## Main numbers", plain_table(report.main_table)]
+    if report.claims:
+        blocks += ["## Claims", f"{len(report.claims)} claims. {tally(report.claims)}.", *_paragraphs(report.rule)]
     first = 1
-    for topic in topics:
-        numbered = list(enumerate((claim for claim in claims if claim.topic == topic), first))
-        rows = [
-            [str(n), words(claim.claim), strong(_verdict(claim)), words(claim.paper), words(claim.ours)]
-            for n, claim in numbered
-        ]
-        notes = [f"{n}. {_note(claim, indent=' ' * (len(str(n)) + 2))}" for n, claim in numbered]
-        blocks += [f"### {_heading(topic)}", table(["#", "Claim", "Verdict", "Paper", "Ours"], rows), "\n".join(notes)]
-        first += len(numbered)
+    for topic, claims in grouped(report.claims, lambda claim: claim.topic).items():
+        rows, notes = [], []
+        for n, claim in enumerate(claims, first):
+            verdict = strong(f"{claim.verdict} {claim.within}".strip())
+            rows.append([str(n), words(claim.claim), verdict, words(claim.paper), words(claim.ours)])
+            notes.append(f"{n}. {_note(claim, indent=' ' * (len(str(n)) + 2))}")
+        heads = ["#", "Claim", "Verdict", "Paper", "Ours"]
+        blocks += [f"### {words(capitalised(topic))}", table(heads, rows), "\n".join(notes)]
+        first += len(claims)
     return blocks
-
-
-def _verdict(claim: Claim) -> str:
-    return f"{claim.verdict} {claim.within}".strip()
 
 
 def _note(claim: Claim, indent: str) -> str:
@@ -141,14 +109,8 @@ def _note(claim: Claim, indent: str) -> str:
     return f"\\\n{indent}".join([said, *commands] if said else commands)
 
 
-def _heading(text: str) -> str:
-    return words(text[:1].upper() + text[1:])
-
-
 def _figures(figures: Sequence[Figure], folder: Path) -> list[str]:
-    if not figures:
-        return []
-    blocks = ["## Figures of the paper"]
+    blocks = ["## Figures of the paper"] if figures else []
     for figure in figures:
         name = f"Figure {figure.number}"
         caption = f"**{name}.** {words(figure.caption)}"
@@ -157,14 +119,13 @@ def _figures(figures: Sequence[Figure], folder: Path) -> list[str]:
 
 
 def _examinations(examinations: Sequence[Examined], folder: Path) -> list[str]:
-    if not examinations:
-        return []
-    blocks = ["## Examinations"]
+    blocks = ["## Examinations"] if examinations else []
     for examined in examinations:
         asked, found = examined.examination, examined.findings
         picture = _picture(examined.picture, asked.title, folder)
         answer = [strong(found.answer), picture, emphasis(found.caption), plain_table(found.table)]
-        blocks += [f"### {_heading(asked.title)}", words(asked.question), *answer, *_paragraphs(found.remarks)]
+        blocks += [f"### {words(capitalised(asked.title))}", words(asked.question), *answer]
+        blocks += _paragraphs(found.remarks)
     return [block for block in blocks if block]
 
 
@@ -175,14 +136,16 @@ def _picture(picture: Path, title: str, folder: Path) -> str:
 
 def _how_to_reproduce(report: Report) -> list[str]:
     whole = f"annelid paper -o report{' --quick' if report.effort == 'quick' else ''}"
-    parts = [(each.examination.title, f"{whole} --only {each.examination.name}") for each in report.examinations]
-    here = whole if report.claims else " ".join([whole, *(part.removeprefix(f"{whole} ") for _, part in parts)])
-    commands = [("this report", here), *parts, ("the page of claims in the repository", CLAIMS_COMMAND)]
-    told = (
+    names = [one.examination.name for one in report.examinations]
+    here = whole if report.claims else " ".join([whole, *(f"--only {name}" for name in names)])
+    commands = [("this report", here)]
+    commands += [(one.examination.title, f"{whole} --only {one.examination.name}") for one in report.examinations]
+    commands.append(("the page of claims in the repository", CLAIMS_COMMAND))
+    kept = (
         "Each claim names the command that makes its number; `annelid show RUN` then prints it. Every run of this "
         "report is kept in `runs`, every figure as PNG and SVG in `figures`. A second call computes only what is "
         "missing or has changed."
     )
     versions = table(["What", "Value"], [[words(name), words(value)] for name, value in report.provenance.items()])
     rows = [[words(what), code(command)] for what, command in commands]
-    return ["## How to reproduce", told, table(["To make", "Command"], rows), versions]
+    return ["## How to reproduce", kept, table(["To make", "Command"], rows), versions]

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
-from math import isfinite, nan
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cache
+from math import inf, isfinite, nan
+from typing import Any, NamedTuple
 
-from annelid.analysis.paper import ROBOT_ELONGATION_M
-from annelid.body.actuators.muscle import Rings
-from annelid.body.actuators.servo import ServoRings
-from annelid.body.assemble import mesh_of
-from annelid.body.worm import WormBody
+from annelid.analysis import ROBOT_ELONGATION_M
+from annelid.body import Rings, WormBody, mesh_of, muscle_force
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Hold, Outcome
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.store import Store, case_key
-from annelid_studies.riddle2023.figures.muscle_surface import closed_form_flv, scaled_length
+from annelid.experiment import Case, Hold, Outcome, Store
+from annelid_studies.riddle2023.figures.muscle_surface import scaled_length
 from annelid_studies.worms import RODS
 
 PRESET = "wang"
@@ -66,23 +60,16 @@ ACTUATORS = ("force-limited", "servo", "muscle", "length-limited")
 """Kinds of actuators; all segments of a worm have the same."""
 
 
-@dataclass(frozen=True)
-class Actuator:
-    """One kind of actuator, and how strongly it pulls.
-
-    Attributes:
-        kind: One of `ACTUATORS`.
-        setting: How strongly, in words.
-        changes: Fields of the base worm that it changes, by their dotted paths.
-        activation: Activation of the pulled segment.
-    """
+class Actuator(NamedTuple):
+    """One of `ACTUATORS`, how strongly it pulls in words, and what of the base worm and its activation makes it so."""
 
     kind: str
     setting: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Mapping[str, Any]
     activation: float = 1.0
 
 
+@cache
 def base_body() -> WormBody:
     """Returns the body of the base worm: the preset's with the authors' mesh."""
     body = load_config(PRESET, AUTHORS_MESH).body
@@ -90,119 +77,93 @@ def base_body() -> WormBody:
     return body
 
 
-def base_servos() -> ServoRings:
-    """Returns the servos of the base worm."""
-    rings = base_body().rings
-    assert isinstance(rings, ServoRings)
-    return rings
-
-
+@cache
 def papers_muscle() -> Rings:
     """Returns the paper's muscle in the base worm's layout."""
     body = load_config(RODS).body
     assert isinstance(body, WormBody)
-    return body.muscles.model_copy(update={"layout": base_servos().layout})
+    return body.muscles.model_copy(update={"layout": base_body().rings.layout})
+
+
+@cache
+def rest_ring_m() -> float:
+    """Length of a ring of the base worm at rest, m."""
+    return round(float(mesh_of(base_body().mesh).ring_length_m[0]), 6)
 
 
 # The cable's own damping delays the standstill and changes nothing of it.
 _QUICK_CABLE = {"body.rings.damping_Ns_per_m": 1.0}
 
 
-def force_limited(force_N: float | tuple[float, ...]) -> Actuator:
-    """A servo that winds until it stalls: its shortest cable is out of reach.
-
-    Args:
-        force_N: Tension all round the ring, N; one for all segments, or one a segment.
-    """
-    forces = force_N if isinstance(force_N, tuple) else (force_N,)
-    changes = {
+def _winding(force_N: float | list[float], stiffness_N_per_m: float, shortest_m: float) -> dict[str, Any]:
+    return {
         **_QUICK_CABLE,
-        "body.rings.force_limit_N": list(force_N) if isinstance(force_N, tuple) else force_N,
-        "body.rings.stiffness_N_per_m": SOFT_N_PER_M,
-        "body.rings.length_range_m": [round(SHORTEST * rest_ring_m(), 6), rest_ring_m()],
+        "body.rings.force_limit_N": force_N,
+        "body.rings.stiffness_N_per_m": stiffness_N_per_m,
+        "body.rings.length_range_m": [shortest_m, rest_ring_m()],
     }
-    return Actuator("force-limited", f"{' / '.join(f'{one:.2f}' for one in forces)} N", changes)
+
+
+def force_limited(*force_N: float) -> Actuator:
+    """A servo that winds until it stalls at a tension all round the ring, N, one for all segments or one a segment.
+
+    Its shortest cable is out of reach.
+    """
+    forces = list(force_N) if len(force_N) > 1 else force_N[0]
+    changes = _winding(forces, SOFT_N_PER_M, round(SHORTEST * rest_ring_m(), 6))
+    return Actuator("force-limited", f"{' / '.join(f'{one:.2f}' for one in force_N)} N", changes)
 
 
 def length_limited(length_m: float) -> Actuator:
-    """A servo that winds its cable to a length, whatever force that takes.
-
-    Args:
-        length_m: Slack length of a whole ring's cable when wound, m.
-    """
-    changes = {
-        **_QUICK_CABLE,
-        "body.rings.force_limit_N": OUT_OF_REACH_N,
-        "body.rings.stiffness_N_per_m": STIFF_N_PER_M,
-        "body.rings.length_range_m": [length_m, rest_ring_m()],
-    }
-    return Actuator("length-limited", f"{length_m:.4f} m", changes)
+    """A servo that winds a ring's whole cable to a slack length, m, whatever force that takes."""
+    return Actuator("length-limited", f"{length_m:.4f} m", _winding(OUT_OF_REACH_N, STIFF_N_PER_M, length_m))
 
 
 def servo() -> Actuator:
     """The base worm's servo: its force limit, its speed limit and its range of lengths."""
-    servos = base_servos()
+    servos = base_body().rings
     shortest = servos.length_ranges(1)[0][0]
     return Actuator("servo", f"{servos.forces(1)[0]:.2f} N, {shortest:g} m", _QUICK_CABLE)
 
 
 def muscle(activation: float) -> Actuator:
     """The paper's muscle, whose force depends on its length, at an activation."""
-    return Actuator(
-        "muscle", f"activation {activation:.4f}", {"body.rings": papers_muscle().model_dump()}, round(activation, 6)
-    )
+    changes = {"body.rings": papers_muscle().model_dump()}
+    return Actuator("muscle", f"activation {activation:.4f}", changes, round(activation, 6))
 
 
 def muscle_activation(force_N: float, ring_length_m: float) -> float:
     """Activation at which the paper's muscle, standing still, pulls with a force at a length of its ring."""
     rings = papers_muscle()
     length = scaled_length(ring_length_m, rings.length_ranges(1)[0])
-    return float(force_N / (rings.forces(1)[0] * closed_form_flv(length, 0.0, rings)))
-
-
-def rest_ring_m() -> float:
-    """Length of a ring of the base worm at rest, m."""
-    return round(float(mesh_of(base_body().mesh).ring_length_m[0]), 6)
+    return float(force_N / (rings.forces(1)[0] * muscle_force(length, 0.0, rings)))
 
 
 def pull(segment: int, actuator: Actuator, changes: Mapping[str, Any] | None = None) -> Case:
-    """Returns the run in which one segment is pulled and all others rest.
+    """Returns the run in which one segment, from 1, is pulled and all others rest.
 
-    Args:
-        segment: The segment, from 1.
-        actuator: What pulls.
-        changes: Fields of worm, ground or resolution that differ from the base worm and this study's settings.
+    Worm, ground and resolution are the base worm's and this study's but for the changes.
     """
-    contractions = [
-        {"segment": segment, "start_s": 0.0, "stop_s": stop, "activation": actuator.activation} for stop in READ_S
-    ]
-    ramp_s = RAMP_S if actuator.kind == "muscle" else 0.0
-    own: dict[str, Any] = {
-        "duration_s": DURATION_S,
-        "controller": {"kind": "program", "ramp_s": ramp_s, "contractions": contractions},
+    contraction = {"segment": segment, "start_s": 0.0, "activation": actuator.activation}
+    program = {
+        "kind": "program",
+        "ramp_s": RAMP_S if actuator.kind == "muscle" else 0.0,
+        "contractions": [{**contraction, "stop_s": stop} for stop in READ_S],
     }
+    own = {"duration_s": DURATION_S, "controller": program}
     return Case(PRESET, {**AUTHORS_MESH, **RESOLUTION, **STANDSTILL, **actuator.changes, **(changes or {}), **own})
 
 
 @dataclass(frozen=True, slots=True)
 class Pulled:
-    """What is read of one pulled segment.
+    """What is read of one pulled segment."""
 
-    Attributes:
-        segment: The segment, from 1.
-        elongation_m: Mean of its left and right sensor above their rest length, m; NaN where there is no reading.
-        ring_length_m: Length of its ring, m.
-        force_N: Tension all round its ring, N.
-        drift_m: How much it lengthened in the last half second, m.
-        problem: Why the reading does not count; empty if it does.
-    """
-
-    segment: int
-    elongation_m: float
-    ring_length_m: float
-    force_N: float
-    drift_m: float
-    problem: str
+    segment: int  # The segment, from 1
+    elongation_m: float  # Mean of its left and right sensor above their rest length, m; NaN where there is no reading
+    ring_length_m: float  # Length of its ring, m
+    force_N: float  # Tension all round its ring, N
+    drift_m: float  # How much it lengthened in the last half second, m
+    problem: str  # Why the reading does not count; empty if it does
 
 
 def read_pull(segment: int, outcome: Outcome) -> Pulled:
@@ -247,19 +208,12 @@ Key = tuple[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """How strongly the kinds of actuators pull where an end is to elongate by `END_M`.
+    """How strongly the kinds of actuators pull where an end is to elongate by `END_M`."""
 
-    Attributes:
-        length_m: Cable of the length-limited actuator, m.
-        ring_length_m: Length of the ring that this gives, m.
-        force_N: Limit of the force-limited actuator, N.
-        activation: Activation of the muscle that has the tension of the wound cable at the same length.
-    """
-
-    length_m: float
-    ring_length_m: float
-    force_N: float
-    activation: float
+    length_m: float  # Cable of the length-limited actuator, m
+    ring_length_m: float  # Length of the ring that this gives, m
+    force_N: float  # Limit of the force-limited actuator, N
+    activation: float  # Activation of the muscle that has the tension of the wound cable at the same length
 
     def actuators(self) -> dict[str, Actuator]:
         """Returns one actuator of each kind; the servo is the base worm's, whatever the setting."""
@@ -267,12 +221,12 @@ class Setting:
         return dict(zip(ACTUATORS, made, strict=True))
 
 
+Readings = Mapping[float, Pulled]
+"""What was read of an end by the length (m) or the force (N) that was set."""
+
+
 def settings(
-    store: Store,
-    worms: Mapping[Key, Mapping[str, Any]],
-    guesses_m: Mapping[Key, Sequence[float]],
-    jobs: int | None,
-    progress: StudyProgress | None,
+    store: Store, worms: Mapping[Key, Mapping[str, Any]], guesses_m: Mapping[Key, Sequence[float]]
 ) -> dict[Key, Setting]:
     """Sets the actuators for several worms.
 
@@ -283,61 +237,50 @@ def settings(
         store: Where runs are kept.
         worms: Fields in which each worm differs from the base worm, by any key.
         guesses_m: Cable lengths that the search for each worm begins with, m.
-        jobs: Processes; None for one a core.
-        progress: Called as runs finish.
-
-    Returns:
-        A setting for every worm.
 
     Raises:
         ConfigError: An end does not come near `END_M`.
-        AnnelidError: A run cannot be built or written.
-        KeyboardInterrupt: Finished runs are kept.
     """
-    search = partial(_search, store, worms, jobs, in_stage(progress, "setting the actuators"))
-    lengths = search(length_limited, guesses_m, _next_lengths)
-    for key, readings in lengths.items():
+    found = {}
+    for key, readings in _search(store, worms, length_limited, guesses_m, _next_lengths).items():
         if _next_lengths(readings):
             changes = ", ".join(f"{field} = {value:g}" for field, value in worms[key].items())
             raise ConfigError(
                 f"with {changes or 'the base worm'} no cable length was found at which an end elongates by "
                 f"{100 * END_M:.2f} cm"
             )
-    found = {key: _setting(*nearest(readings)) for key, readings in lengths.items()}
+        length_m, reading = nearest(readings)
+        force = round(reading.force_N, 2)
+        activation = muscle_activation(force, reading.ring_length_m)
+        found[key] = Setting(length_m, reading.ring_length_m, force, activation)
     # An end near `END_M` is close to where a constant force collapses it, and friction holds it differently on the two
-    # ways there, so that the tension of the wound cable may be a percent too high. Where the search does not end, the
+    # paths there, so that the tension of the wound cable may be a percent too high. Where the search does not end, the
     # force counts that comes nearest.
-    forces = search(force_limited, {key: [one.force_N] for key, one in found.items()}, _next_forces)
+    forces = _search(store, worms, force_limited, {key: [one.force_N] for key, one in found.items()}, _next_forces)
     return {key: replace(one, force_N=nearest(forces[key])[0]) for key, one in found.items()}
-
-
-Readings = dict[float, Pulled]
-"""What was read of an end by the length (m) or the force (N) that was set."""
 
 
 def _search(
     store: Store,
     worms: Mapping[Key, Mapping[str, Any]],
-    jobs: int | None,
-    report: Callable[[int, int, float], object] | None,
     actuator: Callable[[float], Actuator],
     first: Mapping[Key, Sequence[float]],
     following: Callable[[Readings], Sequence[float]],
 ) -> dict[Key, Readings]:
     """Pulls an end of every worm, from first values on, until nothing follows from what was read, or `ROUNDS` times."""
-    tried: dict[Key, Readings] = {key: {} for key in worms}
+    tried: dict[Key, dict[float, Pulled]] = {key: {} for key in worms}
     wanted = dict(first)
     for _ in range(ROUNDS):
         cases = {
             (key, value): pull(1, actuator(value), worms[key]) for key, values in wanted.items() for value in values
         }
-        outcomes = store.compute(cases.values(), jobs=jobs, progress=report)
+        store.compute(cases.values(), "setting the actuators")
         for (key, value), case in cases.items():
-            tried[key][value] = read_pull(1, outcomes[case_key(case)])
+            tried[key][value] = read_pull(1, store[case])
         wanted = {key: values for key, readings in tried.items() if (values := following(readings))}
         if not wanted:
             break
-    return tried
+    return dict(tried)
 
 
 def _next_lengths(readings: Readings) -> Sequence[float]:
@@ -347,34 +290,30 @@ def _next_lengths(readings: Readings) -> Sequence[float]:
 
 
 def _next_forces(readings: Readings) -> Sequence[float]:
-    if _error(*nearest(readings)) <= FORCE_ERROR_M or next_force(readings) in readings:
-        return ()
-    return [next_force(readings)]
+    done = _error(*nearest(readings)) <= FORCE_ERROR_M or next_force(readings) in readings
+    return () if done else [next_force(readings)]
 
 
-def next_force(readings: Mapping[float, Pulled]) -> float:
+def next_force(readings: Readings) -> float:
     """Returns the force, N, to try after these readings: on the secant, or below the least one without a reading."""
     good = {force: one for force, one in readings.items() if not one.problem}
-    too_high = min((force for force, one in readings.items() if one.problem), default=float("inf"))
+    too_high = min((force for force, one in readings.items() if one.problem), default=inf)
     if not good:
         return round((1.0 - STEP_BACK) * too_high, 2)
-    force, reading = nearest(good)
-    others = sorted((one for one in good if one != force), key=lambda one: _error(one, good[one]))
+    (force, reading), *others = sorted(good.items(), key=lambda item: _error(*item))
     slope = force / SLOPE_M
-    if others and good[others[0]].elongation_m != reading.elongation_m:
-        slope = (others[0] - force) / (good[others[0]].elongation_m - reading.elongation_m)
+    if others and others[0][1].elongation_m != reading.elongation_m:
+        slope = (others[0][0] - force) / (others[0][1].elongation_m - reading.elongation_m)
     step = (END_M - reading.elongation_m) * (slope if slope > 0 else force / SLOPE_M)
-    if force + step >= too_high:
-        return round((force + too_high) / 2.0, 2)
-    return round(force + step, 2)
+    return round((force + too_high) / 2.0 if force + step >= too_high else force + step, 2)
 
 
-def nearest(readings: Mapping[float, Pulled]) -> tuple[float, Pulled]:
-    """Returns the length, m, and the reading that come nearest to `END_M`."""
+def nearest(readings: Readings) -> tuple[float, Pulled]:
+    """Returns the length, m, or force, N, and the reading that come nearest to `END_M`."""
     return min(readings.items(), key=lambda item: _error(*item))
 
 
-def next_length(readings: Mapping[float, Pulled]) -> float:
+def next_length(readings: Readings) -> float:
     """Returns the length, m, at which the secant through the two readings nearest to `END_M` reaches it."""
     (x1, one), (x2, two) = sorted(readings.items(), key=lambda item: _error(*item))[:2]
     slope = (two.elongation_m - one.elongation_m) / (x2 - x1)
@@ -383,9 +322,4 @@ def next_length(readings: Mapping[float, Pulled]) -> float:
 
 def _error(_: float, reading: Pulled) -> float:
     error = abs(reading.elongation_m - END_M)
-    return error if isfinite(error) and not reading.problem else float("inf")
-
-
-def _setting(length_m: float, reading: Pulled) -> Setting:
-    force = round(reading.force_N, 2)
-    return Setting(length_m, reading.ring_length_m, force, muscle_activation(force, reading.ring_length_m))
+    return error if isfinite(error) and not reading.problem else inf

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from rich.table import Table as TerminalTable
 
-from annelid.analysis.paper import ROBOT_ELONGATION_M, published
-from annelid.analysis.summary import interior_deficit
-from annelid.config import load_config
-from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
+from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M, interior_deficit
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import tabulated, terminal_table
-from annelid_studies.weak_middle.asymmetry import Answer, Asymmetry
 from annelid_studies.weak_middle.pulls import ACTUATORS, Key, Setting
 from annelid_studies.weak_middle.sweeps import (
     BASE,
@@ -24,90 +23,46 @@ from annelid_studies.weak_middle.sweeps import (
     QUANTITIES,
     STIFFNESS,
     WEIGHT,
+    Answer,
+    Asymmetry,
     Quantity,
     Reading,
     deficits,
 )
-from annelid_studies.worms import CHAIN
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from rich.table import Table as TerminalTable
-
+ROBOT_DEFICIT, PAPERS_DEFICIT = interior_deficit(ROBOT_ELONGATION_M), interior_deficit(PAPER_ELONGATION_M)
+"""How far the interior segments of the robot and of the paper's simulation stay below the ends, fractions."""
 PERCENT = 100.0
 FADED = "0.35"
-COLUMNS = (
-    "quantity",
-    "value",
-    "n_segments",
-    "actuator",
-    "setting",
-    "resolution",
-    "segment",
-    "elongation_cm",
-    "ring_length_m",
-    "force_N",
-    "drift_mm",
-    "deficit_percent",
-    "problem",
-)
 
 
-def write_readings(readings: Sequence[Reading], path: Path) -> None:
-    """Writes one row a pulled segment as CSV with a header; the deficit is that of its worm.
-
-    Raises:
-        RunFileError: The file cannot be written.
-    """
-    write_csv(path, COLUMNS, (row for reading in readings for row in _rows(reading)))
-
-
-def _rows(reading: Reading) -> Iterator[list[object]]:
-    point = reading.point
-    for one in reading.pulled:
-        yield [
-            point.quantity,
-            f"{point.value:g}",
-            point.n_segments,
-            point.actuator.kind,
-            point.actuator.setting,
-            point.resolution,
-            one.segment,
-            _number(100 * one.elongation_m, 3),
-            _number(one.ring_length_m, 4),
-            _number(one.force_N, 3),
-            _number(1e3 * one.drift_m, 3),
-            _number(100 * reading.deficit, 2),
-            one.problem,
-        ]
+def write_readings(readings: Sequence[Reading], path: Path) -> Path:
+    """Writes one row a pulled segment as CSV with a header, and returns its path; the deficit is that of its worm."""
+    rows = [
+        {
+            "quantity": reading.point.quantity,
+            "value": f"{reading.point.value:g}",
+            "n_segments": reading.point.n_segments,
+            "actuator": reading.point.actuator.kind,
+            "setting": reading.point.actuator.setting,
+            "resolution": reading.point.resolution,
+            "segment": one.segment,
+            "elongation_cm": _number(100 * one.elongation_m, 3),
+            "ring_length_m": _number(one.ring_length_m, 4),
+            "force_N": _number(one.force_N, 3),
+            "drift_mm": _number(1e3 * one.drift_m, 3),
+            "deficit_percent": _number(100 * reading.deficit, 2),
+            "problem": one.problem,
+        }
+        for reading in readings
+        for one in reading.pulled
+    ]
+    return write_csv(path, rows[0], (row.values() for row in rows))
 
 
-def robot_deficit() -> float:
-    """How far the robot's interior segments stay below its ends, a fraction."""
-    return interior_deficit(ROBOT_ELONGATION_M)
-
-
-def papers_deficit() -> float:
-    """The same of the paper's simulation, its first helix read peak to peak."""
-    elongation = published(load_config(CHAIN))["elongation_first_helix_pp_m"].value
-    assert isinstance(elongation, tuple)
-    return interior_deficit(elongation)
-
-
-def weak_middle_figure(readings: Sequence[Reading], stem: str | Path) -> Path:
-    """Draws the deficit over every quantity, a panel each, one line for every kind of actuator.
-
-    Args:
-        readings: The sweeps.
-        stem: Path without suffix; ``.svg`` and ``.png`` are written.
-
-    Returns:
-        The path of the picture in pixels.
-
-    Raises:
-        RunFileError: A file cannot be written.
-    """
-    marks = {"robot": robot_deficit(), "paper's\nmodel": papers_deficit()}
+def weak_middle_figure(readings: Sequence[Reading], stem: Path) -> Path:
+    """Draws the deficit over every quantity, a panel each, one line for every kind of actuator."""
+    marks = {"robot": ROBOT_DEFICIT, "paper's\nmodel": PAPERS_DEFICIT}
     largest = max([*marks.values(), *(one.deficit for one in readings if isfinite(one.deficit))])
     with canvas(6.0) as figure:
         grid = figure.subplots(2, 2, sharey=True, squeeze=False)
@@ -155,9 +110,7 @@ def settings_table(set_to: Mapping[Key, Setting]) -> TerminalTable:
             labels.get(name, name),
             f"{value:g}" if name in labels else "",
             f"{one.force_N:.2f}",
-            f"{one.length_m:.4f}",
-            f"{one.ring_length_m:.4f}",
-            f"{one.activation:.4f}",
+            *(f"{number:.4f}" for number in (one.length_m, one.ring_length_m, one.activation)),
         ]
         for (name, value), one in set_to.items()
     ]

@@ -7,6 +7,7 @@ from math import hypot, sin
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
@@ -156,21 +157,43 @@ def _settled_m(body: WormBody, rings: Rings, none_m: float, optimal_m: float, fo
     return shape.n_per_plane * hypotenuse * sin(closed * shape.opening_rad)
 
 
+def muscle_force(length: ArrayLike, velocity: ArrayLike, rings: Rings, activation: float = 1.0) -> Array:
+    """Computes the force of MuJoCo's muscle by its documented formula, ``activation FL(L) FV(V) + FP(L)``.
+
+    FL is a bump of four parabolas from lmin over 1 to lmax. FV is a parabola that reaches 0 at -vmax and 1 at rest,
+    then another that saturates at fvmax. FP is 0 up to 1, a parabola to half fpmax at the middle b between 1
+    and lmax, and its tangent from there: it passes fpmax midway between b and lmax, and is 1.5 fpmax at lmax.
+    MuJoCo's documentation, "Muscles", with its FLV.m.
+
+    Args:
+        length: Relative to the optimal length L0.
+        velocity: Relative to L0, 1/s; negative while the muscle shortens. Broadcast against the lengths.
+        rings: The muscle's parameters.
+        activation: In [0, 1].
+
+    Returns:
+        Pulling force relative to the peak force F0, in the shape of the broadcast arguments.
+    """
+    x, v = np.broadcast_arrays(np.asarray(length, float), np.asarray(velocity, float) / rings.maximum_velocity)
+    active, _ = _force_length(x, rings.minimum_length, rings.maximum_length)
+    speed, _ = _force_velocity(v, rings.lengthening_peak)
+    beyond = (2.0 * (x - 1.0) / (rings.maximum_length - 1.0)).clip(0.0)
+    passive = rings.passive_peak * np.where(beyond < 1.0, 0.5 * beyond**2, beyond - 0.5)
+    return activation * active * speed + passive
+
+
 def _active_share(length: float, rings: Rings) -> float:
-    """Active force of a muscle over its peak, at a length in optimal lengths: the engine's two parabolas."""
-    reach = 1.0 - rings.minimum_length if length < 1.0 else rings.maximum_length - 1.0
-    away = min(1.0, abs(length - 1.0) / reach)
-    return 1.0 - 2.0 * away**2 if away < 0.5 else 2.0 * (1.0 - away) ** 2
+    """Active force of a muscle over its peak, at a length in optimal lengths."""
+    return float(_force_length(np.asarray(length), rings.minimum_length, rings.maximum_length)[0])
 
 
 def _passive_share(length: float, rings: Rings) -> float:
     """Passive force of a muscle over its peak, at a length in optimal lengths."""
-    beyond = max(0.0, length - 1.0) / (0.5 * (rings.maximum_length - 1.0))
-    return rings.passive_peak * (0.5 * beyond**2 if beyond < 1.0 else beyond - 0.5)
+    return float(muscle_force(length, 0.0, rings, 0.0))
 
 
 def _force_length(x: Array, shortest: float, longest: float) -> tuple[Array, Array]:
-    """The active force's dependence on length, as `_active_share`, and its slope."""
+    """The active force's dependence on length, two parabolas on either side of 1, and its slope."""
     reach = np.where(x < 1.0, 1.0 - shortest, longest - 1.0)
     away = np.minimum(np.abs(x - 1.0) / reach, 1.0)
     value = np.where(away < 0.5, 1.0 - 2.0 * away**2, 2.0 * (1.0 - away) ** 2)
@@ -180,7 +203,8 @@ def _force_length(x: Array, shortest: float, longest: float) -> tuple[Array, Arr
 
 def _force_velocity(v: Array, lengthening_peak: float) -> tuple[Array, Array]:
     """The active force's dependence on the rate of length, and its slope."""
-    excess = lengthening_peak - 1.0
+    # Without excess nothing is left to saturate, and the limit guards the quotient.
+    excess = max(lengthening_peak - 1.0, 1e-300)
     shortening, lengthening = (v + 1.0).clip(0.0), (excess - v).clip(0.0)
     shortens = v <= 0.0
     value = np.where(shortens, shortening**2, lengthening_peak - lengthening**2 / excess)

@@ -48,7 +48,15 @@ class FormulationKind(Kind):
 
     @abstractmethod
     def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:
-        """Estimates the time, s, and the memory, GB, that it takes to build a mesh."""
+        """Estimates what it takes to build a mesh.
+
+        Args:
+            n_elements: Straight elements of all strands.
+            n_helices: Number of strands.
+
+        Returns:
+            The time, s, and the memory, GB.
+        """
 
     def check_body(self, body: WormBody) -> None:
         """Checks the section against the rest of its body.
@@ -76,7 +84,15 @@ class FormulationKind(Kind):
         """
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
-        """Returns what reads the largest gap at a pin, if pins can part, and the engine's arrays that it needs."""
+        """Finds what reads the largest gap at a pin.
+
+        Args:
+            model: The compiled body.
+            geometry: The mesh at rest.
+
+        Returns:
+            The reader, None where pins cannot part, and names of the engine's arrays that it needs.
+        """
         return None, ()
 
     def refuse_fidelity(self, level: str) -> None:

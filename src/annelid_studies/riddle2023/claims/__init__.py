@@ -3,10 +3,9 @@
 Places are those of Riddle et al. 2023, "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control".
 """
 
-from annelid_studies.riddle2023.claims.behaviour import control_claims, result_claims
-from annelid_studies.riddle2023.claims.discussion import discussion_claims, outlook_claims
+from annelid_studies.riddle2023.claims.discussion import discussion_claims, outlook_claims, result_claims
 from annelid_studies.riddle2023.claims.evidence import Evidence, claim_cases, rule
-from annelid_studies.riddle2023.claims.model import actuation_claims, structure_claims
+from annelid_studies.riddle2023.claims.model import actuation_claims, control_claims, structure_claims
 from annelid_studies.riddle2023.contents import Claim
 
 __all__ = ["Evidence", "claim_cases", "paper_claims", "rule"]
@@ -14,12 +13,5 @@ __all__ = ["Evidence", "claim_cases", "paper_claims", "rule"]
 
 def paper_claims(evidence: Evidence) -> list[Claim]:
     """Judges every claim, in the order of the paper."""
-    _, main = evidence.runs[0]
-    return [
-        *structure_claims(evidence, main),
-        *actuation_claims(evidence, main),
-        *control_claims(evidence),
-        *result_claims(evidence),
-        *discussion_claims(evidence, main),
-        *outlook_claims(evidence),
-    ]
+    topics = structure_claims, actuation_claims, control_claims, result_claims, discussion_claims, outlook_claims
+    return [claim for judge in topics for claim in judge(evidence)]

@@ -9,16 +9,13 @@ from math import nan
 
 import numpy as np
 
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
-from annelid.experiment.store import Store
+from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
-from annelid.simulation.runfile import Run
-from annelid_studies.riddle2023.contents import Verdict
-from annelid_studies.riddle2023.examination import Effort, Findings, Results
+from annelid.simulation import Run
+from annelid_studies import slip
+from annelid_studies.riddle2023.contents import Findings, Verdict
 from annelid_studies.riddle2023.examinations.design import WORMS
-from annelid_studies.slip import detection
-from annelid_studies.worms import CHAIN, FAST, PLANAR, chain, fast, one_after_the_other, rods
+from annelid_studies.worms import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
 EQUAL_RANGES = {"body.rings.length_range_m": [0.566, 1.067]}
@@ -47,26 +44,14 @@ TUBE_AREA_M2, POLYETHYLENE_KG_PER_M3 = 1.7e-5, 940.0
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the claims are judged by.
+    """What the claims are judged by."""
 
-    Attributes:
-        store: The runs.
-        results: Their outcomes.
-        effort: Quick or full.
-        findings: What each examination found, by its name.
-    """
-
-    store: Store
-    results: Results
-    effort: Effort
-    findings: dict[str, Findings]
+    store: Store  # The runs and their outcomes
+    effort: Effort  # Quick or full
+    findings: dict[str, Findings]  # What each examination found, by its name
 
     def number(self, examination: str, name: str) -> float:
-        """Returns a single result of an examination; NaN where a run did not come that far.
-
-        Raises:
-            KeyError: It has no number of that name; the error lists the valid ones.
-        """
+        """Returns a single result of an examination; NaN where a run did not come that far."""
         value = self.findings[examination].numbers[name]
         return nan if value is None else float(value)
 
@@ -78,12 +63,7 @@ class Evidence:
     def runs(self) -> Sequence[tuple[Outcome, Run]]:
         """The runs of the paper's own worm, as it is first."""
         cases = [MAIN, *(spread_cases(self.effort) if self.effort == "full" else ())]
-        return [(self.results[case], self.store.run(case)) for case in cases]
-
-    @property
-    def worms(self) -> Sequence[str]:
-        """Names of the worms that have examinations of their own at this effort, nearest to the paper's first."""
-        return list(LABELS) if self.effort == "full" else list(LABELS)[1:]
+        return [(self.store[case], self.store.run(case)) for case in cases]
 
 
 def spread_cases(effort: Effort) -> list[Case]:
@@ -97,12 +77,9 @@ def rule(evidence: Evidence) -> list[str]:
     """Says how all claims are judged."""
     perturbed = spread_cases(evidence.effort)
     n, n_seeds = len(perturbed), sum("seed" in case.changes for case in perturbed)
-    swings, periods = [], []
-    for case in perturbed:
-        swings.append(readings_m(evidence.store.run(case)))
-        periods.append(evidence.results[case].rhythm.period_s or nan)
     preset = perturbed[0].preset
-    swings = [readings_m(evidence.store.run(Case(preset))), *swings]
+    swings = [readings_m(evidence.store.run(case)) for case in (Case(preset), *perturbed)]
+    periods = [evidence.store[case].rhythm.period_s or nan for case in perturbed]
     apart = float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0)))
     spread = (
         f"Between the {n + 1} runs, {preset} as it is and the {n}, an elongation differs by up to {100 * apart:.1f} % "
@@ -165,23 +142,17 @@ def claim_cases(effort: Effort) -> Sequence[Case]:
         ),
         *PLANAR_CASES.values(),
         *(longer_worm(n, worm) for n, worm in longer_worms(effort)),
-        *(detection.CASES[name] for name in slip_runs(effort)),
+        *(slip.CASES[name] for name in slip_runs(effort)),
     ]
 
 
 def slip_runs(effort: Effort) -> Sequence[str]:
     """Names of the runs that the slip detector is judged on."""
-    return list(detection.CASES) if effort == "full" else detection.QUICK
+    return list(slip.CASES) if effort == "full" else slip.QUICK_CASES
 
 
 def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:
-    """Judges readings by a number of the paper's; see `rule`.
-
-    Args:
-        ours: All of our readings; NaN is near nothing.
-        paper: The paper's number.
-        on: What tells readings that are near from others, should there be both.
-    """
+    """Judges all of our readings, of which some may be NaN, by a number of the paper's; see `rule` and `judged`."""
     apart = [abs(one / paper - 1.0) for one in ours]
     if all(one <= EXACT for one in apart):
         return "holds", ""
@@ -191,12 +162,7 @@ def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:
 
 
 def judged(has: Iterable[bool], on: str = "") -> tuple[Verdict, str]:
-    """Judges whether runs or readings have a property; see `rule`.
-
-    Args:
-        has: Whether each has it.
-        on: What tells those that have it from others, should there be both.
-    """
+    """Judges whether runs or readings have a property; see `rule`. Those that do and others differ in what is named."""
     found = [bool(one) for one in has]
     if all(found):
         return "holds", ""

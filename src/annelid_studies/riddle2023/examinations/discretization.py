@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
+from annelid.draw import canvas, save_both
+from annelid.experiment import Store
 from annelid.morphology import Array
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Point, Reading, Worm
-from annelid_studies.riddle2023.examinations.words import CM, PERCENT
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.examinations import design
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Columns, Point, Reading, Worm
+from annelid_studies.riddle2023.words import CM, PERCENT
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import one_after_the_other
+from annelid_studies.worms import Effort, one_after_the_other
 
 EULER = {"body.formulation.integrator": "Euler", "clock.physics_timestep_s": 0.001}
 """At 2 ms the rings shoot to a few millimetres when a contraction sets in, and a guard ends the run."""
@@ -48,24 +48,12 @@ _OWN_INTEGRATOR = PAPERS.case({"body.mesh.elements_per_side": PRESETS_ELEMENTS, 
 """The chain held with the preset's RK4, to compare Euler's method with."""
 
 
-def _cases(effort: Effort) -> list[Case]:
-    return [*design.cases_of(_points(effort)), *([_OWN_INTEGRATOR] if effort == "full" else [])]
-
-
 def convergence_order(elements: ArrayLike, difference: ArrayLike, finest: float) -> float | None:
-    """Fits the order of convergence to differences from the finest mesh.
+    """Fits the order of convergence to the magnitudes of differences from the finest mesh.
 
     An error ``c n**-p`` makes a difference ``c (n**-p - N**-p)`` from the finest mesh of N elements. The order p, in
-    0.1 .. 8, is the one whose logarithm fits best in the mean square.
-
-    Args:
-        elements: Numbers of elements n below the finest, shape ``(n_meshes,)``.
-        difference: Magnitudes of the differences from the finest, same shape.
-        finest: N.
-
-    Returns:
-        The order; None with fewer than two differences, with one that is zero or no number, or if none within
-        the range fits best.
+    0.1 .. 8, is the one whose logarithm fits best in the mean square; None with fewer than two differences, with one
+    that is zero or no number, or if none within the range fits best.
     """
     n, e = np.asarray(elements, dtype=float), np.asarray(difference, dtype=float)
     if n.size < 2 or not (np.isfinite(e) & (e > 0)).all():
@@ -89,43 +77,26 @@ _LOOKS: Mapping[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class Convergence:
-    """How held contractions of one worm converge.
+class Convergence(NamedTuple):
+    """How held contractions of one worm converge."""
 
-    Attributes:
-        readings: One for each number of elements, the finest last.
-        difference: For each quantity its relative difference from the finest, root mean square over the segments, shape
-            ``(n_readings - 1,)``.
-        order: For each quantity the fitted order of convergence.
-    """
-
-    readings: Sequence[Reading]
+    worm: Worm
+    elements: Sequence[int]  # Numbers of elements, the finest mesh last
+    # For each quantity its relative difference from the finest, root mean square over the segments, shape ``(n_meshes -
+    # 1,)``
     difference: Mapping[str, Array]
-    order: Mapping[str, float | None]
-
-    @property
-    def worm(self) -> Worm:
-        """The worm."""
-        return self.readings[0].worm
-
-    @property
-    def elements(self) -> list[int]:
-        """Numbers of elements."""
-        return [int(one.value) for one in self.readings]
-
-    def of_presets(self, quantity: str) -> float:
-        """Difference of a quantity with the presets' mesh from the finest."""
-        return float(self.difference[quantity][self.elements.index(PRESETS_ELEMENTS)])
+    of_presets: Mapping[str, float]  # For each quantity that with the presets' mesh
+    order: Mapping[str, float | None]  # For each quantity the fitted order of convergence
 
 
 def measure_convergence(readings: Sequence[Reading]) -> Convergence:
     """Measures how held contractions converge; the finest mesh is the last."""
     *coarser, finest = readings
-    n = [one.value for one in coarser]
+    *n, most = elements = [int(one.value) for one in readings]
     difference = {name: np.array([_apart(name, one, finest) for one in coarser]) for name in QUANTITIES}
-    order = {name: convergence_order(n, apart, finest.value) for name, apart in difference.items()}
-    return Convergence(readings, difference, order)
+    of_presets = {name: float(apart[n.index(PRESETS_ELEMENTS)]) for name, apart in difference.items()}
+    order = {name: convergence_order(n, apart, most) for name, apart in difference.items()}
+    return Convergence(finest.worm, elements, difference, of_presets, order)
 
 
 def _apart(quantity: str, one: Reading, other: Reading) -> float:
@@ -134,13 +105,14 @@ def _apart(quantity: str, one: Reading, other: Reading) -> float:
     return float(np.sqrt(np.mean((values / reference - 1.0) ** 2)))
 
 
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    readings = design.read(_points(effort), results)
-    held = [measure_convergence(own) for own in design.by_worm(readings).values()]
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    readings = design.read(_points(effort), store)
+    by_worm = design.by_worm(readings)
+    held = [measure_convergence(own) for own in by_worm.values()]
     walks = [one for one in readings if one.walk]
     _draw(held, walks, stem)
     first = held[0]
-    coarse, fine = (words.span(QUANTITIES["ring length"](first.readings[i]), CM, digits=1) for i in (0, -1))
+    coarse, fine = (words.span(by_worm[first.worm][i].at_holds("ring_length_m"), CM, digits=1) for i in (0, -1))
     remarks = [
         "The differences are root mean squares over the three segments, each read at the end of its own contraction. "
         f"The rings of {first.worm.label} contract to {coarse} cm with {first.elements[0]} and to {fine} cm with "
@@ -152,15 +124,15 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         walks,
         {
             "verdict_{worm}_{value:g}": lambda one: words.rhythm(one.rhythm),
-            "period_{worm}_{value:g}_s": lambda one: one.period_s,
+            "period_{worm}_{value:g}_s": lambda one: one.closed.rhythm.period_s,
         },
     )
     for found in held:
-        for name in QUANTITIES:
+        for name, apart in found.of_presets.items():
             kind = f"{name.replace(' ', '_')}_{found.worm.name}"
-            numbers |= {f"difference_{kind}": found.of_presets(name), f"order_{kind}": found.order[name]}
+            numbers |= {f"difference_{kind}": apart, f"order_{kind}": found.order[name]}
     if effort == "full":
-        own = Reading(PAPERS, PRESETS_ELEMENTS, hold=results[_OWN_INTEGRATOR])
+        own = Reading(PAPERS, PRESETS_ELEMENTS, hold=store[_OWN_INTEGRATOR])
         euler = next(one for one in readings if (one.worm, one.value) == (PAPERS, PRESETS_ELEMENTS))
         apart = {name: _apart(name, euler, own) for name in QUANTITIES}
         numbers |= {f"euler_from_rk4_{name.replace(' ', '_')}": value for name, value in apart.items()}
@@ -170,27 +142,23 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             f"{words.all_in_cm(own.held_m)} cm."
         )
     lines = {"-": "solid", "--": "dashed", ":": "dotted"}
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "elements a side": lambda one: f"{one.value:g}",
+        "ring held (m)": lambda one: words.each_in_unit(one.at_holds("ring_length_m"), digits=3),
+        "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
+        "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
+        "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
+        "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
+    }
     return Findings(
         answer=" ".join([*map(_convergence_in_words, held), _walks_in_words(walks)]),
-        caption=(
-            "Left: relative difference of held contractions from the finest mesh over the number of elements a rhombus "
-            f"side ({words.listed(f'{found.worm.label} against {found.elements[-1]}' for found in held)} elements; "
-            f"{words.listed(f'{found.worm.label} {lines[found.worm.line]}' for found in held)}), root mean square over "
-            f"the three segments. Right: largest elongation of each segment of {RIGID.label} in closed loop (mean of "
-            f"its springs), {len(walks)} runs; a cross over a marker: the run does not walk 1-2-3."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "elements a side": lambda one: f"{one.value:g}",
-                "ring held (m)": lambda one: words.each_in_unit(QUANTITIES["ring length"](one), digits=3),
-                "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
-                "force held (N)": lambda one: words.each_in_unit(QUANTITIES["force"](one)),
-                "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
-                "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
-            },
-        ),
+        caption="Left: relative difference of held contractions from the finest mesh over the number of elements a "
+        f"rhombus side ({words.listed(f'{found.worm.label} against {found.elements[-1]}' for found in held)} elements; "
+        f"{words.listed(f'{found.worm.label} {lines[found.worm.line]}' for found in held)}), root mean square over the "
+        f"three segments. Right: largest elongation of each segment of {RIGID.label} in closed loop (mean of its "
+        f"springs), {len(walks)} runs; a cross over a marker: the run does not walk 1-2-3.",
+        table=tabulated(readings, columns),
         remarks=remarks,
         numbers=numbers,
     )
@@ -205,7 +173,7 @@ def _convergence_in_words(found: Convergence) -> str:
     slow = ", slower than first order" if orders and max(orders) < 1.0 else ""
     return (
         f"Held contractions of {found.worm.label} with {PRESETS_ELEMENTS} elements a side differ from those with "
-        f"{found.elements[-1]} by {_in_words({name: found.of_presets(name) for name in QUANTITIES})}; the fitted order "
+        f"{found.elements[-1]} by {_in_words(found.of_presets)}; the fitted order "
         f"of convergence is {words.span(orders, digits=1)}{slow}."
     )
 
@@ -215,7 +183,7 @@ def _walks_in_words(walks: Sequence[Reading]) -> str:
     bad = [f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in walks if not one.walks]
     elongations = np.array([one.walked_m for one in good])
     spread = float((np.ptp(elongations, axis=0) / elongations.mean(axis=0)).max()) if good else None
-    periods = [one.period_s for one in good if one.period_s is not None]
+    periods = [words.number(one.closed.rhythm.period_s) for one in good]
     return (
         f"In closed loop {RIGID.label} walk 1-2-3 with {words.listed(f'{one.value:g}' for one in good)} elements a "
         f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s, "
@@ -231,35 +199,27 @@ def _draw(held: Sequence[Convergence], walks: Sequence[Reading], stem: Path) -> 
                 hollow = {"markerfacecolor": "white"} if found.worm is PAPERS else {}
                 look = {**_LOOKS[name], "linestyle": found.worm.line, "markersize": 5.0, **hollow}
                 left.plot(found.elements[:-1], PERCENT * difference, **look)
-        plots.draw_over(right, walks, lambda one: CM * one.walked_m)
-        for one in walks:
-            if not one.walks:
-                plots.cross_out(right, one.value, CM * one.walked_m, 8.0)
+        design.draw_over(right, walks, lambda one: CM * one.walked_m)
+        design.cross_out(right, walks, lambda one: CM * one.walked_m, 8.0)
+        coarser, walked = {n for one in held for n in one.elements[:-1]}, {one.value for one in walks}
         for axes, title, label, counts in (
-            (
-                left,
-                "Held contractions",
-                "difference from the finest (%)",
-                {n for one in held for n in one.elements[:-1]},
-            ),
-            (right, f"Walking, {RIGID.label}", "largest elongation (cm)", {one.value for one in walks}),
+            (left, "Held contractions", "difference from the finest (%)", coarser),
+            (right, f"Walking, {RIGID.label}", "largest elongation (cm)", walked),
         ):
-            plots.label_panel(axes, title, "elements per rhombus side", label, sorted(counts), logarithmic=True)
+            design.label_panel(axes, title, "elements per rhombus side", label, sorted(counts), logarithmic=True)
         left.set_yscale("log")
         left.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        handles = [plots.look_handle(name, linestyle="none", **look) for name, look in _LOOKS.items()]
-        crossed = plots.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black")
-        plots.legend_below(figure, [*handles, crossed, *plots.segment_handles()], columns=4)
+        handles = [design.look_handle(name, linestyle="none", **look) for name, look in _LOOKS.items()]
+        crossed = design.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black")
+        design.legend_below(figure, [*handles, crossed, *design.segment_handles()], columns=4)
         save_both(figure, stem)
 
 
 DISCRETIZATION = Examination(
-    name="discretization",
-    title="Elements per rhombus side",
-    question=(
-        "The paper divides each rhombus side into three straight elements. Are held contractions and the walk "
-        "converged there?"
-    ),
-    cases=_cases,
-    examine=_examine,
+    "discretization",
+    "Elements per rhombus side",
+    "The paper divides each rhombus side into three straight elements. Are held contractions and the walk converged "
+    "there?",
+    lambda effort: [*design.cases_of(_points(effort)), *([_OWN_INTEGRATOR] if effort == "full" else [])],
+    _examine,
 )

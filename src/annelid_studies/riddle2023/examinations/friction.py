@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
-from annelid_studies.riddle2023.examinations.words import CM, MM, PERCENT
+from annelid.draw import canvas, save_both
+from annelid.experiment import Case, Store
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.examinations import design
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading, Worm
+from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import one_after_the_other, rods
+from annelid_studies.worms import Effort, one_after_the_other, rods
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
 FEW = (0.05, 0.2, 0.4, 1.0, 1.5)
@@ -25,8 +26,6 @@ IMPEDANCE_RATIOS = (100.0, 1000.0)
 NEGLIGIBLE_M = 0.01
 """Travel below this, a fiftieth of the body in two cycles, is called negligible."""
 
-_FIELD = "arena.friction"
-
 
 def frictions_of(worm: Worm, effort: Effort) -> Sequence[float]:
     """Returns the frictions at which a worm is walked."""
@@ -36,17 +35,14 @@ def frictions_of(worm: Worm, effort: Effort) -> Sequence[float]:
 
 
 def _points(effort: Effort) -> list[Point]:
-    return [
-        Point(worm, friction, worm.case({_FIELD: friction}), _hold(worm, friction))
-        for worm in WORMS
-        for friction in frictions_of(worm, effort)
-    ]
-
-
-def _hold(worm: Worm, friction: float) -> Case | None:
-    if worm is PAPERS or friction not in (SLIPPERY, PAPERS_FRICTION):
-        return None
-    return worm.case({**one_after_the_other(), _FIELD: friction})
+    points = []
+    for worm in WORMS:
+        for friction in frictions_of(worm, effort):
+            changes = {"arena.friction": friction}
+            held = worm is not PAPERS and friction in (SLIPPERY, PAPERS_FRICTION)
+            hold = worm.case({**one_after_the_other(), **changes}) if held else None
+            points.append(Point(worm, friction, worm.case(changes), hold))
+    return points
 
 
 def _solved(effort: Effort) -> dict[tuple[float, float], Case]:
@@ -59,14 +55,10 @@ def _solved(effort: Effort) -> dict[tuple[float, float], Case]:
     }
 
 
-def _cases(effort: Effort) -> Sequence[Case]:
-    return [*design.cases_of(_points(effort)), *_solved(effort).values()]
-
-
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    readings = design.read(_points(effort), results)
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    readings = design.read(_points(effort), store)
     held = [one for one in readings if one.hold]
-    solved = {at: design.number(results[case].summary.travel_m) for at, case in _solved(effort).items()}
+    solved = {at: words.number(store[case].summary.travel_m) for at, case in _solved(effort).items()}
     _draw(readings, held, stem)
     at_papers = [one for one in readings if one.value == PAPERS_FRICTION]
     numbers = design.numbered(
@@ -80,103 +72,87 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     numbers |= design.numbered(held, {"deficit_open_mean_friction_{value:g}_{worm}": lambda one: one.held_deficit})
     numbers["travel_friction_1_m"] = at_papers[0].travel_m
     numbers |= {f"travel_rods_{MM * step:g}ms_impratio_{ratio:g}_m": travel for (step, ratio), travel in solved.items()}
+    orders = []
     for worm, own in design.by_worm(readings).items():
-        numbers[f"frictions_that_walk_{worm.name}"] = words.listed(f"{one.value:g}" for one in own if one.walks)
+        walk = numbers[f"frictions_that_walk_{worm.name}"] = words.listed(f"{one.value:g}" for one in own if one.walks)
+        fail = words.listed(f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in own if not one.walks)
+        orders.append(f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}, lost at {fail}.")
+    convergence = ""
+    if solved:
+        spread, scale = float(np.ptp(list(solved.values()))), float(np.mean(np.abs(list(solved.values()))))
+        artefact = "no artefact of step or friction cone" if spread < 0.2 * scale else "known to that accuracy only"
+        sizes = [f"{words.in_cm(t)} cm at {MM * dt:g} ms and impratio {ratio:g}" for (dt, ratio), t in solved.items()]
+        convergence = (
+            f"Convergence, rods with rigid crossings at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. "
+            f"The spread is {words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel is "
+            f"{artefact}."
+        )
     small = [one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M]
     parts = [rough.held_deficit - smooth.held_deficit for smooth, rough in design.by_worm(held).values()]
-    travels = words.told(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm")
+    travels = words.by_worm(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm")
     slippery = {one.worm: words.in_percent(one.held_deficit) for one in held if one.value == SLIPPERY}
-    deficits = words.told(
+    deficits = words.by_worm(
         (one for one in held if one.value == PAPERS_FRICTION),
         lambda one: (
             f"{slippery[one.worm]} % at {SLIPPERY:g} and {words.in_percent(one.held_deficit)} % at {one.value:g}"
         ),
     )
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "friction (1)": lambda one: f"{one.value:g}",
+        "travel forwards in 5 s (cm)": lambda one: words.in_cm(one.travel_m),
+        "elongation, mean of springs (cm)": lambda one: words.all_in_cm(one.walked_m),
+        "deficit (%)": lambda one: words.in_percent(one.deficit, 1),
+        "deficit, first helix (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit, 1),
+        "deficit, open loop (%)": lambda one: words.in_percent(one.held_deficit, 1),
+        "rhythm": lambda one: words.rhythm(one.rhythm),
+    }
     return Findings(
-        answer=(
-            f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is negligible "
-            f"for {words.labels(small)} of them. In open loop the deficit of segment 2 over all springs is {deficits}: "
-            f"friction makes {words.span(parts, PERCENT, 1)} percentage points of it."
-        ),
-        caption=(
-            "Closed loop, 5 s, over the coefficient of friction: travel of the centre of mass, positive towards the "
-            "front, against the wave; elongation of segments 1 and 2 (2 with empty markers), mean of six springs; the "
-            "deficit of segment 2 below 1 in the same reading, in closed loop (filled) and open loop (empty); rhythm. "
-            f"One run a point, {', '.join(str(len(own)) for own in design.by_worm(readings).values())} frictions."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "friction (1)": lambda one: f"{one.value:g}",
-                "travel forwards in 5 s (cm)": lambda one: words.in_cm(one.travel_m),
-                "elongation, mean of springs (cm)": lambda one: words.all_in_cm(one.walked_m),
-                "deficit (%)": lambda one: words.in_percent(one.deficit, 1),
-                "deficit, first helix (%)": lambda one: words.in_percent(one.helix_deficit, 1),
-                "deficit, open loop (%)": lambda one: (
-                    words.in_percent(one.held_deficit, 1) if one.hold else words.NOTHING
-                ),
-                "rhythm": lambda one: words.rhythm(one.rhythm),
-            },
-        ),
+        answer=f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is "
+        f"negligible for {words.labels(small)} of them. In open loop the deficit of segment 2 over all springs is "
+        f"{deficits}: friction makes {words.span(parts, PERCENT, 1)} percentage points of it.",
+        caption="Closed loop, 5 s, over the coefficient of friction: travel of the centre of mass, positive towards "
+        "the front, against the wave; elongation of segments 1 and 2 (2 with empty markers), mean of six springs; the "
+        "deficit of segment 2 below 1 in the same reading, in closed loop (filled) and open loop (empty); rhythm. One "
+        f"run a point, {', '.join(str(len(own)) for own in design.by_worm(readings).values())} frictions.",
+        table=tabulated(readings, columns),
         remarks=[
-            *(_orders(worm, own) for worm, own in design.by_worm(readings).items()),
-            *([_convergence(solved)] if solved else []),
-            *([f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only."] if not solved else []),
+            *orders,
+            convergence or f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only.",
         ],
         numbers=numbers,
-    )
-
-
-def _orders(worm: Worm, own: Sequence[Reading]) -> str:
-    fail = [f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in own if not one.walks]
-    walk = words.listed(f"{one.value:g}" for one in own if one.walks)
-    return f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}, lost at {words.listed(fail)}."
-
-
-def _convergence(solved: dict[tuple[float, float], float]) -> str:
-    travels = list(solved.values())
-    sizes = [f"{words.in_cm(t)} cm at {MM * step:g} ms and impratio {ratio:g}" for (step, ratio), t in solved.items()]
-    spread, scale = max(travels) - min(travels), float(np.mean(np.abs(travels)))
-    artefact = "is no artefact of step or friction cone" if spread < 0.2 * scale else "is known to that accuracy only"
-    return (
-        f"Convergence, rods with rigid crossings at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. The "
-        "spread is "
-        f"{words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel {artefact}."
     )
 
 
 def _draw(readings: Sequence[Reading], held: Sequence[Reading], stem: Path) -> None:
     with canvas(5.4) as figure:
         (travel, elongation), (deficit, rhythms) = figure.subplots(2, 2)
-        plots.draw_over(travel, readings, lambda one: CM * one.travel_m)
+        design.draw_over(travel, readings, lambda one: CM * one.travel_m)
         travel.axhline(0.0, color="0.3", linewidth=0.8)
-        for worm, own in design.by_worm(readings).items():
-            for segment in (0, 1):
-                plots.draw_over(elongation, own, lambda one, i=segment: CM * one.walked_m[i], hollow=segment == 1)
-            plots.draw_over(deficit, own, lambda one: PERCENT * one.deficit)
-            opened = [one for one in held if one.worm is worm]
-            plots.draw_over(deficit, opened, lambda one: PERCENT * one.held_deficit, hollow=True, linewidth=0.9)
+        for segment in (0, 1):
+            design.draw_over(elongation, readings, lambda one, i=segment: CM * one.walked_m[i], hollow=segment == 1)
+        design.draw_over(deficit, readings, lambda one: PERCENT * one.deficit)
+        design.draw_over(deficit, held, lambda one: PERCENT * one.held_deficit, hollow=True, linewidth=0.9)
         elongation.set_ylim(bottom=0.0)
-        kinds = plots.draw_rhythms(rhythms, readings)
+        kinds = design.draw_rhythms(rhythms, readings)
         for axes, title, label in (
             (travel, "Travel", "forwards in 5 s (cm)"),
             (elongation, "Elongation of segments 1 and 2", "elongation (cm)"),
             (deficit, "Deficit", "segment 2 below segment 1 (%)"),
             (rhythms, "Rhythm", ""),
         ):
-            plots.label_panel(axes, title, "coefficient of friction (1)", label, FRICTIONS, logarithmic=True)
+            design.label_panel(axes, title, "coefficient of friction (1)", label, FRICTIONS, logarithmic=True)
             axes.set_xlim(0.042, 1.8)
-        opened = plots.look_handle("segment 2 / open loop", hollow=True, marker="o", linestyle="none")
-        plots.legend_below(figure, [*plots.worm_handles(), opened, *kinds], 4)
+        opened = design.look_handle("segment 2 / open loop", hollow=True, marker="o", linestyle="none")
+        design.legend_below(figure, [*design.worm_handles(), opened, *kinds], 4)
         save_both(figure, stem)
 
 
 FRICTION = Examination(
-    name="friction",
-    title="Friction of the floor",
-    question="The paper's worm hardly gets anywhere. How do travel, elongation and rhythm depend on friction, and is "
+    "friction",
+    "Friction of the floor",
+    "The paper's worm hardly gets anywhere. How do travel, elongation and rhythm depend on friction, and is "
     "the middle segment's deficit friction's work?",
-    cases=_cases,
-    examine=_examine,
+    lambda effort: [*design.cases_of(_points(effort)), *_solved(effort).values()],
+    _examine,
 )

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from annelid.analysis.rhythm import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore, contractions, segment_activation
-from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.analysis import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore, contractions, segment_activation
+from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
-from annelid.simulation.runfile import open_run
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import plots, words
+from annelid.simulation import open_run
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
-from annelid_studies.tables import tabulated
-from annelid_studies.worms import PLANAR
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from annelid_studies.riddle2023.words import MS
+from annelid_studies.tables import grouped, tabulated
+from annelid_studies.worms import PLANAR, Effort
 
 FLAT = Worm("planar", "planar worm, kinematic", "planar", lambda changes: Case(PLANAR, changes or {}), "D", "-", "0.5")
 STARTS = ("toolbox", "steady")
@@ -51,28 +50,15 @@ def variant(worm: Worm, start: str, scheme: str) -> Case:
     return worm.case({"controller.gate_start": start, "controller.scheme": scheme})
 
 
-def _cases(effort: Effort) -> list[Case]:
-    return [variant(worm, *pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs]
-
-
-@dataclass(frozen=True)
-class Beat:
-    """The contractions of a run.
-
-    Attributes:
-        worm: The worm.
-        start: How its gates started.
-        scheme: Update order of its network.
-        rhythm: Its score.
-        onsets_s: Onsets of all contractions, s.
-        contractions_s: Onset and release of each contraction of each segment, s; infinite where it does not end.
-    """
+class Beat(NamedTuple):
+    """The contractions of a run, with a start of the gates and an update order of the network."""
 
     worm: Worm
-    start: str
-    scheme: str
-    rhythm: RhythmScore
-    onsets_s: Sequence[float]
+    start: str  # How its gates started
+    scheme: str  # Update order of its network
+    rhythm: RhythmScore  # Its score
+    onsets_s: Sequence[float]  # Onsets of all contractions, s
+    # Onset and release of each contraction of each segment, s; infinite where it does not end
     contractions_s: tuple[Array, ...]
 
     @property
@@ -91,46 +77,39 @@ def read_beat(worm: Worm, start: str, scheme: str, outcome: Outcome) -> Beat:
     return Beat(worm, start, scheme, outcome.rhythm, outcome.summary.onsets_s, found)
 
 
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    beats = [
-        read_beat(worm, *pair, results[variant(worm, *pair)])
-        for worm, pairs in VARIANTS[effort].items()
-        for pair in pairs
-    ]
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    pairs = [(worm, pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs]
+    beats = [read_beat(worm, *pair, store[variant(worm, *pair)]) for worm, pair in pairs]
     _draw(beats, stem)
-    numbers: dict[str, float | str | None] = {}
+    numbers: dict[str, Number] = {}
     for beat in beats:
         tag = f"{beat.worm.name}_{beat.start}_{beat.scheme}"
         numbers[f"verdict_{tag}"] = words.kind(beat.rhythm)
         numbers[f"period_{tag}_s"] = beat.rhythm.period_s
         numbers[f"first_contraction_{tag}_s"] = beat.first_s
     flat = words.listed(
-        f"{words.in_unit(beat.rhythm.period_s, 1000.0, 1)} ms ({beat.start} start, {beat.scheme})"
+        f"{words.in_unit(beat.rhythm.period_s, MS, 1)} ms ({beat.start} start, {beat.scheme})"
         for beat in beats
         if beat.worm is FLAT
     )
+    columns: Mapping[str, Callable[[Beat], str]] = {
+        "worm": lambda beat: beat.worm.label,
+        "gate start": lambda beat: beat.start,
+        "update order": lambda beat: beat.scheme,
+        "rhythm": lambda beat: words.rhythm(beat.rhythm),
+        "period (s)": lambda beat: words.in_unit(beat.rhythm.period_s, digits=4),
+        "first onsets (s)": lambda beat: " ".join(map(words.in_unit, beat.onsets_s[:6])) or words.NOTHING,
+        "first contraction (s)": lambda beat: (
+            words.in_unit(beat.first_s) if np.isfinite(beat.first_s) else "to the end"
+        ),
+    }
     return Findings(
         answer=_answer(beats),
-        caption=(
-            f"When which segment contracts in the first {_SHOWN_S:g} s of closed loop, for each start of the sodium "
-            "gates (toolbox: as SNS-Toolbox starts them; steady: at the steady state of their neuron's potential) and "
-            "each update order of the network, one run a row. At the right, the period or, where there is none, "
-            "what became of the rhythm; rows without either were not run."
-        ),
-        table=tabulated(
-            beats,
-            {
-                "worm": lambda beat: beat.worm.label,
-                "gate start": lambda beat: beat.start,
-                "update order": lambda beat: beat.scheme,
-                "rhythm": lambda beat: words.rhythm(beat.rhythm),
-                "period (s)": lambda beat: words.in_unit(beat.rhythm.period_s, digits=4),
-                "first onsets (s)": lambda beat: " ".join(map(words.in_unit, beat.onsets_s[:6])) or words.NOTHING,
-                "first contraction (s)": lambda beat: (
-                    words.in_unit(beat.first_s) if np.isfinite(beat.first_s) else "to the end"
-                ),
-            },
-        ),
+        caption=f"When which segment contracts in the first {_SHOWN_S:g} s of closed loop, for each start of the "
+        "sodium gates (toolbox: as SNS-Toolbox starts them; steady: at the steady state of their neuron's potential) "
+        "and each update order of the network, one run a row. At the right, the period or, where there is none, what "
+        "became of the rhythm; rows without either were not run.",
+        table=tabulated(beats, columns),
         remarks=[
             f"The planar worm has no dynamics of its own, so its period is the network's: {flat}. By the design of "
             f"the network it is {3000.0 * DESIGN_INTERVAL_S:g} ms."
@@ -140,33 +119,26 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
 
 
 def _answer(beats: Sequence[Beat]) -> str:
-    groups: dict[tuple[str, Worm], list[Beat]] = {}
-    for beat in beats:
-        groups.setdefault((beat.start, beat.worm), []).append(beat)
+    groups = grouped(beats, lambda beat: (beat.start, beat.worm))
     walking, lasting = [], []
     for start in STARTS:
         own = {worm: group for (of, worm), group in groups.items() if of == start}
-        kinds = {
-            worm: sorted({words.kind(beat.rhythm) for beat in group if not beat.rhythm.is_one_wave})
-            for worm, group in own.items()
-        }
-        failing = [f"{worm.label} ({words.listed(of_worm)})" for worm, of_worm in kinds.items() if of_worm]
+        failing = []
+        for worm, group in own.items():
+            if kinds := sorted({words.kind(beat.rhythm) for beat in group if not beat.rhythm.is_one_wave}):
+                failing.append(f"{worm.label} ({words.listed(kinds)})")
         walking.append(
             f"with the {start} start of the gates {len(own) - len(failing)} of {len(own)} "
             f"(others: {words.listed(failing)})"
         )
         lasting.append(f"{words.span(beat.first_s for beat in beats if beat.start == start)} s with the {start} start")
     changed = sum(len({words.kind(beat.rhythm) for beat in group}) > 1 for group in groups.values())
-    periods = [
-        [beat.rhythm.period_s for beat in group if beat.rhythm.is_one_wave and beat.rhythm.period_s is not None]
-        for group in groups.values()
-    ]
-    spread = max((max(group) - min(group) for group in periods if group), default=None)
+    periods = [[b.rhythm.period_s or nan for b in group if b.rhythm.is_one_wave] for group in groups.values()]
+    spread = max((np.ptp(group) for group in periods if group), default=None)
     return (
         f"So many worms walk 1-2-3 with every update order that was run: {'; '.join(walking)}. The first contraction "
-        f"of segment 1 lasts {words.listed(lasting)}. The update order of the network changes the verdict in "
-        f"{changed} of {len(groups)} cases of a worm and a start, and the period by "
-        f"{words.in_unit(spread, 1000.0, 0)} ms at most."
+        f"of segment 1 lasts {words.listed(lasting)}. The update order of the network changes the verdict in {changed} "
+        f"of {len(groups)} cases of a worm and a start, and the period by {words.in_unit(spread, MS, 0)} ms at most."
     )
 
 
@@ -188,7 +160,7 @@ def _draw(beats: Sequence[Beat], stem: Path) -> None:
             axes.set_ylabel("gate start, update order")
         for axes in panels[-1]:
             axes.set_xlabel("time (s)")
-        plots.legend_below(figure, plots.segment_handles())
+        design.legend_below(figure, design.segment_handles())
         save_both(figure, stem)
 
 
@@ -207,12 +179,10 @@ def _draw_beat(axes: Axes, row: int, beat: Beat) -> None:
 
 
 GATE = Examination(
-    name="gate",
-    title="Gate start and update order",
-    question=(
-        "Does the rhythm depend on how the sodium gates start, and on the order in which the network's gates and "
-        "potentials are advanced?"
-    ),
-    cases=_cases,
-    examine=_examine,
+    "gate",
+    "Gate start and update order",
+    "Does the rhythm depend on how the sodium gates start, and on the order in which the network's gates and "
+    "potentials are advanced?",
+    lambda effort: [variant(worm, *pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs],
+    _examine,
 )

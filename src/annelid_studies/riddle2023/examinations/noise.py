@@ -1,4 +1,4 @@
-"""Sensor tolerance and noise: where the rhythm holds, with the paper's crossings and with rigid ones."""
+"""Sensor tolerance and noise: where the worm keeps its rhythm, with the paper's crossings and with rigid ones."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ from dataclasses import dataclass
 from math import sqrt
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch, Rectangle
 
 from annelid.analysis import RhythmScore
-from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, panel_title, save_both
-from annelid.experiment.case import Case
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import words
+from annelid.config import field_value
+from annelid.draw import canvas, panel_title, save_both
+from annelid.experiment import Case, Store
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings, Number
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
-from annelid_studies.riddle2023.examinations.words import MM
+from annelid_studies.riddle2023.words import MM
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import CHAIN
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from annelid_studies.worms import CHAIN, Effort
 
 EVEN = 0.9
 """Least regularity of a wave that does not limp."""
@@ -36,26 +35,18 @@ ONE_WAVE: Callable[[RhythmScore], bool] = attrgetter("is_one_wave")
 
 @dataclass(frozen=True)
 class NoiseMap:
-    """A worm's map.
-
-    Attributes:
-        worm: The worm.
-        tolerances_m: Tolerances of its sensors, m.
-        noises_m: Standard deviations of the noise on every reading, m.
-        n_seeds: Runs of each cell with noise.
-    """
+    """A worm's map."""
 
     worm: Worm
-    tolerances_m: Sequence[float]
-    noises_m: Sequence[float]
-    n_seeds: int
+    tolerances_m: Sequence[float]  # Tolerances of its sensors, m
+    noises_m: Sequence[float]  # Standard deviations of the noise on every reading, m
+    n_seeds: int  # Runs of each cell with noise
 
     def cell(self, tolerance_m: float, noise_m: float) -> list[Case]:
         """Returns the runs of one cell: one for each seed, or a single one without noise, which is deterministic."""
         changes = {"sensor.tolerance_m": tolerance_m, "sensor.noise_m": noise_m}
-        if not noise_m:
-            return [self.worm.case(changes)]
-        return [self.worm.case({**changes, "seed": seed}) for seed in range(self.n_seeds)]
+        seeds = [{"seed": seed} for seed in range(self.n_seeds)] if noise_m else [{}]
+        return [self.worm.case({**changes, **seed}) for seed in seeds]
 
     def cells(self) -> dict[tuple[float, float], list[Case]]:
         """Returns the runs of every cell."""
@@ -89,8 +80,8 @@ def _cases(effort: Effort) -> list[Case]:
 
 
 def is_even(score: RhythmScore) -> bool:
-    """Tells whether a rhythm is the paper's wave and does not limp."""
-    return score.is_one_wave and score.regularity is not None and score.regularity >= EVEN
+    """Whether a rhythm is the paper's wave and does not limp."""
+    return score.is_one_wave and words.number(score.regularity) >= EVEN
 
 
 def steady_tolerances(cells: Cells, noise_m: float, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> list[float]:
@@ -112,13 +103,8 @@ def share(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> flo
 
 def majority(scores: Sequence[RhythmScore]) -> str:
     """Returns the most frequent kind of rhythm; of two as frequent, the less ordered."""
-    counts = Counter(map(_kind, scores))
+    counts = Counter("limping" if one.is_one_wave and not is_even(one) else words.kind(one) for one in scores)
     return max(counts, key=lambda kind: (counts[kind], list(_FILLS).index(kind)))
-
-
-def _kind(score: RhythmScore) -> str:
-    kind = words.kind(score)
-    return "limping" if kind == "1-2-3" and not is_even(score) else kind
 
 
 # From order to silence and from light to dark, so that the map reads in greyscale.
@@ -132,25 +118,18 @@ _FILLS: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True)
-class _Read:
-    """A map with its runs, and what the rest of the examination takes from them."""
+class _Read(NamedTuple):
+    """A map with its runs, those of them in cells that all maps share, and the tolerances that need no luck, m."""
 
     chart: NoiseMap
     cells: Cells
     compared: Cells
+    window: Sequence[float]
+    even_window: Sequence[float]
 
     @property
     def worm(self) -> Worm:
         return self.chart.worm
-
-    @property
-    def window(self) -> list[float]:
-        return steady_tolerances(self.cells, 0.0)
-
-    @property
-    def even_window(self) -> list[float]:
-        return steady_tolerances(self.cells, 0.0, is_even)
 
     @property
     def breadth(self) -> float:
@@ -158,19 +137,25 @@ class _Read:
         return max(self.even_window) / min(self.even_window) if self.even_window else 0.0
 
 
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     mapped = {
-        chart: {place: [results[case].rhythm for case in cell] for place, cell in chart.cells().items()}
+        chart: {place: [store[case].rhythm for case in cell] for place, cell in chart.cells().items()}
         for chart in MAPS[effort]
     }
-    common = set.intersection(*map(set, mapped.values()))
+    common = sorted(set.intersection(*map(set, mapped.values())))
     maps = [
-        _Read(chart, cells, {place: cells[place] for place in sorted(common)} if common else cells)
+        _Read(
+            chart,
+            cells,
+            {place: cells[place] for place in common} or cells,
+            steady_tolerances(cells, 0.0),
+            steady_tolerances(cells, 0.0, is_even),
+        )
         for chart, cells in mapped.items()
     ]
     noisy_maps = [one for one in maps if max(one.chart.noises_m) > 0]
     _draw(maps, stem)
-    numbers: dict[str, float | str | None] = {"noise_common_cells": float(len(common))}
+    numbers: dict[str, Number] = {"noise_common_cells": float(len(common))}
     for one in maps:
         of_worm = {
             "noise_handled": handled_noise(one.cells),
@@ -187,19 +172,19 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
             "runs": float(sum(map(len, one.cells.values()))),
         }
         numbers |= {f"{name}_{one.worm.name}": value for name, value in of_worm.items()}
+    breadths = words.by_worm((one for one in maps if one.even_window), lambda one: f"{one.breadth:.1f}")
     remarks = [
-        "The largest tested tolerance with an even wave is so many times the smallest: "
-        f"{words.told((one for one in maps if one.even_window), lambda one: f'{one.breadth:.1f}')}. The true windows "
+        f"The largest tested tolerance with an even wave is so many times the smallest: {breadths}. The true windows "
         "are wider, by up to the next tested tolerances.",
         "The paper supposes that noise is handled by changing the sensor's threshold. The tolerances that keep every "
-        f"run in order, by noise: {'; '.join(_by_noise(one) for one in noisy_maps)}.",
-        _sensor_in_words(maps),
+        f"run in order, by noise: {'; '.join(map(_by_noise, noisy_maps))}.",
+        _sensor_in_words(max(noise for one in maps for noise in one.chart.noises_m)),
     ]
     if effort == "full":
-        noisy = [results[case].rhythm.is_one_wave for case in NOISY_AT_THE_PAPERS_STEP]
+        noisy = [store[case].rhythm.is_one_wave for case in NOISY_AT_THE_PAPERS_STEP]
         numbers["walking_share_noisy_papers_step"] = sum(noisy) / len(noisy)
         quiet = words.listed(
-            f"at {MM * tolerance:g} mm {words.rhythm(results[case].rhythm)}"
+            f"at {MM * tolerance:g} mm {words.rhythm(store[case].rhythm)}"
             for tolerance, case in AT_THE_PAPERS_STEP.items()
         )
         remarks.append(
@@ -209,26 +194,20 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         )
     else:
         remarks.append(f"The quick effort runs {PAPERS.label} at its own tolerance only.")
-    handled = words.told(
+    handled = words.by_worm(
         noisy_maps,
         lambda one: f"{words.in_unit(handled_noise(one.cells), MM, 0)} of {MM * max(one.chart.noises_m):g} mm",
     )
     return Findings(
-        answer=(
-            f"Without noise the worm walks in one wave 1-2-3 at tolerances of "
-            f"{words.told(maps, lambda one: _in_mm(one.window))}, and evenly at "
-            f"{words.told(maps, lambda one: _in_mm(one.even_window))}. "
-            f"{_fragility_in_words(maps, bool(common))} The largest noise under which some tolerance keeps every run "
-            f"in this wave is, of the largest tested, {handled}."
-        ),
-        caption=(
-            "Rhythm in closed loop over the tolerance of the stretch sensors and the standard deviation of their "
-            "noise. A cell's shade is the most frequent rhythm of its runs; the text says how many of them walk in a "
-            "single wave 1-2-3, and below it their mean regularity: 1 for a perfectly even wave; with less than "
-            f"{EVEN:g} it limps. With noise a cell is {maps[0].chart.n_seeds} runs of "
-            f"{PAPERS.case(None).config.duration_s:g} s, each with its own seed; without noise it is one run, which is "
-            "deterministic. Blank cells were not run."
-        ),
+        answer="Without noise the worm walks in one wave 1-2-3 at tolerances of "
+        f"{words.by_worm(maps, lambda one: _in_mm(one.window))}, and evenly at "
+        f"{words.by_worm(maps, lambda one: _in_mm(one.even_window))}. {_fragility_in_words(maps, bool(common))} The "
+        f"largest noise under which some tolerance keeps every run in this wave is, of the largest tested, {handled}.",
+        caption="Rhythm in closed loop over the tolerance of the stretch sensors and the standard deviation of their "
+        "noise. A cell's shade is the most frequent rhythm of its runs; the text says how many of them walk in a "
+        f"single wave 1-2-3, and below it their mean regularity: 1 for a perfectly even wave; with less than {EVEN:g} "
+        f"it limps. With noise a cell is {maps[0].chart.n_seeds} runs of {PAPERS.case(None).config.duration_s:g} s, "
+        "each with its own seed; without noise it is one run, which is deterministic. Blank cells were not run.",
         table=tabulated(
             [
                 (one, noise, [score for (_, level), cell in one.cells.items() if level == noise for score in cell])
@@ -245,16 +224,12 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
 _Row = tuple[_Read, float, Sequence[RhythmScore]]
 
 
-def _count(kind: str) -> Callable[[_Row], str]:
+def _of_kind(kind: str) -> Callable[[_Row], str]:
     return lambda row: str(sum(words.kind(score) == kind for score in row[2]))
 
 
 def _of_walks(name: str) -> Callable[[_Row], str]:
-    def text(row: _Row) -> str:
-        values = [getattr(score, name) for score in row[2] if score.is_one_wave]
-        return words.span(value for value in values if value is not None)
-
-    return text
+    return lambda row: words.span(words.number(getattr(score, name)) for score in row[2] if score.is_one_wave)
 
 
 _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
@@ -263,9 +238,9 @@ _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
     "all walk at (mm)": lambda row: _in_mm(steady_tolerances(row[0].cells, row[1])).removesuffix(" mm"),
     "walk 1-2-3": lambda row: f"{sum(map(ONE_WAVE, row[2]))} of {len(row[2])}",
     "evenly": lambda row: str(sum(map(is_even, row[2]))),
-    "other order": _count("other order"),
-    "disordered": _count("disordered"),
-    "silent": _count("silent"),
+    "other order": _of_kind("other order"),
+    "disordered": _of_kind("disordered"),
+    "silent": _of_kind("silent"),
     "regularity of walks": _of_walks("regularity"),
     "their period (s)": _of_walks("period_s"),
 }
@@ -279,13 +254,14 @@ def _fragility_in_words(maps: Sequence[_Read], in_common: bool) -> str:
     where = f"the {len(maps[0].compared)} cells that the three maps share" if in_common else "each map's own cells"
     walking = {one.worm: share(one.compared) for one in maps}
     evenly = {one.worm: share(one.compared, is_even) for one in maps}
-    measures = (walking, evenly, {one.worm: one.breadth for one in maps})
     parts, even_parts = (
-        words.told(maps, lambda one, of=measure: f"{words.in_percent(of[one.worm])} %") for measure in (walking, evenly)
+        words.listed(f"{words.in_percent(value)} % ({worm.label})" for worm, value in of.items())
+        for of in (walking, evenly)
     )
     fact = f"Of the runs in {where}, {parts} walk, {even_parts} evenly."
     if not in_common:
         return fact
+    measures = (walking, evenly, {one.worm: one.breadth for one in maps})
     wider = sum(measure[RIGID] > 1.05 * max(measure[PAPERS], measure[SOFT]) for measure in measures)
     verdict = {
         len(measures): "a good part of the loop's fragility is the soft crossings'",
@@ -302,22 +278,18 @@ def _by_noise(one: _Read) -> str:
     return f"{one.worm.label} (own tolerance {MM * one.worm.tolerance_m:g} mm), {', '.join(parts)}"
 
 
-def _sensor_in_words(maps: Sequence[_Read]) -> str:
-    most = max(noise for one in maps for noise in one.chart.noises_m)
+def _sensor_in_words(most_m: float) -> str:
     config = RIGID.case(None).config
-    assert isinstance(config.body, WormBody)
-    n_springs = config.body.mesh.n_helices // 2
+    n_springs = field_value(config, "body.mesh.n_helices") // 2
     return (
         f"Noise is normal, and drawn anew for every spring and every {MM * config.clock.control_timestep_s:g} ms. The "
-        f"sensor compares the mean of a segment's {n_springs} springs with the tolerance, so {MM * most:g} mm on each "
-        f"spring are {MM * most / sqrt(n_springs):.1f} mm on what it compares. In cells where some runs walk and some "
-        "do not, chance decides."
+        f"sensor compares the mean of a segment's {n_springs} springs with the tolerance, so {MM * most_m:g} mm on "
+        f"each spring are {MM * most_m / sqrt(n_springs):.1f} mm on what it compares. In cells where some runs walk "
+        "and some do not, chance decides."
     )
 
 
 def _draw(maps: Sequence[_Read], stem: Path) -> None:
-    from matplotlib.patches import Patch
-
     tolerances = sorted({tolerance for one in maps for tolerance in one.chart.tolerances_m})
     noises = sorted({noise for one in maps for noise in one.chart.noises_m})
     with canvas(1.35 + 0.38 * len(noises)) as figure:
@@ -342,8 +314,6 @@ def _draw(maps: Sequence[_Read], stem: Path) -> None:
 
 def _draw_cell(axes: Axes, x: int, y: int, scores: Sequence[RhythmScore]) -> None:
     """Shades a cell by its rhythm and writes into it how many runs walk, and how regularly."""
-    from matplotlib.patches import Rectangle
-
     kind = majority(scores)
     fill = _FILLS[kind]
     axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, linewidth=0.8, **fill))
@@ -357,13 +327,10 @@ def _draw_cell(axes: Axes, x: int, y: int, scores: Sequence[RhythmScore]) -> Non
 
 
 NOISE = Examination(
-    name="noise",
-    title="Sensor tolerance and noise",
-    question=(
-        "Within which tolerances of the stretch sensors, and up to which noise, does the worm keep its rhythm? How "
-        "much of the loop's fragility is the pins', and can noise be handled by changing the threshold, as the paper "
-        "supposes?"
-    ),
-    cases=_cases,
-    examine=_examine,
+    "noise",
+    "Sensor tolerance and noise",
+    "Within which tolerances of the stretch sensors, and up to which noise, does the worm keep its rhythm? How much of "
+    "the loop's fragility is the pins', and can noise be handled by changing the threshold, as the paper supposes?",
+    _cases,
+    _examine,
 )

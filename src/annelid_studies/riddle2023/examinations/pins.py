@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from annelid.body.assemble import build_spec
-from annelid.body.formulations.chain import Chain
-from annelid.body.formulations.rods import Rods
-from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save_both
+from annelid.body import Rods, WormBody, build_spec
+from annelid.config import field_value
+from annelid.draw import canvas, save_both
 from annelid.errors import ConfigError
-from annelid.experiment.case import Case
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading
+from annelid.experiment import Case, Store
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.examinations import design
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
-from annelid_studies.riddle2023.examinations.words import CM, MM, PERCENT
+from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import HOLD_S, chain, fast, one_after_the_other, rods
+from annelid_studies.worms import HOLD_S, Effort, chain, fast, one_after_the_other, rods
 
 STIFFNESSES_N_PER_M = (12.0, 21.5, 50.0, 100.0, 300.0, 1000.0)
 """Ties of the rods; 21.5 N/m are the preset's."""
@@ -47,12 +46,6 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     A soft constraint with time constant T and impedance d at critical damping pulls with ``K = k d / R`` per
     violation, where ``k = 1 / (d T)^2`` and ``R = (1 - d) / d`` times the inverse mass of the pair. Where strands are
     tied to each other without a pin between them, one tie does the work of two in series and counts double.
-
-    Args:
-        case: A case of a 3D worm.
-
-    Raises:
-        ConfigError: The case has no pins.
     """
     config = case.config
     if not isinstance(config.body, WormBody):
@@ -60,13 +53,14 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     formulation = config.body.formulation
     if isinstance(formulation, Rods):
         return formulation.pin_stiffness_N_per_m if formulation.pins == "separate" else float("inf")
-    assert isinstance(formulation, Chain)
     model = build_spec(config).compile()
     inverse_mass = model.body_invweight0[model.eq_obj1id, 0] + model.body_invweight0[model.eq_obj2id, 0]
-    impedance = formulation.pin_impedance[1]
-    reference = 1.0 / (impedance * formulation.pin_time_constant_s) ** 2
+    pins, (_, impedance, _), time_s = (
+        field_value(config, f"{_FORMULATION}.{name}") for name in ("pins", "pin_impedance", "pin_time_constant_s")
+    )
+    reference = 1.0 / (impedance * time_s) ** 2
     stiffness = reference * impedance / ((1.0 - impedance) / impedance * inverse_mass)
-    return float(stiffness.mean()) * (2.0 if formulation.pins == "direct" else 1.0)
+    return float(stiffness.mean()) * (2.0 if pins == "direct" else 1.0)
 
 
 def _tied(stiffness: float) -> dict[str, Any]:
@@ -76,19 +70,14 @@ def _tied(stiffness: float) -> dict[str, Any]:
     }
 
 
-def _sprung_damping_s() -> float | None:
-    body = fast().config.body
-    assert isinstance(body, WormBody)
-    return body.strands.damping_time_s
-
-
 _OWN_DAMPING = rods({**one_after_the_other(), "body.rings.length_range_m": compiled_ranges()})
+_DAMPING = "body.strands.damping_time_s"
 # Muscles and damping as the rods with soft crossings have them, so that the pins alone differ.
-_HELD_TIGHT = _OWN_DAMPING.but({"body.strands.damping_time_s": _sprung_damping_s()})
+_HELD_TIGHT = _OWN_DAMPING.but({_DAMPING: field_value(fast().config, _DAMPING)})
 
 
 def _points(effort: Effort) -> list[Point]:
-    """The worms, softest pins first; their stiffness is not worked out yet."""
+    """The worms, softest pins first; the value is worked out later."""
     paper = chain(one_after_the_other())
     chains = [paper]
     if effort == "full":
@@ -99,11 +88,7 @@ def _points(effort: Effort) -> list[Point]:
         Point(SOFT, k, fast(_tied(k)) if k in walked else None, fast({**one_after_the_other(), **_tied(k)}))
         for k in STIFFNESSES_N_PER_M
     ]
-    return [
-        *(Point(PAPERS, 0.0, hold=case) for case in chains),
-        *sprung,
-        Point(RIGID, 0.0, rods(), _HELD_TIGHT),
-    ]
+    return [*(Point(PAPERS, 0.0, hold=case) for case in chains), *sprung, Point(RIGID, 0.0, rods(), _HELD_TIGHT)]
 
 
 def _settling(effort: Effort) -> list[Case]:
@@ -112,13 +97,9 @@ def _settling(effort: Effort) -> list[Case]:
     return [case.but(long) for case in (_HELD_TIGHT, _OWN_DAMPING)] if effort == "full" else []
 
 
-def _cases(effort: Effort) -> Sequence[Case]:
-    return [*design.cases_of(_points(effort)), _OWN_DAMPING, *_settling(effort)]
-
-
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    points = [replace(one, value=tie_stiffness_N_per_m(one.hold)) for one in _points(effort) if one.hold]
-    readings = design.read(points, results)
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    points = [one._replace(value=tie_stiffness_N_per_m(one.hold)) for one in _points(effort) if one.hold]
+    readings = design.read(points, store)
     groups = design.by_worm(readings)
     chains, sprung, [tight] = groups[PAPERS], groups[SOFT], groups[RIGID]
     _draw(readings, stem)
@@ -126,8 +107,8 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
     paper, stiffest = chains[0], chains[-1]
     paper_m, tight_m = paper.held_m[0], tight.held_m[0]
     gaps_m, ring_m, tight_ring_m = paper.at_holds("pin_gap_m"), _rings(paper)[0], _rings(tight)[0]
-    own_m = design.held_elongation(results[_OWN_DAMPING])[0]
-    settled = [design.held_elongation(results[case])[0] for case in _settling(effort)]
+    own_m = design.held_elongation(store[_OWN_DAMPING])[0]
+    settled = [design.held_elongation(store[case])[0] for case in _settling(effort)]
     walked = [one for one in sprung if one.walk]
     ordered = words.listed(f"{one.value:g}" for one in walked if one.walks)
     others = words.listed(f"{one.value:g} ({words.kind(one.closed.rhythm)})" for one in walked if not one.walks)
@@ -140,9 +121,9 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         f"In closed loop the sensor tolerance is {MM * SOFT.tolerance_m:g} mm, which was chosen for ties of "
         f"{tie_stiffness_N_per_m(fast()):g} N/m. With it the rods walk 1-2-3 at {ordered} N/m, and not at {others} "
         f"N/m. Rigid crossings at {MM * RIGID.tolerance_m:g} mm: {words.rhythm(tight.rhythm)}.",
-        "The rods with rigid crossings here have the muscles and the damping of those with soft ones, so that only "
-        "the pins differ. "
-        f"With the damping of their own preset they elongate by {words.in_cm(own_m)} cm, {_beside(own_m, tight_m)}.",
+        "The rods with rigid crossings here have the muscles and the damping of those with soft ones, so that only the "
+        "pins differ. With the damping of their own preset they elongate by "
+        f"{words.in_cm(own_m)} cm, {_beside(own_m, tight_m)}.",
     ]
     if settled:
         passes = abs(settled[1] / settled[0] - 1.0) < 0.5 * abs(own_m / tight_m - 1.0)
@@ -154,36 +135,29 @@ def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
         )
         remarks.append(
             f"Held for {LONG_S:g} s in place of {HOLD_S:g} s, rods with rigid crossings elongate by "
-            f"{words.in_cm(settled[0])} cm with "
-            f"the damping of soft crossings and {words.in_cm(settled[1])} cm with their own: what the damping changes "
-            f"{'passes; the readings are of meshes still on their way to rest' if passes else 'lasts'}."
+            f"{words.in_cm(settled[0])} cm with the damping of soft crossings and {words.in_cm(settled[1])} cm with "
+            "their own: what the damping changes "
+            f"{'passes; the readings are of meshes that still come to rest' if passes else 'lasts'}."
         )
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
+        "elongation of 1 / 2 / 3 (cm)": lambda one: words.all_in_cm(one.held_m),
+        "largest gap (cm)": lambda one: words.all_in_cm(one.at_holds("pin_gap_m")) if one is not tight else "0",
+        "ring (m)": lambda one: words.each_in_unit(_rings(one), digits=3),
+        "closed loop": lambda one: words.rhythm(one.rhythm),
+    }
     return Findings(
-        answer=(
-            f"The paper's pins give like springs of {paper.value:.0f} N/m: with segment 1 held contracted, strands "
-            f"part by up to {words.in_cm(gaps_m[0], 1)} cm at a pin, and the segment elongates by "
-            f"{words.in_cm(paper_m)} cm. Rigid crossings give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} "
-            "times as "
-            f"much, at rings of {words.in_unit(ring_m)} and {words.in_unit(tight_ring_m)} m. Rods with ties of "
-            f"{sprung[-1].value:g} N/m reach {words.in_percent(sprung[-1].held_m[0] / tight_m)} % of that."
-        ),
-        caption=(
-            "Open loop: each of the three segments is held contracted for 0.8 s in turn. Its elongation (mean of six "
-            "springs), the largest gap at any pin, and its ring's length, over the stiffness of the tie between pin "
-            f"and strand. One run a point; {len(chains)} of the paper's chain, {len(sprung)} of rods with sprung pins, "
-            "one of rods with rigid crossings, drawn at the right edge. The rhythm is that of closed loops of 5 s."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
-                "elongation of 1 / 2 / 3 (cm)": lambda one: words.all_in_cm(one.held_m),
-                "largest gap (cm)": lambda one: words.all_in_cm(one.at_holds("pin_gap_m")) if one is not tight else "0",
-                "ring (m)": lambda one: words.each_in_unit(_rings(one), digits=3),
-                "closed loop": lambda one: words.rhythm(one.rhythm),
-            },
-        ),
+        answer=f"The paper's pins give like springs of {paper.value:.0f} N/m: with segment 1 held contracted, strands "
+        f"part by up to {words.in_cm(gaps_m[0], 1)} cm at a pin, and the segment elongates by {words.in_cm(paper_m)} "
+        f"cm. Rigid crossings give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} times as much, at rings of "
+        f"{words.in_unit(ring_m)} and {words.in_unit(tight_ring_m)} m. Rods with ties of {sprung[-1].value:g} N/m "
+        f"reach {words.in_percent(sprung[-1].held_m[0] / tight_m)} % of that.",
+        caption="Open loop: each of the three segments is held contracted for 0.8 s in turn. Its elongation (mean of "
+        "six springs), the largest gap at any pin, and its ring's length, over the stiffness of the tie between pin "
+        f"and strand. One run a point; {len(chains)} of the paper's chain, {len(sprung)} of rods with sprung pins, one "
+        "of rods with rigid crossings, drawn at the right edge. The rhythm is that of closed loops of 5 s.",
+        table=tabulated(readings, columns),
         remarks=remarks,
         numbers={
             "stiffness_paper_N_per_m": paper.value,
@@ -225,10 +199,7 @@ def _beside(value: float, reference: float) -> str:
 
 def _draw(readings: Sequence[Reading], stem: Path) -> None:
     edge = 6.0 * max(one.value for one in readings if one.worm is not RIGID)
-
-    def place(one: Reading) -> float:
-        return min(one.value, edge)
-
+    readings = [replace(one, value=min(one.value, edge)) for one in readings]
     groups = design.by_worm(readings)
     with canvas(5.2) as figure:
         (elongation, gap), (ring, rhythm) = figure.subplots(2, 2)
@@ -237,11 +208,11 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
             (gap, lambda one: CM * one.at_holds("pin_gap_m")),
             (ring, _rings),
         ):
-            plots.draw_over(axes, groups[SOFT], numbers)
-            plots.draw_over(axes, groups[PAPERS], numbers, hollow=True)
+            design.draw_over(axes, groups[SOFT], numbers)
+            design.draw_over(axes, groups[PAPERS], numbers, hollow=True)
             if axes is not gap:
-                plots.draw_over(axes, groups[RIGID], numbers, at=place, linestyle="none", markersize=6.0)
-        kinds = plots.draw_rhythms(rhythm, readings, at=place)
+                design.draw_over(axes, groups[RIGID], numbers, linestyle="none", markersize=6.0)
+        kinds = design.draw_rhythms(rhythm, readings)
         decades = [10.0**k for k in range(1, 6) if 10.0**k < 0.2 * edge]
         for axes, title, label in (
             (elongation, "Elongation", "elongation, held (cm)"),
@@ -249,7 +220,7 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
             (ring, "Ring", "length, held (m)"),
             (rhythm, "Rhythm in closed loop", ""),
         ):
-            plots.label_panel(axes, title, "stiffness of a tie (N/m)", label, logarithmic=True)
+            design.label_panel(axes, title, "stiffness of a tie (N/m)", label, logarithmic=True)
             axes.set_xticks([*decades, edge], [*(f"{value:g}" for value in decades), "rigid"])
             axes.minorticks_off()
             axes.set_xlim(9.0, 1.5 * edge)
@@ -259,17 +230,17 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
         steps = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
         low, high = gap.get_ylim()
         gap.set_yticks(shown := [step for step in steps if low <= step <= high], [f"{step:g}" for step in shown])
-        looks = [{**worm.look, "color": "0.25", "hollow": worm is PAPERS} for worm in (PAPERS, SOFT)]
-        worms = [plots.look_handle(**look) for look in (*looks, {**RIGID.look, "color": "0.25", "linestyle": "none"})]
-        plots.legend_below(figure, [*plots.segment_handles(), *worms, *kinds], 3)
+        looks = (PAPERS, {"hollow": True}), (SOFT, {}), (RIGID, {"linestyle": "none"})
+        worms = [design.look_handle(**{**worm.look, "color": "0.25", **look}) for worm, look in looks]
+        design.legend_below(figure, [*design.segment_handles(), *worms, *kinds], 3)
         save_both(figure, stem)
 
 
 PINS = Examination(
-    name="pins",
-    title="Crossings, from soft to rigid",
-    question="The paper ties its strands with the engine's soft constraints. How soft are they, and what would tight "
+    "pins",
+    "Crossings, from soft to rigid",
+    "The paper ties its strands with the engine's soft constraints. How soft are they, and what would tight "
     "pins change?",
-    cases=_cases,
-    examine=_examine,
+    lambda effort: [*design.cases_of(_points(effort)), _OWN_DAMPING, *_settling(effort)],
+    _examine,
 )

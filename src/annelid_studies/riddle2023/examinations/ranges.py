@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from annelid.analysis.paper import published
-from annelid.analysis.summary import middle_deficit
-from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, save_both
+from annelid.analysis import PAPER_MIDDLE_DEFICIT, middle_deficit
+from annelid.body import WormBody
+from annelid.draw import canvas, save_both
+from annelid.experiment import Store
 from annelid.morphology import Array
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading, Worm
-from annelid_studies.riddle2023.examinations.words import PERCENT
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.examinations import design
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Worm
+from annelid_studies.riddle2023.words import PERCENT
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import chain, one_after_the_other
+from annelid_studies.worms import Effort, chain, one_after_the_other
 
 EQUAL = (0.566, 1.067)
 """Mean of the three ranges that the engine of the paper's time compiled, m."""
-
-_FIELD = "body.rings.length_range_m"
 
 
 def compiled_ranges() -> list[list[float]]:
@@ -36,139 +35,125 @@ def _points(effort: Effort) -> list[Point]:
     points = []
     for worm in WORMS if effort == "full" else WORMS[1:]:
         for equal, limits in enumerate((compiled_ranges(), list(EQUAL))):
-            changes = {_FIELD: limits}
+            changes = {"body.rings.length_range_m": limits}
             points.append(Point(worm, equal, worm.case(changes), worm.case({**one_after_the_other(), **changes})))
     return points
 
 
-class _Row(NamedTuple):
-    """One worm in open or closed loop, with either kind of ranges."""
+class _Loop(NamedTuple):
+    """One worm in open or closed loop, with one kind of ranges: elongation on the first helix, and mean of springs."""
 
+    worm: Worm
     loop: str
-    compiled: Reading
-    equal: Reading
+    ranges: str
+    elongation_m: tuple[Array, Array]
+    rhythm: str
 
-    @property
-    def worm(self) -> Worm:
-        return self.compiled.worm
-
-
-def _elongation(loop: str, one: Reading, first_helix: bool) -> Array:
-    if loop == "open":
-        return design.held_elongation(one.hold, first_helix=first_helix)
-    return design.walked_elongation(one.walk, first_helix=first_helix)
+    def deficit(self, reading: int = 1) -> float:
+        """Deficit of segment 2, a fraction, on the first helix (0) or over all springs (1)."""
+        return middle_deficit(self.elongation_m[reading])
 
 
-def _deficit(loop: str, one: Reading, first_helix: bool = False) -> float:
-    return middle_deficit(_elongation(loop, one, first_helix))
-
-
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    readings = design.read(_points(effort), results)
-    pairs = list(zip(readings[::2], readings[1::2], strict=True))
-    rows = [_Row(loop, *pair) for pair in pairs for loop in ("open", "closed")]
-    paper = published(chain().config)["middle_deficit"].value
-    assert isinstance(paper, float)
-    _draw(rows, paper, stem)
-    numbers = {
-        f"deficit{reading}_{row.loop}_{kind}_{row.worm.name}": _deficit(row.loop, one, first_helix)
-        for row in rows
-        for kind, one in (("compiled", row.compiled), ("equal", row.equal))
-        for reading, first_helix in (("", True), ("_mean", False))
-    }
-    first = rows[1]
-    helix, helix_equal, mean, mean_equal = (
-        words.in_percent(_deficit("closed", one, first_helix))
-        for first_helix in (True, False)
-        for one in (first.compiled, first.equal)
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    readings = design.read(_points(effort), store)
+    loops = []
+    for pair in zip(readings[::2], readings[1::2], strict=True):
+        for loop in ("open", "closed"):
+            for ranges, one in zip(("compiled", "equal"), pair, strict=True):
+                helix_m, mean_m = (
+                    design.held_elongation(one.hold, first_helix=helix)
+                    if loop == "open"
+                    else design.walked_elongation(one.walk, first_helix=helix)
+                    for helix in (True, False)
+                )
+                rhythm = "as programmed" if loop == "open" else words.rhythm(one.rhythm)
+                loops.append(_Loop(one.worm, loop, ranges, (helix_m, mean_m), rhythm))
+    rows = list(zip(loops[::2], loops[1::2], strict=True))
+    opened, closed = rows[::2], rows[1::2]
+    _draw(rows, stem)
+    first, first_equal = closed[0]
+    shares = [1.0 - equal.deficit() / compiled.deficit() for compiled, equal in opened]
+    low, high = zip(*compiled_ranges(), strict=True)
+    beyond = words.listed(
+        f"{words.in_percent(in_closed.deficit() - in_open.deficit(), 1)} ({in_open.worm.label})"
+        for (_, in_open), (_, in_closed) in zip(opened, closed, strict=True)
     )
-    shares = [1.0 - one.equal.held_deficit / one.compiled.held_deficit for one in rows[::2]]
+    columns: Mapping[str, Callable[[_Loop], str]] = {
+        "worm": lambda one: one.worm.label,
+        "loop": lambda one: one.loop,
+        "ranges": lambda one: {"compiled": "as compiled"}.get(one.ranges, one.ranges),
+        "first helix (cm)": lambda one: words.all_in_cm(one.elongation_m[0]),
+        "deficit on it (%)": lambda one: words.in_percent(one.deficit(0), 1),
+        "mean of springs (cm)": lambda one: words.all_in_cm(one.elongation_m[1]),
+        "deficit (%)": lambda one: words.in_percent(one.deficit(), 1),
+        "rhythm": lambda one: one.rhythm,
+    }
     return Findings(
-        answer=(
-            f"Deficit of {first.worm.label} in closed loop: {helix} % on the first helix with the ranges as compiled "
-            f"and {helix_equal} % with equal ones; over all springs, {mean} % and {mean_equal} %. In open loop, over "
-            f"all springs, equal ranges leave {_left(rows[::2])}. So the ranges make "
-            f"{words.span(shares, PERCENT, 0)} % of the deficit of a contraction held by itself"
-            f"{', which is most of it' if min(shares) > 0.5 else ', and the rest has other causes'}."
-        ),
-        caption=(
-            "How far segment 2 elongates less than segment 1, with the three length ranges as the engine of the "
-            "paper's time compiled them and with equal ones. Left: first helix (closed loop: peak to peak), the "
-            f"paper's reading; the line is the paper's {words.in_percent(paper, 1)} %. Right: mean of the six springs. "
-            "One run a point, closed loop 5 s, open loop one contraction of 0.8 s a segment."
-        ),
-        table=tabulated(
-            [(row.loop, one) for row in rows for one in (row.compiled, row.equal)],
-            {
-                "worm": lambda at: at[1].worm.label,
-                "loop": lambda at: at[0],
-                "ranges": lambda at: "equal" if at[1].value else "as compiled",
-                "first helix (cm)": lambda at: words.all_in_cm(_elongation(*at, first_helix=True)),
-                "deficit on it (%)": lambda at: words.in_percent(_deficit(*at, first_helix=True), 1),
-                "mean of springs (cm)": lambda at: words.all_in_cm(_elongation(*at, first_helix=False)),
-                "deficit (%)": lambda at: words.in_percent(_deficit(*at), 1),
-                "rhythm": lambda at: "as programmed" if at[0] == "open" else words.rhythm(at[1].rhythm),
-            },
-        ),
+        answer=f"Deficit of {first.worm.label} in closed loop: {words.in_percent(first.deficit(0))} % on the first "
+        f"helix with the ranges as compiled and {words.in_percent(first_equal.deficit(0))} % with equal ones; over all "
+        f"springs, {words.in_percent(first.deficit())} % and {words.in_percent(first_equal.deficit())} %. In open "
+        f"loop, over all springs, equal ranges leave {_left(opened)}. So the ranges make "
+        f"{words.span(shares, PERCENT, 0)} % of the deficit of a contraction held by "
+        f"itself{', which is most of it' if min(shares) > 0.5 else ', and the rest has other causes'}.",
+        caption="How far segment 2 elongates less than segment 1, with the three length ranges as the engine of the "
+        "paper's time compiled them and with equal ones. Left: first helix (closed loop: peak to peak), the paper's "
+        f"reading; the line is the paper's {words.in_percent(PAPER_MIDDLE_DEFICIT, 1)} %. Right: mean of the six "
+        "springs. One run a point, closed loop 5 s, open loop one contraction of 0.8 s a segment.",
+        table=tabulated(loops, columns),
         remarks=[
-            *_remarks(rows),
+            f"The ranges as compiled begin at {' / '.join(f'{value:g}' for value in low)} m and end at "
+            f"{' / '.join(f'{value:g}' for value in high)} m for segments 1 / 2 / 3. A muscle's active force ends at a "
+            "length that follows from its range, and segment 2's begins "
+            f"{100 * (low[1] - (low[0] + low[2]) / 2):.1f} cm above the mean of its neighbours'.",
+            f"In closed loop, over all springs, equal ranges leave {_left(closed)}. With equal ranges the deficit in "
+            f"closed loop exceeds that in open loop by {beyond} percentage points. Equal muscles cannot make that "
+            "difference; in closed loop segments contract while others still relax.",
             *([f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else []),
         ],
-        numbers=numbers,
+        numbers={
+            f"deficit{reading}_{one.loop}_{one.ranges}_{one.worm.name}": one.deficit(index)
+            for one in loops
+            for index, reading in enumerate(("", "_mean"))
+        },
     )
 
 
-def _left(rows: Sequence[_Row]) -> str:
+def _left(rows: Sequence[tuple[_Loop, _Loop]]) -> str:
     """What equal ranges leave of the deficit over all springs."""
     return words.listed(
-        f"{words.in_percent(_deficit(row.loop, row.equal))} of {words.in_percent(_deficit(row.loop, row.compiled))} % "
-        f"({row.worm.label})"
-        for row in rows
+        f"{words.in_percent(equal.deficit())} of {words.in_percent(compiled.deficit())} % ({equal.worm.label})"
+        for compiled, equal in rows
     )
 
 
-def _remarks(rows: Sequence[_Row]) -> list[str]:
-    low, high = zip(*compiled_ranges(), strict=True)
-    closed = [row.equal for row in rows[1::2]]
-    beyond = words.told(closed, lambda one: words.in_percent(one.deficit - one.held_deficit, 1))
-    return [
-        f"The ranges as compiled begin at {' / '.join(f'{value:g}' for value in low)} m and end at "
-        f"{' / '.join(f'{value:g}' for value in high)} m for segments 1 / 2 / 3. A muscle's active force ends at a "
-        f"length that follows from its range, and segment 2's begins {100 * (low[1] - (low[0] + low[2]) / 2):.1f} cm "
-        "above the mean of its neighbours'.",
-        f"In closed loop, over all springs, equal ranges leave {_left(rows[1::2])}. With equal ranges the deficit in "
-        f"closed loop exceeds that in open loop by {beyond} percentage points. Equal muscles cannot make that "
-        "difference; in closed loop segments contract while others still relax.",
-    ]
-
-
-def _draw(rows: Sequence[_Row], paper: float, stem: Path) -> None:
+def _draw(rows: Sequence[tuple[_Loop, _Loop]], stem: Path) -> None:
     with canvas(1.2 + 0.42 * len(rows)) as figure:
         panels = figure.subplots(1, 2, sharey=True, sharex=True)
-        for axes, title, first_helix in zip(panels, ("First helix", "Mean of six springs"), (True, False), strict=True):
-            plots.label_panel(axes, title, "segment 2 below segment 1 (%)", "")
+        for reading, (axes, title) in enumerate(zip(panels, ("First helix", "Mean of six springs"), strict=True)):
+            design.label_panel(axes, title, "segment 2 below segment 1 (%)", "")
             for i, row in enumerate(rows):
-                compiled, equal = (PERCENT * _deficit(row.loop, one, first_helix) for one in (row.compiled, row.equal))
-                look = {**row.worm.look, "markersize": 7.0, "linestyle": "none"}
+                compiled, equal = (PERCENT * one.deficit(reading) for one in row)
+                look = {**row[0].worm.look, "markersize": 7.0, "linestyle": "none"}
                 axes.plot([compiled, equal], [-i, -i], color="0.7", linewidth=2.0, zorder=1)
                 axes.plot([compiled], [-i], **look)
                 axes.plot([equal], [-i], **look, markerfacecolor="white", markeredgewidth=1.4)
             axes.axvline(0.0, color="0.4", linewidth=0.8)
             axes.grid(visible=False, axis="y")
-        line = panels[0].axvline(PERCENT * paper, color="0.2", linewidth=1.0, linestyle="-.", label="the paper")
-        panels[0].set_yticks([-i for i in range(len(rows))], [f"{row.worm.label},\n{row.loop} loop" for row in rows])
+        paper = PERCENT * PAPER_MIDDLE_DEFICIT
+        line = panels[0].axvline(paper, color="0.2", linewidth=1.0, linestyle="-.", label="the paper")
+        panels[0].set_yticks([-i for i in range(len(rows))], [f"{one.worm.label},\n{one.loop} loop" for one, _ in rows])
         panels[0].set_ylim(0.5 - len(rows), 0.5)
         dots: dict[str, Any] = {"marker": "o", "linestyle": "none"}
-        kinds = [plots.look_handle("as compiled", **dots), plots.look_handle("equal", hollow=True, **dots)]
-        plots.legend_below(figure, [*kinds, line])
+        kinds = [design.look_handle("as compiled", **dots), design.look_handle("equal", hollow=True, **dots)]
+        design.legend_below(figure, [*kinds, line])
         save_both(figure, stem)
 
 
 RANGES = Examination(
-    name="ranges",
-    title="Length ranges of the muscles",
-    question="The engine of the paper's time gave each muscle a length range of its own. How much of the middle "
+    "ranges",
+    "Length ranges of the muscles",
+    "The engine of the paper's time gave each muscle a length range of its own. How much of the middle "
     "segment's deficit is left when all have the same?",
-    cases=lambda effort: design.cases_of(_points(effort)),
-    examine=_examine,
+    lambda effort: design.cases_of(_points(effort)),
+    _examine,
 )

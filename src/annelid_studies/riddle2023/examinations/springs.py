@@ -6,14 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from annelid.draw.canvas import canvas, save_both, segment_colors
+from annelid.draw import canvas, save_both, segment_colors
+from annelid.experiment import Store
 from annelid.morphology import Array
-from annelid.simulation.runfile import open_run
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Reading
-from annelid_studies.riddle2023.examinations.words import CM
+from annelid.simulation import open_run
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.examinations import design
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading
+from annelid_studies.riddle2023.words import CM
 from annelid_studies.tables import tabulated
+from annelid_studies.worms import Effort
 
 BILATERAL, TENSION_ONLY = 0.0, 1.0
 _SPRINGS = {BILATERAL: "bilateral", TENSION_ONLY: "tension only"}
@@ -25,72 +28,57 @@ def _points(effort: Effort) -> list[Point]:
     return [Point(worm, springs, worm.case(own)) for worm in worms for springs, own in changes.items()]
 
 
-Reach = tuple[Array, Array]
-"""Shortest and longest mean of each segment's springs against rest, m, each ``(n_segments,)``."""
-
-
-def _reach(one: Reading) -> Reach:
+def _reach(one: Reading) -> tuple[Array, Array]:
+    """Shortest and longest mean of each segment's springs against rest, m, each ``(n_segments,)``."""
     data = open_run(one.closed.path).data
     above_rest = (data["stretch_length"].values - data["stretch_rest_length"].values).mean(axis=2)
     return above_rest.min(axis=0), above_rest.max(axis=0)
 
 
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    readings = design.read(_points(effort), results)
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    readings = design.read(_points(effort), store)
     reaches = {one: _reach(one) for one in readings}
     _draw(reaches, stem)
-    numbers: dict[str, float | str | None] = {}
+    numbers: dict[str, Number] = {}
     for one, (shortest_m, _) in reaches.items():
         kind = f"{_SPRINGS[one.value].replace(' ', '_')}_{one.worm.name}"
         numbers[f"verdict_{kind}"] = words.rhythm(one.rhythm)
         numbers[f"elongation_first_{kind}_m"] = one.walked_helix_m[0]
         numbers[f"undershoot_{kind}_m"] = -shortest_m.min()
-    pairs = list(zip(readings[::2], readings[1::2], strict=True))
-    pulling = readings[1::2]
+    bilateral = dict(zip(readings[1::2], readings[::2], strict=True))
+    pulling = list(bilateral)
     lost = [f"{one.worm.label} ({words.rhythm(one.rhythm)})" for one in pulling if not one.walks]
-
-    def below_rest(one: Reading) -> str:
-        return f"{words.in_cm(-reaches[one][0].min())} cm"
-
-    swings = words.listed(
-        f"{words.in_cm(only.walked_helix_m[0])} in place of {words.in_cm(both.walked_helix_m[0])} cm "
-        f"({only.worm.label})"
-        for both, only in pairs
-    )
+    swing = {one: words.in_cm(one.walked_helix_m[0]) for one in readings}
+    below = {one: words.in_cm(-shortest_m.min()) for one, (shortest_m, _) in reaches.items()}
+    swings = words.by_worm(pulling, lambda one: f"{swing[one]} in place of {swing[bilateral[one]]} cm")
     shorten = words.listed(
-        f"{below_rest(only)} (bilateral: {below_rest(both)}; {only.worm.label})" for both, only in pairs
+        f"{below[one]} cm (bilateral: {below[both]} cm; {one.worm.label})" for one, both in bilateral.items()
     )
+    columns: Columns = {
+        "worm": lambda one: one.worm.label,
+        "springs": lambda one: _SPRINGS[one.value],
+        "rhythm": lambda one: words.rhythm(one.rhythm),
+        "first helix, peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
+        "deficit (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit),
+        "mean of springs, longest above rest (cm)": lambda one: words.all_in_cm(reaches[one][1]),
+        "shortest below rest (cm)": lambda one: words.all_in_cm(-reaches[one][0]),
+        "median force (N)": lambda one: words.in_unit(one.force_N),
+    }
     return Findings(
-        answer=(
-            "With springs that only pull, these worms keep the order 1-2-3: "
-            f"{words.labels(one for one in pulling if one.walks)}; these do not: {words.listed(lost)}. The spring on "
-            f"the first helix of segment 1 then swings over {swings}. Segments shorten below their rest length by up "
-            f"to {shorten}."
-        ),
-        caption=(
-            f"Closed loop, 5 s, one run a group, {len(readings)} runs: from the shortest to the longest that each "
-            "segment becomes (mean of its six springs, against rest), and below each group its springs and rhythm. "
-            "Hatched: springs that only pull."
-        ),
-        table=tabulated(
-            readings,
-            {
-                "worm": lambda one: one.worm.label,
-                "springs": lambda one: _SPRINGS[one.value],
-                "rhythm": lambda one: words.rhythm(one.rhythm),
-                "first helix, peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
-                "deficit (%)": lambda one: words.in_percent(one.helix_deficit),
-                "mean of springs, longest above rest (cm)": lambda one: words.all_in_cm(reaches[one][1]),
-                "shortest below rest (cm)": lambda one: words.all_in_cm(-reaches[one][0]),
-                "median force (N)": lambda one: words.in_unit(one.force_N),
-            },
-        ),
+        answer="With springs that only pull, these worms keep the order 1-2-3: "
+        f"{words.labels(one for one in pulling if one.walks)}; these do not: {words.listed(lost)}. The spring on the "
+        f"first helix of segment 1 then swings over {swings}. Segments shorten below their rest length by up to "
+        f"{shorten}.",
+        caption=f"Closed loop, 5 s, one run a group, {len(readings)} runs: from the shortest to the longest that each "
+        "segment becomes (mean of its six springs, against rest), and below each group its springs and rhythm. "
+        "Hatched: springs that only pull.",
+        table=tabulated(readings, columns),
         remarks=[f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else [],
         numbers=numbers,
     )
 
 
-def _draw(reaches: Mapping[Reading, Reach], stem: Path) -> None:
+def _draw(reaches: Mapping[Reading, tuple[Array, Array]], stem: Path) -> None:
     width = 0.24
     with canvas(3.5) as figure:
         axes = figure.subplots()
@@ -114,15 +102,15 @@ def _draw(reaches: Mapping[Reading, Reach], stem: Path) -> None:
         for center, one in zip(centers, reaches, strict=True):
             if one.value == BILATERAL:
                 axes.text(center + 0.5, top, one.worm.label, ha="center", va="bottom")
-        plots.legend_below(figure, plots.segment_handles())
+        design.legend_below(figure, design.segment_handles())
         save_both(figure, stem)
 
 
 SPRINGS = Examination(
-    name="springs",
-    title="Springs that push or only pull",
-    question="The paper says that its axial springs act only in tension; the authors' files have them act both ways. "
+    "springs",
+    "Springs that push or only pull",
+    "The paper says that its axial springs act only in tension; the authors' files have them act both ways. "
     "Does it matter?",
-    cases=lambda effort: design.cases_of(_points(effort)),
-    examine=_examine,
+    lambda effort: design.cases_of(_points(effort)),
+    _examine,
 )

@@ -3,35 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from annelid.body.worm import WormBody
+from annelid.body import WormBody
 from annelid.config import RunConfig
-from annelid.draw.canvas import canvas, save_both
-from annelid.experiment.case import Case
-from annelid.experiment.outcome import Outcome
+from annelid.draw import canvas, save_both
+from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
-from annelid.simulation.runfile import open_run
-from annelid_studies.riddle2023.examination import Effort, Examination, Findings, Results
-from annelid_studies.riddle2023.examinations import design, plots, words
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Point, Reading, Worm
-from annelid_studies.riddle2023.examinations.words import CM
+from annelid.simulation import open_run
+from annelid_studies.riddle2023 import words
+from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.examinations import design
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
+from annelid_studies.riddle2023.words import CM, MS
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import chain, one_after_the_other
+from annelid_studies.worms import Effort, chain, one_after_the_other
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-MS = 1000.0
 TRANSIENT_S = 0.1
 """How much of a contraction's beginning is resolved, s."""
 EARLY_S = 0.02
 """When the ring's length is compared with the muscle's limit, s."""
-PAPERS_STEP_S = 0.001
+PAPERS_STEP_MS = 1.0
 
 # Curves that end nearer than this share one label.
 _LABEL_SPAN_M = 0.05
@@ -69,27 +66,17 @@ def start_case(worm: Worm, step_s: float) -> Case:
 
 
 def _points(effort: Effort) -> list[Point]:
-    """Walks, then beginnings of a contraction in open loop."""
+    """Walks, then beginnings of a contraction in open loop, by their steps in ms."""
+    walks = [(worm, step) for worm, steps in WALKS[effort].items() for step in steps]
+    starts = [(worm, step) for worm, steps in STARTS[effort].items() for step in steps]
     return [
-        *(
-            Point(worm, step, walk=worm.case({"clock.physics_timestep_s": step}))
-            for worm, steps in WALKS[effort].items()
-            for step in steps
-        ),
-        *(Point(worm, step, hold=start_case(worm, step)) for worm, steps in STARTS[effort].items() for step in steps),
+        *(Point(worm, MS * step, walk=worm.case({"clock.physics_timestep_s": step})) for worm, step in walks),
+        *(Point(worm, MS * step, hold=start_case(worm, step)) for worm, step in starts),
     ]
 
 
 def velocity_limit(config: RunConfig, segment: int = 0) -> float:
-    """Returns the speed at which a ring muscle's force vanishes: vmax L0, with L0 = (r1 - r0) / 0.3, m/s.
-
-    Args:
-        config: Configuration of a 3D worm.
-        segment: Counted from 0.
-
-    Raises:
-        ValueError: The worm is planar.
-    """
+    """Returns the speed at which a ring muscle's force vanishes: vmax L0, with L0 = (r1 - r0) / 0.3, m/s."""
     if not isinstance(config.body, WormBody):
         raise ValueError("a planar worm has no ring muscles")
     rings = config.body.muscles
@@ -97,19 +84,12 @@ def velocity_limit(config: RunConfig, segment: int = 0) -> float:
     return rings.maximum_velocity * (high - low) / 0.3
 
 
-@dataclass(frozen=True)
-class Start:
-    """The beginning of the first segment's contraction.
+class Start(NamedTuple):
+    """The beginning of the first segment's contraction."""
 
-    Attributes:
-        time_s: Sample times, s.
-        ring_m: Length of its ring, m, same shape.
-        limit_m_per_s: Speed at which its force vanishes, m/s.
-    """
-
-    time_s: Array
-    ring_m: Array
-    limit_m_per_s: float
+    time_s: Array  # Sample times, s
+    ring_m: Array  # Length of its ring, m, same shape
+    limit_m_per_s: float  # Speed at which its force vanishes, m/s
 
     def at(self, time_s: float) -> float:
         """Length of the ring at a time, m; NaN where the run ended before."""
@@ -129,45 +109,81 @@ def read_start(outcome: Outcome) -> Start:
 
 
 Starts = Mapping[Worm, Mapping[float, Start]]
-"""Beginnings of a contraction by worm and step."""
+"""Beginnings of a contraction by worm and step, ms."""
 
 
-def _examine(results: Results, effort: Effort, stem: Path) -> Findings:
-    readings = design.read(_points(effort), results)
+def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+    readings = design.read(_points(effort), store)
     walks = [one for one in readings if one.walk]
     starts: dict[Worm, dict[float, Start]] = {}
     for one in readings:
         if one.hold:
             starts.setdefault(one.worm, {})[one.value] = read_start(one.hold)
     _draw(walks, starts, stem)
+    own_walks = design.by_worm(walks)
+    numbers: dict[str, Number] = {
+        f"largest_walking_step_{worm.name}_s": max((one.value / MS for one in own if one.walks), default=None)
+        for worm, own in own_walks.items()
+    }
+    numbers |= design.numbered(
+        walks,
+        {
+            "verdict_{worm}_{value:g}ms": _fate,
+            "period_{worm}_{value:g}ms_s": lambda one: one.closed.summary.period_s,
+            "elongation_first_helix_{worm}_{value:g}ms_m": lambda one: one.walked_helix_m[0],
+            "elongation_mean_{worm}_{value:g}ms_m": lambda one: one.walked_m[0],
+            "real_time_factor_{worm}_{value:g}ms": _speed,
+        },
+    )
+    early = []
+    for worm, row in starts.items():
+        for step, start in row.items():
+            numbers[f"ring_at_20ms_{worm.name}_{step:g}ms_m"] = start.at(EARLY_S)
+            numbers[f"times_velocity_limit_{worm.name}_{step:g}ms"] = start.times_limit(EARLY_S)
+            numbers[f"velocity_limit_{worm.name}_m_per_s"] = start.limit_m_per_s
+        reached = {step: start for step, start in row.items() if np.isfinite(start.at(EARLY_S))}
+        factors = words.listed(words.in_unit(start.times_limit(EARLY_S), digits=1) for start in reached.values())
+        early.append(f"{factors} times as far in {worm.label} at {_steps(reached)} ms")
+    largest = [
+        max((one for one in own if one.walks), key=lambda one: one.value, default=None) for own in own_walks.values()
+    ]
+    speeds = [
+        f"{words.in_unit(_speed(one))} times real time ({one.worm.label}, {one.value:g} ms)" for one in largest if one
+    ]
+    columns: Columns = {
+        "worm and integrator": lambda one: one.worm.label,
+        "step, ms": lambda one: f"{one.value:g}",
+        "rhythm": lambda one: "flies apart" if _fate(one) == "flies apart" else words.rhythm(one.rhythm),
+        "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.NOTHING,
+        "first helix peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
+        "mean of six springs (cm)": lambda one: words.all_in_cm(one.walked_m),
+        "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
+        "times real time": lambda one: words.in_unit(_speed(one)),
+    }
     return Findings(
-        answer=" ".join([*(_walks_in_words(own) for own in design.by_worm(walks).values()), _early_in_words(starts)]),
-        caption=(
-            "Left: largest elongation of segment 1 (mean of its springs) in closed loop over the physics time step, "
-            f"one run a marker, {len(walks)} in all; a cross: the run does not walk 1-2-3. Right: ring of segment 1 "
-            f"over the first {_ms(TRANSIENT_S)} ms of its contraction in open loop, {sum(map(len, starts.values()))} "
-            "runs; the grey region cannot be reached by a muscle that has no force beyond its limit of velocity."
+        answer=" ".join(
+            [
+                *map(_walks_in_words, own_walks.values()),
+                f"A muscle has no force beyond its limit of velocity. In the first {MS * EARLY_S:g} ms of a "
+                f"contraction the ring shortens, compared with that limit, {words.listed(early)}.",
+            ]
         ),
-        table=tabulated(
-            walks,
-            {
-                "worm and integrator": lambda one: one.worm.label,
-                "step, ms": lambda one: _ms(one.value),
-                "rhythm": lambda one: "flies apart" if _fate(one) == "flies apart" else words.rhythm(one.rhythm),
-                "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.NOTHING,
-                "first helix peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
-                "mean of six springs (cm)": lambda one: words.all_in_cm(one.walked_m),
-                "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
-                "times real time": lambda one: words.in_unit(_speed(one)),
-            },
-        ),
-        remarks=[_settling_in_words(starts), _speed_in_words(walks)],
-        numbers=_numbers(walks, starts),
+        caption="Left: largest elongation of segment 1 (mean of its springs) in closed loop over the physics time "
+        f"step, one run a marker, {len(walks)} in all; a cross: the run does not walk 1-2-3. Right: ring of segment 1 "
+        f"over the first {MS * TRANSIENT_S:g} ms of its contraction in open loop, {sum(map(len, starts.values()))} "
+        "runs; the grey region cannot be reached by a muscle that has no force beyond its limit of velocity.",
+        table=tabulated(walks, columns),
+        remarks=[
+            _settling_in_words(starts),
+            f"At the largest step that walks, one core computes {words.listed(speeds)}, by the processor time of each "
+            "run.",
+        ],
+        numbers=numbers,
     )
 
 
-def _ms(step_s: float) -> str:
-    return f"{MS * step_s:g}"
+def _steps(steps_ms: Iterable[float]) -> str:
+    return words.listed(f"{step:g}" for step in steps_ms)
 
 
 def _fate(one: Reading) -> str:
@@ -184,108 +200,57 @@ def _speed(one: Reading) -> float | None:
 
 def _walks_in_words(own: Sequence[Reading]) -> str:
     good = [one for one in own if one.walks]
-    bad = words.listed(f"{_ms(one.value)} ms ({_fate(one)})" for one in own if not one.walks)
-    mean = words.in_percent(_spread([one.walked_m[0] for one in good]))
-    helix = words.in_percent(_spread([one.walked_helix_m[0] for one in good]))
-    return (
-        f"{words.capitalised(own[0].worm.label)}: walks 1-2-3 at {words.listed(_ms(one.value) for one in good)} ms "
-        f"(elongation of segment 1 within {mean} %, on its first helix within {helix} %) and fails at {bad}."
+    bad = words.listed(f"{one.value:g} ms ({_fate(one)})" for one in own if not one.walks)
+    mean, helix = (
+        words.in_percent(np.ptp(values) / float(np.mean(values)) if len(values) > 1 else None)
+        for values in ([one.walked_m[0] for one in good], [one.walked_helix_m[0] for one in good])
     )
-
-
-def _spread(values: Sequence[float]) -> float | None:
-    return (max(values) - min(values)) / float(np.mean(values)) if len(values) > 1 else None
-
-
-def _early_in_words(starts: Starts) -> str:
-    parts = []
-    for worm, row in starts.items():
-        reached = {step: start for step, start in row.items() if np.isfinite(start.at(EARLY_S))}
-        factors = words.listed(words.in_unit(start.times_limit(EARLY_S), digits=1) for start in reached.values())
-        parts.append(f"{factors} times as far in {worm.label} at {words.listed(map(_ms, reached))} ms")
     return (
-        f"A muscle has no force beyond its limit of velocity. In the first {_ms(EARLY_S)} ms of a contraction the ring "
-        f"shortens, compared with that limit, {words.listed(parts)}."
+        f"{words.capitalised(own[0].worm.label)}: walks 1-2-3 at {_steps(one.value for one in good)} ms "
+        f"(elongation of segment 1 within {mean} %, on its first helix within {helix} %) and fails at {bad}."
     )
 
 
 def _settling_in_words(starts: Starts) -> str:
     def lengths(row: Mapping[float, Start], time_s: float) -> str:
-        return words.listed(f"{words.in_unit(start.at(time_s))} m at {_ms(step)} ms" for step, start in row.items())
+        return words.listed(f"{words.in_unit(start.at(time_s))} m at {step:g} ms" for step, start in row.items())
 
     sentences = [
-        f"{words.capitalised(worm.label)}: ring of segment 1 {_ms(EARLY_S)} ms after the onset "
-        f"{lengths(row, EARLY_S)}; after {_ms(TRANSIENT_S)} ms {lengths(row, TRANSIENT_S)}."
+        f"{words.capitalised(worm.label)}: ring of segment 1 {MS * EARLY_S:g} ms after the onset "
+        f"{lengths(row, EARLY_S)}; after {MS * TRANSIENT_S:g} ms {lengths(row, TRANSIENT_S)}."
         for worm, row in starts.items()
     ]
     rk4 = starts[RK4]
     finest = rk4[min(rk4)].at(EARLY_S)
-    gap = rk4[PAPERS_STEP_S].at(EARLY_S) - finest
+    gap = rk4[PAPERS_STEP_MS].at(EARLY_S) - finest
     if abs(gap) > 0.02 * finest:
         sentences.append(
-            f"So at the paper's step of {_ms(PAPERS_STEP_S)} ms the beginning of a contraction is not converged: the "
-            f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {_ms(min(rk4))} ms. "
+            f"So at the paper's step of {PAPERS_STEP_MS:g} ms the beginning of a contraction is not converged: the "
+            f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {min(rk4):g} ms. "
             "An explicit step holds the muscle's force while the light pins gather speed, and so misses the steep fall "
             "of the force with velocity."
         )
     else:
-        sentences.append(f"At the paper's step of {_ms(PAPERS_STEP_S)} ms the beginning is converged within 2 %.")
+        sentences.append(f"At the paper's step of {PAPERS_STEP_MS:g} ms the beginning is converged within 2 %.")
     return " ".join(sentences)
-
-
-def _speed_in_words(walks: Sequence[Reading]) -> str:
-    best = []
-    for own in design.by_worm(one for one in walks if one.walks).values():
-        one = max(own, key=lambda one: one.value)
-        best.append(f"{words.in_unit(_speed(one))} times real time ({one.worm.label}, {_ms(one.value)} ms)")
-    return f"At the largest step that walks, one core computes {words.listed(best)}, by the processor time of each run."
-
-
-def _numbers(walks: Sequence[Reading], starts: Starts) -> dict[str, float | str | None]:
-    numbers: dict[str, float | str | None] = {}
-    for worm, own in design.by_worm(walks).items():
-        numbers[f"largest_walking_step_{worm.name}_s"] = max((one.value for one in own if one.walks), default=None)
-    # Names of numbers tell the step in milliseconds.
-    numbers |= design.numbered(
-        [replace(one, value=MS * one.value) for one in walks],
-        {
-            "verdict_{worm}_{value:g}ms": _fate,
-            "period_{worm}_{value:g}ms_s": lambda one: one.closed.summary.period_s,
-            "elongation_first_helix_{worm}_{value:g}ms_m": lambda one: one.walked_helix_m[0],
-            "elongation_mean_{worm}_{value:g}ms_m": lambda one: one.walked_m[0],
-            "real_time_factor_{worm}_{value:g}ms": _speed,
-        },
-    )
-    for worm, row in starts.items():
-        for step, start in row.items():
-            tag = f"{worm.name}_{_ms(step)}ms"
-            numbers[f"ring_at_20ms_{tag}_m"] = start.at(EARLY_S)
-            numbers[f"times_velocity_limit_{tag}"] = start.times_limit(EARLY_S)
-            numbers[f"velocity_limit_{worm.name}_m_per_s"] = start.limit_m_per_s
-    return numbers
 
 
 def _draw(walks: Sequence[Reading], starts: Starts, stem: Path) -> None:
     with canvas(3.5) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
         for worm, own in design.by_worm(walks).items():
-            hollow = worm is EULER
-            plots.draw_over(left, own, lambda one: CM * one.walked_m[0], at=lambda one: MS * one.value, hollow=hollow)
-        for one in walks:
-            if not one.walks:
-                plots.cross_out(left, MS * one.value, CM * one.walked_m[0])
-        steps = sorted({MS * one.value for one in walks})
-        plots.label_panel(
-            left, "In closed loop", "physics time step (ms)", "elongation of segment 1 (cm)", steps, logarithmic=True
-        )
+            design.draw_over(left, own, lambda one: CM * one.walked_m[0], hollow=worm is EULER)
+        design.cross_out(left, walks, lambda one: CM * one.walked_m[0])
+        steps = sorted({one.value for one in walks})
+        step, elongation = "physics time step (ms)", "elongation of segment 1 (cm)"
+        design.label_panel(left, "In closed loop", step, elongation, steps, logarithmic=True)
         left.set_ylim(bottom=0.0)
         _draw_starts(right, starts)
-        plots.label_panel(
-            right, "Beginning of the first contraction", "time after the onset (ms)", "ring of segment 1 (m)"
-        )
-        handles = [plots.look_handle(**worm.look, hollow=worm is EULER) for worm in design.by_worm(walks)]
-        crossed = plots.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black", markersize=9.0)
-        plots.legend_below(figure, [*handles, crossed], columns=3)
+        time, ring = "time after the onset (ms)", "ring of segment 1 (m)"
+        design.label_panel(right, "Beginning of the first contraction", time, ring)
+        handles = [design.look_handle(**worm.look, hollow=worm is EULER) for worm in design.by_worm(walks)]
+        crossed = design.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black", markersize=9.0)
+        design.legend_below(figure, [*handles, crossed], columns=3)
         save_both(figure, stem)
 
 
@@ -296,29 +261,26 @@ def _draw_starts(axes: Axes, starts: Starts) -> None:
         for i, step in enumerate(ordered):
             look = {"color": worm.color, "linestyle": worm.line, "linewidth": 2.2 - 1.4 * i / thinnest}
             axes.plot(MS * row[step].time_s, row[step].ring_m, **look)
-        ends = {f"{_ms(step)} ms": float(row[step].ring_m[-1]) for step in ordered}
+        ends = {f"{step:g} ms": float(row[step].ring_m[-1]) for step in ordered}
         if np.ptp(list(ends.values())) < _LABEL_SPAN_M:
-            ends = {f"{_ms(ordered[-1])} to {_ms(ordered[0])} ms": float(np.mean(list(ends.values())))}
+            ends = {f"{ordered[-1]:g} to {ordered[0]:g} ms": float(np.mean(list(ends.values())))}
         beside = {"xytext": (4, 0), "textcoords": "offset points", "va": "center", "annotation_clip": False}
         for text, end in ends.items():
             axes.annotate(text, (MS * TRANSIENT_S, end), **beside, fontsize=7.5, color=worm.color)
-    first = next(iter(next(iter(starts.values())).values()))
-    lowest: Iterable[float] = (start.ring_m.min() for row in starts.values() for start in row.values())
+    every = [start for row in starts.values() for start in row.values()]
     times = np.array([0.0, TRANSIENT_S])
-    limit = first.ring_m[0] - first.limit_m_per_s * times
+    limit = every[0].ring_m[0] - every[0].limit_m_per_s * times
     axes.fill_between(MS * times, limit, 0.0, color="0.9", linewidth=0.0)
     axes.plot(MS * times, limit, color="0.4", linewidth=1.0)
     axes.set_xlim(0.0, MS * TRANSIENT_S)
-    axes.set_ylim(0.9 * min(lowest), 1.03 * first.ring_m[0])
+    axes.set_ylim(0.9 * min(start.ring_m.min() for start in every), 1.03 * every[0].ring_m[0])
 
 
 TIMESTEP = Examination(
-    name="timestep",
-    title="Integrator and time step",
-    question=(
-        "Do order, period and elongation depend on the integrator and its step, and are the first instants of a "
-        "contraction resolved?"
-    ),
-    cases=lambda effort: design.cases_of(_points(effort)),
-    examine=_examine,
+    "timestep",
+    "Integrator and time step",
+    "Do order, period and elongation depend on the integrator and its step, and are the first instants of a "
+    "contraction resolved?",
+    lambda effort: design.cases_of(_points(effort)),
+    _examine,
 )

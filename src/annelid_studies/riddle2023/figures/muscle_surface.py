@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from annelid.body.actuators.muscle import Rings
-from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
+from annelid.body import Rings, muscle_force
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.morphology import Array
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
+from annelid_studies.riddle2023.words import span
 
 SCALED_RANGE = (0.75, 1.05)
 """Scaled lengths between which a ring's operating range lies: MuJoCo's default."""
@@ -23,73 +20,34 @@ RING_LENGTHS_M = (0.30, 0.96)
 SETTLED_FORCE_N = 2.5
 """Force at which the paper's contracted rings settle, N."""
 
-_VELOCITIES = (-0.75, -0.3, 0.0, 0.3)
 _BLUE, _ORANGE, _GREEN, _ = segment_colors(4)
-_CUT_COLORS = (_GREEN, _ORANGE, "0.1", _BLUE)
-_DASHES = ((0, (1, 1.2)), (0, (4, 1.5)), "-", (0, (6, 1.5, 1, 1.5)))
+_CUTS = (
+    (-0.75, (0, (1, 1.2)), _GREEN),
+    (-0.3, (0, (4, 1.5)), _ORANGE),
+    (0.0, "-", "0.1"),
+    (0.3, (0, (6, 1.5, 1, 1.5)), _BLUE),
+)
+"""Velocities of the cuts, with their lines and colours."""
 
 
 def engine_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activation: float = 1.0) -> Array:
-    """Calls the engine's muscle for its force as a function of scaled length and velocity.
-
-    Args:
-        lengths: Relative to the optimal length L0.
-        velocities: Relative to L0, 1/s; negative while the muscle shortens. Broadcast against the lengths.
-        rings: The muscle's parameters.
-        activation: In [0, 1].
-
-    Returns:
-        Pulling force relative to the peak force F0, in the shape of the broadcast arguments.
-    """
+    """Calls the engine's muscle for its force as a function of scaled length and velocity, as `muscle_force`."""
     import mujoco
 
     own = rings.minimum_length, rings.maximum_length, rings.maximum_velocity, rings.passive_peak, rings.lengthening_peak
     parameters = np.array([*SCALED_RANGE, 1.0, 1.0, *own])
     # With this length range a scaled length is a length in metres.
-    span = np.array(SCALED_RANGE)
+    reach = np.array(SCALED_RANGE)
 
     def force(length: float, velocity: float) -> float:
-        gain = mujoco.mju_muscleGain(length, velocity, span, 1.0, parameters)
-        return -(activation * gain + mujoco.mju_muscleBias(length, span, 1.0, parameters))
+        gain = mujoco.mju_muscleGain(length, velocity, reach, 1.0, parameters)
+        return -(activation * gain + mujoco.mju_muscleBias(length, reach, 1.0, parameters))
 
     return np.vectorize(force, otypes=[float])(lengths, velocities)
 
 
-def closed_form_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activation: float = 1.0) -> Array:
-    """Computes the same force as `engine_flv` by the documented formula, ``activation FL(L) FV(V) + FP(L)``.
-
-    FL is a bump of four parabolas from lmin over 1 to lmax. FV is a parabola that reaches 0 at -vmax and 1 at rest,
-    then another that saturates at fvmax. FP is 0 up to 1, a parabola to half fpmax at the middle b between 1
-    and lmax, and its tangent from there: it passes fpmax midway between b and lmax, and is 1.5 fpmax at lmax.
-    MuJoCo's documentation, "Muscles", with its FLV.m. Arguments and result are those of `engine_flv`.
-    """
-    length, velocity = np.broadcast_arrays(np.asarray(lengths, float), np.asarray(velocities, float))
-    reach = np.where(length < 1.0, 1.0 - rings.minimum_length, rings.maximum_length - 1.0)
-    from_peak = np.clip(np.abs(length - 1.0) / reach, 0.0, 1.0)
-    force_length = np.where(from_peak < 0.5, 1.0 - 2.0 * from_peak**2, 2.0 * (1.0 - from_peak) ** 2)
-
-    speed = velocity / rings.maximum_velocity
-    excess = rings.lengthening_peak - 1.0
-    shortening = np.clip(1.0 + speed, 0.0, 1.0) ** 2
-    # The limit guards the quotient: without excess nothing is left to saturate.
-    lengthening = excess - np.clip(excess - speed, 0.0, None) ** 2 / max(excess, 1e-300)
-    force_velocity = np.where(speed <= 0.0, shortening, 1.0 + lengthening)
-
-    stretch = np.clip(2.0 * (length - 1.0) / (rings.maximum_length - 1.0), 0.0, None)
-    passive = rings.passive_peak * np.where(stretch < 1.0, 0.5 * stretch**2, stretch - 0.5)
-    return activation * force_length * force_velocity + passive
-
-
 def scaled_length(ring_length_m: ArrayLike, length_range_m: tuple[float, float]) -> Array:
-    """Converts ring lengths into the muscle's scaled lengths.
-
-    Args:
-        ring_length_m: Any shape, m.
-        length_range_m: Operating range of the ring, m, which MuJoCo maps to `SCALED_RANGE`.
-
-    Returns:
-        Same shape, relative to the optimal length.
-    """
+    """Converts ring lengths, m, into the muscle's: MuJoCo maps the operating range of a ring to `SCALED_RANGE`."""
     (low_m, high_m), (low, high) = length_range_m, SCALED_RANGE
     return low + (np.asarray(ring_length_m, float) - low_m) * (high - low) / (high_m - low_m)
 
@@ -97,46 +55,37 @@ def scaled_length(ring_length_m: ArrayLike, length_range_m: tuple[float, float])
 def largest_difference(rings: Rings) -> float:
     """Returns the largest difference between the engine and the closed form over the figure's range, F0."""
     length, velocity = np.meshgrid(*_grids(rings, 121))
-    return float(np.abs(engine_flv(length, velocity, rings) - closed_form_flv(length, velocity, rings)).max())
+    return float(np.abs(engine_flv(length, velocity, rings) - muscle_force(length, velocity, rings)).max())
 
 
 def figure_5_muscle_surface(rings: Rings, stem: Path, n_segments: int = 3) -> str:
     """Draws the engine's force over length and velocity, and cuts through it beside the documented formula.
 
-    Args:
-        rings: The muscle's parameters.
-        stem: Path of the two files without their suffixes.
-        n_segments: Number of rings, which may each have an operating range of its own.
-
-    Returns:
-        The caption, with the numbers of the given muscle.
+    Returns the caption, with the numbers of this muscle; each ring may have an operating range of its own.
     """
-    working = _working_range(rings.length_ranges(n_segments))
+    ranges = rings.length_ranges(n_segments)
+    scaled = np.array([scaled_length(RING_LENGTHS_M, one) for one in ranges])
+    # At least one of the rings works between these scaled lengths.
+    low, high = float(scaled[:, 0].min()), float(scaled[:, 1].max())
     with canvas(3.5) as figure:
         surface, cuts = figure.subplots(1, 2, width_ratios=[1.0, 1.05])
-        _draw_surface(surface, rings, working)
-        _draw_cuts(cuts, rings, working)
+        _draw_surface(surface, rings, (low, high))
+        _draw_cuts(cuts, rings, (low, high))
         save_both(figure, stem)
-    return _caption(rings, n_segments)
-
-
-def _caption(rings: Rings, n_segments: int) -> str:
-    ranges = rings.length_ranges(n_segments)
-    optimal = [(high - low) / (SCALED_RANGE[1] - SCALED_RANGE[0]) for low, high in ranges]
-    low, high = _working_range(ranges)
+    optimal = [(longest - shortest) / (SCALED_RANGE[1] - SCALED_RANGE[0]) for shortest, longest in ranges]
     peak_N = max(rings.forces(n_segments))
     grid = np.linspace(rings.minimum_length, 1.0, 20_001)
     settled = grid[np.searchsorted(engine_flv(grid, 0.0, rings), SETTLED_FORCE_N / peak_N)]
-    settled_m = [high - (SCALED_RANGE[1] - settled) * unit for (_, high), unit in zip(ranges, optimal, strict=True)]
+    settled_m = [far - (SCALED_RANGE[1] - settled) * unit for (_, far), unit in zip(ranges, optimal, strict=True)]
     return (
         "Force of MuJoCo's muscle as computed by the engine, relative to the peak force F0 and against length relative "
         "to the optimal length L0: a) over length and velocity at full activation, b) cuts at four velocities. The "
         f"engine agrees with the documented formula (circles) to {largest_difference(rings):.0e} F0; the passive "
         f"force is {1.5 * rings.passive_peak:.2f} F0 at the maximum length, 1.5 times the parameter fpmax = "
-        f"{rings.passive_peak:g}. With optimal lengths of {_span(optimal, 2)} m the rings work between "
+        f"{rings.passive_peak:g}. With optimal lengths of {span(optimal)} m the rings work between "
         f"{RING_LENGTHS_M[0]:.2f} and {RING_LENGTHS_M[1]:.2f} m on the ascending limb (shaded, L = {low:.2f} to "
         f"{high:.2f}), where the force falls to zero at {rings.minimum_length:g} L0. A full contraction against "
-        f"{SETTLED_FORCE_N:g} N ends at {settled:.2f} L0, with rings {_span(settled_m, 2)} m long: its end is set by "
+        f"{SETTLED_FORCE_N:g} N ends at {settled:.2f} L0, with rings {span(settled_m)} m long: its end is set by "
         f"length rather than by the peak force of {peak_N:.0f} N."
     )
 
@@ -162,10 +111,10 @@ def _draw_cuts(axes: Axes, rings: Rings, working: tuple[float, float]) -> None:
     lengths, _ = _grids(rings, 301)
     sparse = lengths[::15]
     axes.axvspan(*working, color="0.9", zorder=0)
-    for velocity, dashes, color in zip(_VELOCITIES, _DASHES, _CUT_COLORS, strict=True):
+    for velocity, dashes, color in _CUTS:
         label = f"${velocity:+.2f}\\ L_0$/s" if velocity else "isometric"
         axes.plot(lengths, engine_flv(lengths, velocity, rings), color=color, linestyle=dashes, label=label)
-        axes.plot(sparse, closed_form_flv(sparse, velocity, rings), "o", color=color, markersize=3, fillstyle="none")
+        axes.plot(sparse, muscle_force(sparse, velocity, rings), "o", color=color, markersize=3, fillstyle="none")
     axes.plot(lengths, engine_flv(lengths, 0.0, rings, 0.0), color="0.45", linewidth=0.9, label="passive")
     axes.plot([], [], "o", color="0.2", markersize=3, fillstyle="none", label="documented formula")
     axes.set_xlim(lengths[0], lengths[-1])
@@ -180,14 +129,3 @@ def _grids(rings: Rings, n: int) -> tuple[Array, Array]:
     """Lengths a little beyond those of the active force, and velocities up to the largest, n of each."""
     lengths = np.linspace(rings.minimum_length - 0.08, rings.maximum_length, n)
     return lengths, np.linspace(-rings.maximum_velocity, 0.5 * rings.maximum_velocity, n)
-
-
-def _working_range(ranges: list[tuple[float, float]]) -> tuple[float, float]:
-    """Scaled lengths between which at least one of the rings works."""
-    scaled = np.array([scaled_length(RING_LENGTHS_M, one) for one in ranges])
-    return float(scaled[:, 0].min()), float(scaled[:, 1].max())
-
-
-def _span(values: list[float], digits: int) -> str:
-    low, high = (f"{bound:.{digits}f}" for bound in (min(values), max(values)))
-    return low if low == high else f"{low}-{high}"

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyArrowPatch
 
 from annelid.config import RunConfig, load_config
-from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
-from annelid.draw.planar_scene import bent_rhombi, rhombi
+from annelid.draw import bent_rhombi, canvas, panel_title, rhombi, save_both, segment_colors
 from annelid.errors import ConfigError
 from annelid.morphology import Array
-from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Records
 from annelid.simulation import build_plant
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 CAPTION = (
     "Three planar models of worm segments, each as its planar plant rests with the middle segment contracted: a) "
@@ -34,11 +29,7 @@ _SETTLING_TIME_S = 3.0
 
 
 def contracted_outline(config: RunConfig, contracted: int) -> Array:
-    """Lets a planar plant contract one segment until it rests.
-
-    Args:
-        config: A configuration with a planar body.
-        contracted: Index of the segment, from 0.
+    """Lets a planar plant contract one segment, from 0, until it rests.
 
     Returns:
         Upper half of each segment from front to rear, shape ``(n_segments, n_corners, 2)``, m; the front tip at x = 0.
@@ -46,7 +37,7 @@ def contracted_outline(config: RunConfig, contracted: int) -> Array:
     Raises:
         ConfigError: The body is not a planar one.
     """
-    if not isinstance(config.body, PlanarWorm):
+    if not config.body.is_planar:
         raise ConfigError(f"figure 1 is drawn of planar bodies, and {config.name!r} has a body in 3D")
     plant = build_plant(config)
     activation = np.zeros(plant.n_muscles)
@@ -63,31 +54,12 @@ def contracted_outline(config: RunConfig, contracted: int) -> Array:
 
 
 def rigid_outline(height_m: Array, length_m: Array) -> Array:
-    """Places hinged rhombi in a row; their lower halves are the mirror images of the upper.
-
-    Args:
-        height_m: Shape ``(n_segments,)``.
-        length_m: Shape ``(n_segments,)``.
-
-    Returns:
-        Upper half of each, shape ``(n_segments, 3, 2)``: front joint on the axis, top, rear joint, m.
-    """
+    """Upper halves of hinged rhombi in a row, from the front joint over the top to the rear one, ``(n, 3, 2)``, m."""
     return rhombi(length_m, height_m)[:, :3] + [np.sum(length_m) / 2.0, 0.0]
 
 
 def zigzag(start: Array, end: Array, amplitude: float, n_teeth: int = 9, lead: float = 0.2) -> Array:
-    """Path of a linear spring's symbol.
-
-    Args:
-        start: Shape ``(2,)``.
-        end: Shape ``(2,)``.
-        amplitude: Height of a tooth.
-        n_teeth: Number of teeth.
-        lead: Share of the length at each end that stays straight.
-
-    Returns:
-        Shape ``(n_teeth + 4, 2)``.
-    """
+    """Path of a linear spring's symbol, ``(n_teeth + 4, 2)``; a share ``lead`` at each end stays straight."""
     along = np.concatenate([[0.0], np.linspace(lead, 1.0 - lead, n_teeth + 2), [1.0]])
     across = np.zeros(n_teeth + 4)
     across[2:-2] = amplitude * (-1.0) ** np.arange(n_teeth)
@@ -104,14 +76,7 @@ def spiral(center: Array, radius: float, turns: float = 2.25) -> Array:
 
 
 def figure_1_planar_models(stem: Path) -> str:
-    """Draws the three models with the middle segment contracted, each from its own plant.
-
-    Args:
-        stem: Path of the two files without their suffixes.
-
-    Returns:
-        The caption.
-    """
+    """Draws the three models with the middle segment contracted, each from its own plant; returns the caption."""
     contracted = N_SEGMENTS // 2
     outlines = {
         title: contracted_outline(load_config(preset, {"body.n_segments": N_SEGMENTS}), contracted)
@@ -175,8 +140,6 @@ def _draw_hinge(axes: Axes, place: Array) -> None:
 
 
 def _draw_actuator(axes: Axes, start: Array, end: Array, *, active: bool) -> None:
-    from matplotlib.patches import FancyArrowPatch
-
     shape = {"arrowstyle": "simple,head_length=5,head_width=7,tail_width=2.4", "shrinkA": 0.0, "shrinkB": 0.0}
     look = {"facecolor": _ACTUATOR if active else "w", "edgecolor": _ACTUATOR, "linewidth": 0.9, "zorder": 3}
     axes.add_patch(FancyArrowPatch((start[0], start[1]), (end[0], end[1]), **shape, **look))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from annelid.analysis.rhombi import (
+from annelid.analysis import (
+    Deformation,
     actuated,
     deformation,
     distance_from_ring_m,
@@ -17,10 +20,10 @@ from annelid.analysis.rhombi import (
     rhombus_diagonals,
     rhombus_plane,
 )
-from annelid.draw.camera import picture_axes
-from annelid.draw.canvas import WIDTH_IN, canvas, panel_title, save_both
-from annelid.draw.planar_scene import rhombi as flat_rhombi
+from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
+from annelid.draw import rhombi as flat_rhombi
 from annelid.morphology import Array, MeshGeometry
+from annelid.simulation import Run
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,
@@ -30,12 +33,6 @@ from annelid_studies.riddle2023.figures.renderings import (
     rhombus_outline,
     show_worm,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from annelid.simulation.runfile import Run
-
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
@@ -48,49 +45,35 @@ _GAP_M = 0.002
 
 @dataclass(frozen=True)
 class Measured:
-    """A rhombus at one moment against rest.
+    """A rhombus at one moment against rest."""
 
-    Attributes:
-        rhombus: Its index.
-        distance_m: Along the resting body from the contracted ring, negative towards the front.
-        length_m: Axial diagonal, at rest and now.
-        width_m: Lateral diagonal, at rest and now.
-    """
-
-    rhombus: int
-    distance_m: float
-    length_m: tuple[float, float]
-    width_m: tuple[float, float]
+    rhombus: int  # Its index
+    distance_m: float  # Along the resting body from the contracted ring, negative towards the front
+    length_m: tuple[float, float]  # Axial diagonal, at rest and now
+    width_m: tuple[float, float]  # Lateral diagonal, at rest and now
 
     def __str__(self) -> str:
-        (length0, length), (width0, width) = self.length_m, self.width_m
-        return (
-            f"length {_CM * length0:.1f} → {_CM * length:.1f} cm ({_change(length0, length)})\n"
-            f"width {_CM * width0:.1f} → {_CM * width:.1f} cm ({_change(width0, width)})"
+        return "\n".join(
+            f"{name} {_CM * before:.1f} → {_CM * after:.1f} cm ({_change(after / before)})"
+            for name, (before, after) in (("length", self.length_m), ("width", self.width_m))
         )
+
+    @property
+    def changes(self) -> tuple[str, str]:
+        """Changes of length and width in words."""
+        return _change(self.length_m[1] / self.length_m[0]), _change(self.width_m[1] / self.width_m[0])
 
 
 @dataclass(frozen=True)
 class Propagation:
-    """What figures 2 and 8 measure.
+    """How far a contraction deforms the mesh."""
 
-    Attributes:
-        time_s: Time of the posture.
-        segment: The most contracted segment, counted from 0.
-        near: An unactuated rhombus next to the contracted ring, without a corner on it.
-        far: The unactuated rhombus farthest from that ring, at the other side of it where both ends are as far.
-        plane_distance_m: Distance of every plane of rhombi from the contracted ring, shape ``(n_planes - 2,)``.
-        plane_axial: Mean relative change of the axial diagonals on each of them, same shape.
-        plane_lateral: The same of the lateral diagonals.
-    """
-
-    time_s: float
-    segment: int
-    near: Measured
-    far: Measured
-    plane_distance_m: Array
-    plane_axial: Array
-    plane_lateral: Array
+    posture: Posture
+    segment: int  # The most contracted segment, counted from 0
+    near: Measured  # An unactuated rhombus next to the contracted ring, without a corner on it
+    far: Measured  # The unactuated rhombus farthest from that ring, at the other side of it where both ends are as far
+    plane_distance_m: Array  # Distance of every plane of rhombi from the contracted ring, shape ``(n_planes - 2,)``
+    change: Deformation  # Of every rhombus
 
 
 def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
@@ -101,77 +84,89 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
-    return _measure(recorded_posture(run, time_s))
+    posture = recorded_posture(run, time_s)
+    geometry, segment = posture.geometry, _contracted(posture)
+    distance = distance_from_ring_m(geometry, segment)
+    offset = np.abs(rhombus_plane(geometry) - geometry.ring_planes[segment])
+    facing = _outward(posture.crossings_m, geometry) @ -picture_axes(*FIGURE_8_DEG)[2]
+    free = np.flatnonzero(offset >= 2)
+    own_muscle = actuated(geometry)[free]
+    near = int(free[np.lexsort((-facing[free], offset[free], own_muscle))[0]])
+    same_side = np.sign(distance[free]) == np.sign(distance[near])
+    far = int(free[np.lexsort((-facing[free], same_side, -offset[free], own_muscle))[0]])
+    measured = []
+    for rhombus in (near, far):
+        corners = geometry.rhombi[[rhombus]]
+        both = [rhombus_diagonals(crossings, corners) for crossings in (geometry.crossings_m, posture.crossings_m)]
+        length, width = ((float(rest[0]), float(now[0])) for rest, now in zip(*both, strict=True))
+        measured.append(Measured(rhombus, float(distance[rhombus]), length, width))
+    change = deformation(posture.crossings_m, geometry)
+    return Propagation(posture, segment, *measured, plane_means(distance, geometry), change)
 
 
 def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
-    """Sets rhombi that deform alone beside the same row of the compliant worm, with one segment contracted.
-
-    Args:
-        run: The run of a 3D worm.
-        stem: Path of the two files to write, without suffix.
-        time_s: Time of the posture, s.
-
-    Returns:
-        The caption.
+    """Draws rhombi that deform alone beside the same row of the compliant worm; returns the caption.
 
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
     posture = recorded_posture(run, time_s)
-    rows = _side_by_side(posture)
+    geometry, segment = posture.geometry, _contracted(posture)
+    rings_own = np.flatnonzero(rhombus_plane(geometry) == geometry.ring_planes[segment])
+    # Seen from -y, the first segment is on the left.
+    outward = _outward(geometry.crossings_m, geometry)[rings_own]
+    start, away = int(rings_own[np.argmin(outward[:, 1])]), outward[np.argmin(outward[:, 1])]
+    row = _row(geometry, start)
+    own = int(np.flatnonzero(row == start)[0])
+    # Axial and lateral diagonals, m, each (2, n): at rest, in the mesh, and alone with rigid sides.
+    rest, mesh = (
+        np.stack(rhombus_diagonals(crossings, geometry.rhombi[row]))
+        for crossings in (geometry.crossings_m, posture.crossings_m)
+    )
+    width = np.where(np.arange(len(row)) == own, mesh[1], rest[1])
+    rigid = np.stack([np.sqrt((rest**2).sum(axis=0) - width**2), width])
+    change_alone, change = rigid[0] / rest[0], mesh[0] / rest[0]
     with canvas(3.0) as figure:
-        rigid, compliant = figure.subplots(1, 2, sharex=True, sharey=True)
-        place = draw_worm(compliant, posture, rows.facing_deg, strength=0.45)
-        corners = place(posture.crossings_m[posture.geometry.rhombi[rows.rhombi]])
-        alone = _CM * flat_rhombi(rows.rigid_m[0], rows.rigid_m[1])
-        alone += corners[rows.own].mean(axis=0) - alone[rows.own].mean(axis=0)
-        foot = float(compliant.get_ylim()[0])
-        _draw_row(rigid, alone, rows.own, rows.rigid_m[0] / rows.rest_m[0] - 1.0, foot)
-        _draw_row(compliant, corners, rows.own, rows.compliant_m[0] / rows.rest_m[0] - 1.0, foot)
+        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+        place = draw_worm(right, posture, (90.0, float(np.degrees(np.arcsin(-away[2])))), strength=0.45)
+        corners = place(posture.crossings_m[geometry.rhombi[row]])
+        alone = _CM * flat_rhombi(rigid[0], rigid[1])
+        alone += corners[own].mean(axis=0) - alone[own].mean(axis=0)
+        foot = float(right.get_ylim()[0])
+        _draw_row(left, alone, own, change_alone, foot)
+        _draw_row(right, corners, own, change, foot)
         reach = np.concatenate([alone, corners])[..., 0]
-        compliant.set_xlim(min(compliant.get_xlim()[0], reach.min() - 1), max(compliant.get_xlim()[1], reach.max() + 1))
-        compliant.set_ylim(foot - 8.0, None)
-        figure.set_figheight(_height_over_width(compliant) * WIDTH_IN / 2 + 0.3)
-        _scale_bar(rigid, alone)
-        panel_title(rigid, "a) without propagation: each rhombus alone")
-        panel_title(compliant, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
+        right.set_xlim(min(right.get_xlim()[0], reach.min() - 1), max(right.get_xlim()[1], reach.max() + 1))
+        right.set_ylim(foot - 8.0, None)
+        figure.set_figheight(_height_over_width(right) * WIDTH_IN / 2 + 0.3)
+        # 10 cm above the left end.
+        bar, above = alone[..., 0].min(), alone[..., 1].max() + 2.5
+        left.plot([bar, bar + 10.0], [above, above], color="black", linewidth=2.0, solid_capstyle="butt")
+        left.text(bar + 5.0, above + 0.6, "10 cm", ha="center", va="bottom", fontsize=8)
+        panel_title(left, "a) without propagation: each rhombus alone")
+        panel_title(right, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
         save_both(figure, stem)
-    return _caption_2(posture, rows)
-
-
-def _caption_2(posture: Posture, rows: _Rows) -> str:
-    rest, alone, mesh = (float(lengths[0].sum()) for lengths in (rows.rest_m, rows.rigid_m, rows.compliant_m))
-    own_alone, own_mesh = (float(m[0][rows.own] / rows.rest_m[0][rows.own]) for m in (rows.rigid_m, rows.compliant_m))
-    beside = [k for k in (rows.own - 1, rows.own + 1) if 0 <= k < len(rows.rhombi)]
-    neighbours = float((rows.compliant_m[0] / rows.rest_m[0])[beside].mean())
+    beside = [k for k in (own - 1, own + 1) if 0 <= k < len(row)]
     return (
-        f"One row of rhombi along the body while segment {rows.segment + 1} contracts (orange, hatched; all others "
+        f"One row of rhombi along the body while segment {segment + 1} contracts (orange, hatched; all others "
         "black); below each rhombus the change of its length. a) Kinematic, with rigid sides: made as narrow as the "
-        f"contracted rhombus of b), that one lengthens by {_change(1.0, own_alone)} and its neighbours keep their "
-        f"shape. b) The compliant worm at {posture.time_s:.2f} s, drawn facing that row, the rest of the mesh pale: "
-        f"the contracted rhombus lengthens by {_change(1.0, own_mesh)}, and its neighbours in the row by "
-        f"{_change(1.0, neighbours)} on average. The row of {_CM * rest:.1f} cm becomes {_CM * alone:.1f} cm long in "
-        f"a) and {_CM * mesh:.1f} cm in b).{_pin_remark(posture, rows.segment)}"
+        f"contracted rhombus of b), that one lengthens by {_change(float(change_alone[own]))} and its neighbours keep "
+        f"their shape. b) The compliant worm at {posture.time_s:.2f} s, drawn facing that row, the rest of the mesh "
+        f"pale: the contracted rhombus lengthens by {_change(float(change[own]))}, and its neighbours in the row by "
+        f"{_change(float(change[beside].mean()))} on average. The row of {_CM * rest[0].sum():.1f} cm becomes "
+        f"{_CM * rigid[0].sum():.1f} cm long in a) and {_CM * mesh[0].sum():.1f} cm in b)."
+        f"{_pin_remark(posture, segment)}"
     )
 
 
 def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
-    """Shows the worm with one segment contracted, a near and a far rhombus, and the deformation of all of them.
-
-    Args:
-        run: The run of a 3D worm.
-        stem: Path of the two files to write, without suffix.
-        time_s: Time of the posture, s.
-
-    Returns:
-        The caption.
+    """Shows a near and a far rhombus of the worm, and the deformation of all of them; returns the caption.
 
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
-    posture = recorded_posture(run, time_s)
-    measured = _measure(posture)
+    measured = measure_propagation(run, time_s)
+    posture = measured.posture
     with canvas(6.7) as figure:
         grid = figure.add_gridspec(2, 1)
         picture, below = figure.add_subfigure(grid[0]).subplots(), figure.add_subfigure(grid[1])
@@ -185,9 +180,8 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         _outline(picture, place, posture, measured.far, "far rhombus", PINK, "--", places[1])
         panel_title(picture, f"a) segment {measured.segment + 1} contracted, t = {posture.time_s:.2f} s")
         axial, lateral = below.subplots(1, 2, sharex=True)
-        change = deformation(posture.crossings_m, posture.geometry)
-        _scatter(axial, posture.geometry, measured, change.axial, measured.plane_axial)
-        _scatter(lateral, posture.geometry, measured, change.lateral, measured.plane_lateral)
+        _scatter(axial, measured, measured.change.axial)
+        _scatter(lateral, measured, measured.change.lateral)
         panel_title(axial, "b) length of each rhombus")
         panel_title(lateral, "c) width of each rhombus")
         axial.set_ylabel("change against rest (%)")
@@ -196,25 +190,19 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         handles, labels = axial.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), columnspacing=1.4)
         save_both(figure, stem)
-    return _caption_8(posture, measured)
-
-
-def _caption_8(posture: Posture, measured: Propagation) -> str:
     how = "rendered" if rendering_works() else "drawn from the recorded posture, not rendered"
     near, far = measured.near, measured.far
-    distance, axial = np.abs(measured.plane_distance_m), measured.plane_axial
+    distance, axial = np.abs(measured.plane_distance_m), plane_means(measured.change.axial, posture.geometry)
     most, last = int(np.argmax(np.abs(axial))), int(np.argmax(distance))
     return (
-        f"a) The compliant worm with segment {measured.segment + 1} contracted, at {measured.time_s:.2f} s ({how}; the "
-        "contracted ring is thick and red). The near rhombus (green, solid), "
-        f"{_CM * abs(near.distance_m):.1f} cm from the ring at rest, {_muscle(posture, near)}, changes its "
-        f"length by {_change(*near.length_m)} and its width by {_change(*near.width_m)}; the far one (pink, dashed), "
-        f"{_CM * abs(far.distance_m):.1f} cm away, {_muscle(posture, far)}, by {_change(*far.length_m)} and "
-        f"{_change(*far.width_m)}. b, c) The same for every rhombus (straight lines between opposite pins) with the "
-        f"mean of each plane, front on the left: the mean change of length is largest, "
-        f"{_change(1.0, 1.0 + float(axial[most]))}, {_CM * distance[most]:.1f} cm from the ring, and "
-        f"{_change(1.0, 1.0 + float(axial[last]))} at {_CM * distance[last]:.1f} cm."
-        f"{_pin_remark(posture, measured.segment)}"
+        f"a) The compliant worm with segment {measured.segment + 1} contracted, at {posture.time_s:.2f} s ({how}; the "
+        f"contracted ring is thick and red). The near rhombus (green, solid), {_CM * abs(near.distance_m):.1f} cm from "
+        f"the ring at rest, {_muscle(posture, near)}, changes its length by {near.changes[0]} and its width by "
+        f"{near.changes[1]}; the far one (pink, dashed), {_CM * abs(far.distance_m):.1f} cm away, "
+        f"{_muscle(posture, far)}, by {far.changes[0]} and {far.changes[1]}. b, c) The same for every rhombus "
+        "(straight lines between opposite pins) with the mean of each plane, front on the left: the mean change of "
+        f"length is largest, {_change(1.0 + float(axial[most]))}, {_CM * distance[most]:.1f} cm from the ring, and "
+        f"{_change(1.0 + float(axial[last]))} at {_CM * distance[last]:.1f} cm.{_pin_remark(posture, measured.segment)}"
     )
 
 
@@ -234,36 +222,6 @@ def _pin_remark(posture: Posture, segment: int) -> str:
     return f" The contracted ring's pins, which are tied softly, stand {_CM * gap_m:.1f} cm off their strands."
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """A row of rhombi tip to tip, alone and in the mesh: each ``(axial, lateral)``, m, of shape ``(2, n)``."""
-
-    segment: int
-    rhombi: NDArray[np.int64]
-    own: int
-    facing_deg: tuple[float, float]
-    rest_m: Array
-    compliant_m: Array
-    rigid_m: Array
-
-
-def _side_by_side(posture: Posture) -> _Rows:
-    geometry = posture.geometry
-    segment = _contracted(posture)
-    rings_own = np.flatnonzero(rhombus_plane(geometry) == geometry.ring_planes[segment])
-    # Seen from -y, the first segment is on the left.
-    outward = _outward(geometry.crossings_m, geometry)[rings_own]
-    start, away = int(rings_own[np.argmin(outward[:, 1])]), outward[np.argmin(outward[:, 1])]
-    row = _row(geometry, start)
-    own = int(np.flatnonzero(row == start)[0])
-    rest = np.stack(rhombus_diagonals(geometry.crossings_m, geometry.rhombi[row]))
-    compliant = np.stack(rhombus_diagonals(posture.crossings_m, geometry.rhombi[row]))
-    lateral = rest[1].copy()
-    lateral[own] = compliant[1, own]
-    rigid = np.stack([np.sqrt((rest**2).sum(axis=0) - lateral**2), lateral])
-    return _Rows(segment, row, own, (90.0, float(np.degrees(np.arcsin(-away[2])))), rest, compliant, rigid)
-
-
 def _row(geometry: MeshGeometry, start: int) -> NDArray[np.int64]:
     """The rhombi that lie tip to tip with one of them, front to back."""
     front, rear = geometry.rhombi[:, 0].tolist(), geometry.rhombi[:, 2].tolist()
@@ -277,14 +235,12 @@ def _row(geometry: MeshGeometry, start: int) -> NDArray[np.int64]:
 
 def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) -> None:
     """Draws rhombi, shape ``(n, 4, 2)``, in cm, the contracted one apart, with their changes of length below."""
-    from matplotlib.patches import Polygon
-
     axes.set_axis_off()
     axes.set_aspect("equal")
     for k, quad in enumerate(corners):
         style = {"edgecolor": ORANGE, "linewidth": 2.6, "hatch": "////"} if k == own else {"edgecolor": "black"}
         axes.add_patch(Polygon(quad, closed=True, facecolor="none", zorder=6 if k == own else 5, **style))
-        text = _change(1.0, 1.0 + float(change[k])).removesuffix(" %")
+        text = _change(float(change[k])).removesuffix(" %")
         axes.text(quad[:, 0].mean(), foot - 1.0, text, ha="center", va="top", fontsize=8)
     middle = (corners[..., 0].min() + corners[..., 0].max()) / 2
     axes.text(middle, foot - 5.0, "change of length (%)", ha="center", va="top", fontsize=8)
@@ -293,13 +249,6 @@ def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) 
 def _height_over_width(axes: Axes) -> float:
     """Shape of what the limits of axes hold, where both axes have one scale."""
     return abs(float(np.diff(axes.get_ylim())[0] / np.diff(axes.get_xlim())[0]))
-
-
-def _scale_bar(axes: Axes, corners: Array) -> None:
-    """Draws 10 cm above a row's left end."""
-    left, above = corners[..., 0].min(), corners[..., 1].max() + 2.5
-    axes.plot([left, left + 10.0], [above, above], color="black", linewidth=2.0, solid_capstyle="butt")
-    axes.text(left + 5.0, above + 0.6, "10 cm", ha="center", va="bottom", fontsize=8)
 
 
 def _outline(
@@ -316,8 +265,9 @@ def _outline(
     axes.annotate(f"{name}\n{measured}", tuple(tip), (share, -0.04), color=color, **below)
 
 
-def _scatter(axes: Axes, geometry: MeshGeometry, measured: Propagation, change: Array, mean: Array) -> None:
+def _scatter(axes: Axes, measured: Propagation, change: Array) -> None:
     """Change of every rhombus over its distance from the contracted ring."""
+    geometry = measured.posture.geometry
     distance = _CM * distance_from_ring_m(geometry, measured.segment)
     with_muscle = actuated(geometry)
     for mask, marker, color, face, name in (
@@ -326,41 +276,12 @@ def _scatter(axes: Axes, geometry: MeshGeometry, measured: Propagation, change: 
     ):
         look = {"color": color, "markerfacecolor": face, "markersize": 4, "label": name}
         axes.plot(distance[mask], _PERCENT * change[mask], marker, **look)
-    axes.plot(_CM * measured.plane_distance_m, _PERCENT * mean, "-", color="0.1", linewidth=1.2, label="mean")
+    mean = _PERCENT * plane_means(change, geometry)
+    axes.plot(_CM * measured.plane_distance_m, mean, "-", color="0.1", linewidth=1.2, label="mean")
     for one, marker, color, name in ((measured.near, "D", GREEN, "near"), (measured.far, "v", PINK, "far")):
         place = _CM * one.distance_m, _PERCENT * change[one.rhombus]
         axes.plot(*place, marker, color=color, markersize=8, markeredgecolor="black", label=name, zorder=5)
     axes.axhline(0.0, color="0.5", linewidth=0.8)
-
-
-def _measure(posture: Posture) -> Propagation:
-    geometry = posture.geometry
-    segment = _contracted(posture)
-    distance = distance_from_ring_m(geometry, segment)
-    offset = np.abs(rhombus_plane(geometry) - geometry.ring_planes[segment])
-    facing = _outward(posture.crossings_m, geometry) @ -picture_axes(*FIGURE_8_DEG)[2]
-    free = np.flatnonzero(offset >= 2)
-    own_muscle = actuated(geometry)[free]
-    near = int(free[np.lexsort((-facing[free], offset[free], own_muscle))[0]])
-    same_side = np.sign(distance[free]) == np.sign(distance[near])
-    far = int(free[np.lexsort((-facing[free], same_side, -offset[free], own_muscle))[0]])
-    change = deformation(posture.crossings_m, geometry)
-    return Propagation(
-        time_s=posture.time_s,
-        segment=segment,
-        near=_measured(posture, near, float(distance[near])),
-        far=_measured(posture, far, float(distance[far])),
-        plane_distance_m=plane_means(distance, geometry),
-        plane_axial=plane_means(change.axial, geometry),
-        plane_lateral=plane_means(change.lateral, geometry),
-    )
-
-
-def _measured(posture: Posture, rhombus: int, distance_m: float) -> Measured:
-    corners = posture.geometry.rhombi[[rhombus]]
-    both = [rhombus_diagonals(crossings, corners) for crossings in (posture.geometry.crossings_m, posture.crossings_m)]
-    length, width = ((float(rest[0]), float(now[0])) for rest, now in zip(*both, strict=True))
-    return Measured(rhombus, distance_m, length, width)
 
 
 def _contracted(posture: Posture) -> int:
@@ -379,6 +300,6 @@ def _outward(crossings_m: Array, geometry: MeshGeometry) -> Array:
     return away / np.linalg.norm(away, axis=1, keepdims=True)
 
 
-def _change(before: float, after: float) -> str:
-    percent = round(_PERCENT * (after / before - 1.0))
+def _change(ratio: float) -> str:
+    percent = round(_PERCENT * (ratio - 1.0))
     return f"{percent:+d} %".replace("-", "\N{MINUS SIGN}") if percent else "0 %"

@@ -5,29 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
-from annelid.analysis.rhombi import nearest_frame
-from annelid.body import mesh_of
-from annelid.body.actuation import PIN_RGBA
-from annelid.body.formulations.rods.net import STRAND_RGBA
-from annelid.body.worm import WormBody
+from annelid.analysis import nearest_frame
+from annelid.body import WormBody, mesh_of
 from annelid.config import RunConfig
-from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
-from annelid.draw.canvas import CONTRACTED, activation_color, canvas, panel_title, save_both
-from annelid.draw.gl import find_backend
-from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, postures_of, render_still
+from annelid.draw import (
+    CONTRACTED,
+    CONTRACTED_WIDTH,
+    PIN_RGBA,
+    SPRING_RGBA,
+    STRAND_RGBA,
+    VIEWS_DEG,
+    Skeleton,
+    activation_color,
+    canvas,
+    find_backend,
+    fitting_distance,
+    panel_title,
+    picture_axes,
+    picture_points,
+    postures_of,
+    render_still,
+    save_both,
+)
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import Array, MeshGeometry
-from annelid.simulation.worm import compile_worm
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from annelid.simulation.runfile import Run
+from annelid.simulation import Run, compile_worm
 
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""
@@ -47,25 +57,15 @@ _PIECES = 6
 
 @dataclass(frozen=True)
 class Posture:
-    """A 3D worm at one moment.
+    """A 3D worm at one moment."""
 
-    Attributes:
-        config: Its configuration.
-        geometry: Its mesh at rest.
-        time_s: Time of the posture; NaN at rest.
-        crossings_m: Positions of the pins, m, shape ``(n_crossings, 3)``.
-        strands_m: Points of the strands, m, shape ``(n_strands, n_vertices, 3)``.
-        qpos: The engine's coordinates; None at rest.
-        activation: Of every ring muscle; None where all are to be shown in red.
-    """
-
-    config: RunConfig
-    geometry: MeshGeometry
-    time_s: float
-    crossings_m: Array
-    strands_m: Array
-    qpos: Array | None = None
-    activation: Array | None = None
+    config: RunConfig  # Its configuration
+    geometry: MeshGeometry  # Its mesh at rest
+    time_s: float  # Time of the posture; NaN at rest
+    crossings_m: Array  # Positions of the pins, m, shape ``(n_crossings, 3)``
+    strands_m: Array  # Points of the strands, m, shape ``(n_strands, n_vertices, 3)``
+    qpos: Array | None = None  # The engine's coordinates; None at rest
+    activation: Array | None = None  # Of every ring muscle; None where all are to be shown in red
 
 
 def rest_posture(config: RunConfig) -> Posture:
@@ -74,7 +74,7 @@ def rest_posture(config: RunConfig) -> Posture:
     Raises:
         RunFileError: The worm is planar.
     """
-    geometry = mesh_of(_worm(config).mesh)
+    geometry = _mesh(config)
     return Posture(config, geometry, float("nan"), geometry.crossings_m, geometry.vertices_m)
 
 
@@ -84,8 +84,7 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
     Raises:
         RunFileError: The worm is planar, or no posture was recorded at that time.
     """
-    geometry = mesh_of(_worm(run.config).mesh)
-    frame = nearest_frame(run, time_s)
+    geometry, frame = _mesh(run.config), nearest_frame(run, time_s)
     recorded_s = float(run.data["frame_time"].values[frame])
     anatomy = compile_worm(run.config)
     qpos = postures_of(run, anatomy.model.nq)[frame]
@@ -100,8 +99,14 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
     )
 
 
+def _mesh(config: RunConfig) -> MeshGeometry:
+    if not isinstance(config.body, WormBody):
+        raise RunFileError(f"{config.name} is a planar worm: this figure shows the 3D worm")
+    return mesh_of(config.body.mesh)
+
+
 def rendering_works() -> bool:
-    """Tells whether pictures of the worm are rendered on this machine; otherwise they are drawn."""
+    """Whether pictures of the worm are rendered on this machine; otherwise they are drawn."""
     try:
         find_backend()
     except RenderingUnavailable:
@@ -110,23 +115,16 @@ def rendering_works() -> bool:
 
 
 def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], width_in: float) -> Place:
-    """Shows a posture on axes of its own: rendered with OpenGL, or drawn with lines where there is none.
+    """Shows a posture on empty axes: rendered with OpenGL, or drawn with lines where there is none.
 
-    Args:
-        axes: Empty axes.
-        posture: The worm.
-        angles_deg: Azimuth and elevation of the line of sight.
-        width_in: Width of the axes, inches, which decides the resolution.
-
-    Returns:
-        Where points in space lie on the axes.
+    The angles are azimuth and elevation of the line of sight; the width of the axes, inches, decides the resolution.
     """
     axes.set_axis_off()
     axes.set_aspect("equal")
     if not rendering_works():
         return draw_worm(axes, posture, angles_deg, perspective=True)
-    width = int(width_in * _PIXELS_PER_INCH)
-    still = render_still(posture.config, angles_deg, (width, width), qpos=posture.qpos, activation=posture.activation)
+    size = (int(width_in * _PIXELS_PER_INCH),) * 2
+    still = render_still(posture.config, angles_deg, size, qpos=posture.qpos, activation=posture.activation)
     axes.imshow(still.pixels)
     rows, columns = np.nonzero((still.pixels < 250).any(axis=-1))
     axes.set_xlim(columns.min() - 4, columns.max() + 4)
@@ -135,27 +133,17 @@ def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], wid
 
 
 def draw_worm(
-    axes: Axes,
-    posture: Posture,
-    angles_deg: tuple[float, float],
-    *,
-    perspective: bool = False,
-    strength: float = 1.0,
+    axes: Axes, posture: Posture, angles_deg: tuple[float, float], *, perspective: bool = False, strength: float = 1.0
 ) -> Place:
-    """Draws a posture with lines; what lies behind is paler and crossed over.
+    """Draws a posture on empty axes with lines; what lies behind is paler and crossed over.
 
     Args:
-        axes: Empty axes.
+        axes: The axes.
         posture: The worm.
         angles_deg: Azimuth and elevation of the line of sight.
         perspective: As the renderer's camera sees it; by default in parallel projection, in cm.
         strength: Share of the colours that the nearest parts keep, in (0, 1].
-
-    Returns:
-        Where points in space lie on the axes.
     """
-    from matplotlib.collections import LineCollection
-
     right, up, sight = picture_axes(*angles_deg)
     pieces, colors, widths = _lines(posture)
     target = (pieces.min(axis=(0, 1)) + pieces.max(axis=(0, 1))) / 2
@@ -168,60 +156,80 @@ def draw_worm(
         return _CM * np.stack([points @ right, points @ up], axis=-1)
 
     depth = pieces.mean(axis=1) @ sight
-    pin_depth = posture.crossings_m @ sight
     near, far = depth.min(), depth.max()
-    share = strength * (1.0 - (1.0 - _FARTHEST_SHARE) * (depth - near) / (far - near))
-    pin_share = strength * (1.0 - (1.0 - _FARTHEST_SHARE) * np.clip((pin_depth - near) / (far - near), 0, 1))
-    faded, pins = _fade(colors, share), _fade(np.array([PIN_RGBA[:3]]), pin_share)
-    flat, flat_pins = place(pieces), place(posture.crossings_m)
     bounds = np.linspace(far, near, _LAYERS + 1)[1:-1]
-    layers, pin_layers = np.searchsorted(-bounds, -depth), np.searchsorted(-bounds, -pin_depth)
+
+    def faded(colors: Array, depth: Array) -> tuple[Array, Array]:
+        """Colours mixed with white the more the farther behind, and the layer of each depth."""
+        share = strength * (1.0 - (1.0 - _FARTHEST_SHARE) * np.clip((depth - near) / (far - near), 0, 1))
+        return 1.0 - share[:, None] * (1.0 - colors), np.searchsorted(-bounds, -depth)
+
+    colors, layers = faded(colors, depth)
+    pins, pin_layers = faded(np.array([PIN_RGBA[:3]]), posture.crossings_m @ sight)
+    flat, flat_pins = place(pieces), place(posture.crossings_m)
     for layer in range(_LAYERS):
         own, at, height = layers == layer, pin_layers == layer, 2 + layer / _LAYERS
-        halo = LineCollection(list(flat[own]), colors="white", linewidths=widths[own] + _HALO, capstyle="butt")
-        lines = LineCollection(list(flat[own]), colors=faded[own], linewidths=widths[own], capstyle="round")
-        for collection in (halo, lines):
-            collection.set_zorder(height)
-            axes.add_collection(collection)
+        for color, width, cap in (("white", widths[own] + _HALO, "butt"), (colors[own], widths[own], "round")):
+            lines = LineCollection(list(flat[own]), colors=color, linewidths=width, capstyle=cap, zorder=height)
+            axes.add_collection(lines)
         # A pin is thicker than the strands that meet in it.
         axes.scatter(*flat_pins[at].T, s=_PIN_SIZE, c=pins[at], linewidths=0, zorder=height + 1.5 / _LAYERS)
     low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
     room = 0.015 * float((high - low).max())
-    axes.set_xlim(low[0] - room, high[0] + room)
-    axes.set_ylim(low[1] - room, high[1] + room)
+    axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
     return place
 
 
+def _lines(posture: Posture) -> tuple[Array, Array, Array]:
+    """Straight pieces of strands, springs and rings, shape ``(n, 2, 3)``, their colours and their widths."""
+    geometry, crossings = posture.geometry, posture.crossings_m
+    n_segments = geometry.n_segments
+    strands = np.stack([posture.strands_m[:, :-1], posture.strands_m[:, 1:]], axis=2)
+    strand_colors = np.repeat([color[:3] for color in STRAND_RGBA], strands[0].shape[0] * geometry.n_per_plane, axis=0)
+    springs = _cut(crossings[geometry.springs])
+    rings = _cut(np.stack([crossings[geometry.rings], crossings[np.roll(geometry.rings, -1, axis=1)]], axis=2))
+    if posture.activation is None:
+        contraction = np.zeros(n_segments)
+        ring_colors, spring_color = np.tile(CONTRACTED, (n_segments, 1)), CONTRACTED
+    else:
+        contraction = posture.activation.reshape(n_segments, -1).mean(axis=1)
+        ring_colors, spring_color = np.array([activation_color(a) for a in contraction]), SPRING_RGBA[:3]
+    n_ring = len(rings) // n_segments
+    ring_widths = np.repeat(_RING_WIDTH * (1.0 + (CONTRACTED_WIDTH - 1.0) * contraction), n_ring)
+    widths = [np.full(len(strand_colors), _STRAND_WIDTH), np.full(len(springs), _SPRING_WIDTH), ring_widths]
+    return (
+        np.concatenate([strands.reshape(-1, 2, 3), springs, rings]),
+        np.concatenate([strand_colors, np.tile(spring_color, (len(springs), 1)), np.repeat(ring_colors, n_ring, 0)]),
+        np.concatenate(widths),
+    )
+
+
+def _cut(lines: Array) -> Array:
+    """Cuts straight lines, shape ``(..., 2, 3)``, into pieces one after the other, shape ``(n, 2, 3)``."""
+    share = np.linspace(0.0, 1.0, _PIECES + 1)[:, None]
+    points = lines[..., :1, :] * (1.0 - share) + lines[..., 1:, :] * share
+    return np.stack([points[..., :-1, :], points[..., 1:, :]], axis=-2).reshape(-1, 2, 3)
+
+
 def rhombus_outline(posture: Posture, rhombus: int) -> Array:
-    """Follows the strands round a rhombus, from pin to pin.
-
-    Args:
-        posture: The worm.
-        rhombus: Its index.
-
-    Returns:
-        A closed line, m, shape ``(n_points, 3)``.
-    """
-    corners = posture.geometry.rhombi[rhombus]
-    sides = [_side(posture, int(a), int(b)) for a, b in zip(corners, np.roll(corners, -1), strict=True)]
-    return np.concatenate([*sides, sides[0][:1]])
+    """Follows the strands round a rhombus from pin to pin: a closed line, m, shape ``(n_points, 3)``."""
+    geometry, corners = posture.geometry, posture.geometry.rhombi[rhombus]
+    points = []
+    for start, end in zip(corners, np.roll(corners, -1), strict=True):
+        # The points of the strand that both share, from the one pin to just before the other.
+        (strand,) = np.intersect1d(geometry.crossing_strands[start], geometry.crossing_strands[end])
+        first, last = (int(geometry.crossing_vertex[geometry.crossing_plane[c]]) for c in (start, end))
+        step = 1 if last > first else -1
+        points += [posture.crossings_m[[start]], posture.strands_m[strand, np.arange(first + step, last, step)]]
+    return np.concatenate([*points, points[0]])
 
 
 def figure_4_model(config: RunConfig, stem: Path) -> str:
-    """Shows the model at rest, in the axial and the isometric view.
-
-    Args:
-        config: Configuration of a 3D worm.
-        stem: Path of the two files to write, without suffix.
-
-    Returns:
-        The caption, with the numbers of the model.
+    """Shows the model at rest, in the axial and the isometric view; returns the caption.
 
     Raises:
         RunFileError: The worm is planar.
     """
-    from matplotlib.lines import Line2D
-
     posture = rest_posture(config)
     with canvas(3.3) as figure:
         axial, isometric = figure.subplots(1, 2, width_ratios=[1.0, 1.42])
@@ -249,58 +257,3 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
         f"round the body through {half} pins each, so at rest they are polygons, and {len(geometry.springs)} axial "
         "springs (thin red) join pins that are two planes apart."
     )
-
-
-def _worm(config: RunConfig) -> WormBody:
-    if not isinstance(config.body, WormBody):
-        raise RunFileError(f"{config.name} is a planar worm: this figure shows the 3D worm")
-    return config.body
-
-
-def _lines(posture: Posture) -> tuple[Array, Array, Array]:
-    """Straight pieces of strands, springs and rings, shape ``(n, 2, 3)``, their colours and their widths."""
-    geometry, crossings = posture.geometry, posture.crossings_m
-    strands = np.stack([posture.strands_m[:, :-1], posture.strands_m[:, 1:]], axis=2)
-    strand_colors = np.repeat([color[:3] for color in STRAND_RGBA], strands[0].shape[0] * geometry.n_per_plane, axis=0)
-    springs = _cut(crossings[geometry.springs])
-    rings = _cut(np.stack([crossings[geometry.rings], crossings[np.roll(geometry.rings, -1, axis=1)]], axis=2))
-    if posture.activation is None:
-        ring_share = np.zeros(geometry.n_segments)
-        ring_colors, spring_color = np.tile(CONTRACTED, (geometry.n_segments, 1)), CONTRACTED
-    else:
-        ring_share = posture.activation.reshape(geometry.n_segments, -1).mean(axis=1)
-        ring_colors, spring_color = np.array([activation_color(a) for a in ring_share]), SPRING_RGBA[:3]
-    n_ring = len(rings) // geometry.n_segments
-    return (
-        np.concatenate([strands.reshape(-1, 2, 3), springs, rings]),
-        np.concatenate([strand_colors, np.tile(spring_color, (len(springs), 1)), np.repeat(ring_colors, n_ring, 0)]),
-        np.concatenate(
-            [
-                np.full(len(strand_colors), _STRAND_WIDTH),
-                np.full(len(springs), _SPRING_WIDTH),
-                np.repeat(_RING_WIDTH * (1.0 + (CONTRACTED_WIDTH - 1.0) * ring_share), n_ring),
-            ]
-        ),
-    )
-
-
-def _cut(lines: Array) -> Array:
-    """Cuts straight lines, shape ``(..., 2, 3)``, into pieces one after the other, shape ``(n, 2, 3)``."""
-    share = np.linspace(0.0, 1.0, _PIECES + 1)[:, None]
-    points = lines[..., :1, :] * (1.0 - share) + lines[..., 1:, :] * share
-    return np.stack([points[..., :-1, :], points[..., 1:, :]], axis=-2).reshape(-1, 2, 3)
-
-
-def _fade(colors: Array, share: Array) -> Array:
-    """Mixes colours with white, of which they keep a share each."""
-    return 1.0 - share[:, None] * (1.0 - colors)
-
-
-def _side(posture: Posture, start: int, end: int) -> Array:
-    """Points of the strand that two neighbouring crossings share, from the one pin to just before the other."""
-    geometry = posture.geometry
-    (strand,) = np.intersect1d(geometry.crossing_strands[start], geometry.crossing_strands[end])
-    first, last = (int(geometry.crossing_vertex[geometry.crossing_plane[c]]) for c in (start, end))
-    step = 1 if last > first else -1
-    between = posture.strands_m[strand, np.arange(first + step, last, step)]
-    return np.concatenate([posture.crossings_m[[start]], between])

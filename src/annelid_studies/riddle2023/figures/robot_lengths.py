@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from annelid.analysis.paper import ROBOT_ELONGATION_M, published
-from annelid.config import load_config
-from annelid.draw.canvas import canvas, panel_title, save_both, segment_colors
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 
 _CM = 100.0
 _BAR = 0.8
@@ -30,46 +26,33 @@ CAPTION = (
 
 
 def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) -> str:
-    """Draws the elongations of the robot, of the paper's model and of simulations as groups of bars.
+    """Draws the elongations, m, of the robot, of the paper's model and of simulations as groups of bars.
 
-    Args:
-        series: For each simulation its label and the elongation of every segment, m.
-        stem: Path of the two files without their suffixes.
-
-    Returns:
-        The caption.
+    Returns the caption.
     """
-    groups = _with_published(series)
-    n_segments = max(len(elongation) for elongation in groups.values())
-    colors = segment_colors(n_segments)
+    groups = {"robot (Wang)": ROBOT_ELONGATION_M, "the paper's model": PAPER_ELONGATION_M, **series}
+    most = max(groups.values(), key=len)
     with canvas(4.6) as figure:
         absolute, relative = figure.subplots(2, 1, sharex=True)
-        _draw_bars(absolute, {label: _CM * np.asarray(values) for label, values in groups.items()}, colors)
-        _draw_bars(relative, {label: np.divide(values, values[0]) for label, values in groups.items()}, colors)
+        _draw_bars(absolute, [_CM * np.asarray(values) for values in groups.values()], len(most))
+        _draw_bars(relative, [np.divide(values, values[0]) for values in groups.values()], len(most))
         panel_title(absolute, "a) largest elongation")
         absolute.set_ylabel("elongation (cm)")
         panel_title(relative, "b) the same relative to segment 1")
         relative.set_ylabel("relative elongation (1)")
         relative.set_xticks(range(len(groups)), [fill(label, _LABEL_WIDTH) for label in groups])
-        handles = absolute.containers[np.argmax([len(values) for values in groups.values()])]
-        names = [f"segment {segment}" for segment in range(1, n_segments + 1)]
+        handles = absolute.containers[list(groups.values()).index(most)]
+        names = [f"segment {segment}" for segment in range(1, len(most) + 1)]
         room = {"columnspacing": 1.2, "handlelength": 1.2, "borderaxespad": 0.1}
-        absolute.legend(list(handles), names, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=n_segments, **room)
+        absolute.legend(list(handles), names, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(most), **room)
         save_both(figure, stem)
     return CAPTION
 
 
-def _with_published(series: Mapping[str, Sequence[float]]) -> dict[str, Sequence[float]]:
-    model = published(load_config("riddle2023"))["elongation_first_helix_pp_m"].value
-    if not isinstance(model, tuple):
-        raise TypeError("the paper's elongations are one number a segment")
-    return {"robot (Wang)": ROBOT_ELONGATION_M, "the paper's model": model, **series}
-
-
-def _draw_bars(axes: Axes, groups: Mapping[str, ArrayLike], colors: Sequence[Any]) -> None:
+def _draw_bars(axes: Axes, groups: Sequence[ArrayLike], n_segments: int) -> None:
     """Draws one group of bars a label, one bar a segment, with its number above."""
-    width = _BAR / len(colors)
-    for center, values in enumerate(map(np.asarray, groups.values())):
+    width, colors = _BAR / n_segments, segment_colors(n_segments)
+    for center, values in enumerate(map(np.asarray, groups)):
         places = center + width * (np.arange(len(values)) - (len(values) - 1) / 2)
         bars = axes.bar(places, values, 0.92 * width, color=colors[: len(values)], edgecolor="0.1", linewidth=0.6)
         for label in axes.bar_label(bars, labels=[f"{value:.2f}" for value in values], padding=2, fontsize=8):

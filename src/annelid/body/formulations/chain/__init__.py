@@ -78,7 +78,7 @@ class Chain(FormulationKind):
         from annelid.body.formulations.chain.capsules import add_chains
 
         # Planes that move with the skin find spheres, not capsules.
-        add_chains(spec, geometry, body, self, arena, vertices_touch=for_plant and arena.has_moving_planes)
+        add_chains(spec, geometry, body, self, arena, for_plant and arena.has_moving_planes)
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
         """Reads the residual of the engine's connections, as `FormulationKind.pin_reader`."""

@@ -27,34 +27,18 @@ if TYPE_CHECKING:
 
 
 def add_chains(
-    spec: mujoco.MjSpec,
-    geometry: MeshGeometry,
-    body: WormBody,
-    formulation: Chain,
-    arena: ArenaKind,
-    *,
-    vertices_touch: bool = False,
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: ArenaKind, spheres: bool
 ) -> None:
-    """Adds the mesh as chains of capsules, and the paper's solver settings, as `FormulationKind.add`.
-
-    With ``vertices_touch`` a sphere at each vertex touches the ground instead of the capsules.
-    """
+    """Adds the mesh as chains of capsules, which touch by spheres at their vertices if so, and the paper's solver."""
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{formulation.integrator.upper()}")
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
     spec.option.iterations = formulation.solver_iterations
     spec.option.tolerance = formulation.solver_tolerance
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    for strand in range(geometry.n_strands):
-        add_chain(
-            spec,
-            f"strand_{strand}",
-            geometry.vertices_m[strand],
-            body.strands,
-            formulation,
-            contact=contact_options(arena),
-            vertices_touch=vertices_touch,
-            rgba=STRAND_RGBA[strand // geometry.n_per_plane],
-        )
+    touch = {"contact": contact_options(arena), "vertices_touch": spheres}
+    for strand, vertices_m in enumerate(geometry.vertices_m):
+        rgba = STRAND_RGBA[strand // geometry.n_per_plane]
+        add_chain(spec, f"strand_{strand}", vertices_m, body.strands, formulation, rgba=rgba, **touch)
     for crossing in range(geometry.n_crossings):
         _add_pin(spec, geometry, crossing, body, formulation)
 

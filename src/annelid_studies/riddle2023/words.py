@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import isfinite
-from typing import Protocol, TypeVar
+from math import isfinite, nan
+from typing import Any
 
 import numpy as np
 
 from annelid.analysis import RhythmScore
 from annelid.morphology import Array
-from annelid_studies.riddle2023.examinations.design import Reading, Worm, number
 
-CM, MM, PERCENT = 100.0, 1000.0, 100.0
+CM, MM, MS, PERCENT = 100.0, 1000.0, 1000.0, 100.0
 NOTHING = "–"
 """Printed where there is no number."""
 
@@ -20,6 +19,11 @@ NOTHING = "–"
 def capitalised(text: str) -> str:
     """Begins a text with a capital and leaves the rest as it is."""
     return text[:1].upper() + text[1:]
+
+
+def number(value: float | None) -> float:
+    """Returns NaN for None."""
+    return nan if value is None else value
 
 
 def in_unit(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
@@ -53,30 +57,18 @@ def all_in_cm(values_m: Iterable[float | None], digits: int = 2) -> str:
 
 def listed(words: Iterable[str]) -> str:
     """Joins words as English does: ``a, b and c``; ``none`` without any."""
-    words = list(words)
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"
+    *others, last = ["none", *words]
+    return f"{', '.join(others[1:])} and {last}" if others[1:] else last
 
 
-class OfWorm(Protocol):
-    """What was found of one worm."""
-
-    @property
-    def worm(self) -> Worm:
-        """The worm."""
-        ...
-
-
-Found = TypeVar("Found", bound=OfWorm)
-
-
-def told(found: Iterable[Found], text: Callable[[Found], str]) -> str:
-    """Lists what is said of things found, each with its worm's label in brackets."""
+def by_worm(found: Iterable[Any], text: Callable[[Any], str]) -> str:
+    """Lists what is said of things found, each with the label of its ``worm`` in brackets."""
     return listed(f"{text(one)} ({one.worm.label})" for one in found)
 
 
-def labels(readings: Iterable[Reading]) -> str:
-    """Lists the worms of readings."""
-    return listed(one.worm.label for one in readings)
+def labels(found: Iterable[Any]) -> str:
+    """Lists the labels of the worms of things found."""
+    return listed(one.worm.label for one in found)
 
 
 def span(values: Iterable[float] | Array, scale: float = 1.0, digits: int = 2) -> str:
@@ -96,8 +88,7 @@ def rhythm(score: RhythmScore | None) -> str:
         period = NOTHING if score.period_s is None else f"{score.period_s:.2f} s"
         if score.direction == 0:
             return f"{score.wave_fronts} fronts, {period}"
-        n = max(score.order)
-        segments = range(1, n + 1) if score.direction == 1 else range(n, 0, -1)
+        segments = range(1, max(score.order) + 1)[:: score.direction]
         fronts = "" if score.wave_fronts == 1 else f", {score.wave_fronts} fronts"
         return f"{'-'.join(map(str, segments))}{fronts}, {period}"
     if score.verdict == "silent":
@@ -106,7 +97,7 @@ def rhythm(score: RhythmScore | None) -> str:
 
 
 def kind(score: RhythmScore) -> str:
-    """Names the kind of a rhythm, as the legend of `draw_rhythms` does."""
+    """Names the kind of a rhythm, as the legend of the figures does."""
     if score.verdict == "ordered":
         return "1-2-3" if score.is_one_wave else "other order"
     return score.verdict or "too short"

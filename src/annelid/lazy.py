@@ -1,0 +1,59 @@
+"""Packages whose public names are loaded on first use, so that importing one loads nothing heavy.
+
+Such a package names what it offers once, as imports for type checkers, and in ``__all__``::
+
+    if TYPE_CHECKING:
+        from annelid.body.worm import WormBody
+
+    __all__ = ["WormBody"]
+    __getattr__, __dir__ = lazy(__name__)
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from importlib import import_module
+
+# typing takes longer to load than all else here.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import ast
+    from collections.abc import Callable
+    from typing import Any
+
+
+def lazy(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Returns the ``__getattr__`` and ``__dir__`` of a package, which load its public names on first use.
+
+    Args:
+        package: The package's ``__name__``.
+    """
+
+    @cache
+    def homes() -> dict[str, str]:
+        import ast
+        from pathlib import Path
+
+        file = sys.modules[package].__file__
+        assert file is not None
+        return offered(ast.parse(Path(file).read_bytes()))
+
+    def get(name: str) -> Any:
+        if name not in sys.modules[package].__all__:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        return getattr(import_module(homes()[name]), name)
+
+    return get, lambda: sorted(sys.modules[package].__all__)
+
+
+def offered(package: ast.Module) -> dict[str, str]:
+    """Returns the module of every name that a package's file imports, also where only type checkers read it."""
+    import ast
+
+    return {
+        alias.name: node.module
+        for node in ast.walk(package)
+        if isinstance(node, ast.ImportFrom) and node.module is not None
+        for alias in node.names
+    }

@@ -1,1 +1,0 @@
-"""Slip: what pressure feedback saves, and how well a robot can tell that it slips."""

@@ -100,14 +100,18 @@ class Store:
         return self._stored(case) is not None
 
     def __getitem__(self, case: Case) -> Outcome:
-        """Outcome of a case that has been computed; KeyError if it has not."""
+        """Outcome of a case that has been computed; a KeyError if it has not."""
         found = self._stored(case)
         if found is None:
             raise KeyError(case.command)
         return found
 
     def run(self, case: Case) -> Run:
-        """Opens the run of a case that has been computed; a RunFileError if it has not."""
+        """Opens the run of a case that has been computed.
+
+        Raises:
+            RunFileError: It has not, or its file is damaged.
+        """
         return open_run(self.path(case))
 
     def _stored(self, case: Case) -> Outcome | None:
@@ -172,8 +176,13 @@ class Store:
     def finish(self, cases: Sequence[Case], stage: str, *, progress: StudyProgress | None = None) -> list[Done]:
         """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
 
-        ``stage`` is what ``progress``, by default the store's, is called with as they are run. Returns what became of
-        each case, in their order.
+        Args:
+            cases: The cases.
+            stage: What is done, in a few words.
+            progress: Called as cases are checked and run, in place of the store's own.
+
+        Returns:
+            What became of every case, in their order.
         """
         report: StudyProgress = progress or self.progress or (lambda *_: None)
         refused: dict[int, ConfigError] = {}

@@ -18,6 +18,7 @@ from annelid.experiment.attempt import OUTCOME_NAME, compute_run, keep_outcome
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store, case_key
+from annelid.experiment.workers import Processes
 from annelid.simulation.runfile import FILE_NAME, open_run
 from annelid_studies.worms import PLANAR, RODS
 
@@ -30,7 +31,8 @@ def planar(seed: int = 0, duration_s: float = 0.2) -> Case:
 def filled(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """A store with two runs, computed by two processes."""
     store = Store(tmp_path_factory.mktemp("store") / "runs")
-    store.compute([planar(0), planar(1), planar(0)], jobs=2)
+    with Processes(2) as two:
+        Store(store.folder, two).compute([planar(0), planar(1), planar(0)])
     return store
 
 
@@ -81,7 +83,7 @@ def test_a_killed_run_is_computed_again(single: Store) -> None:
     run_file = folder / FILE_NAME
     run_file.write_bytes(run_file.read_bytes()[: run_file.stat().st_size // 2])
     assert case not in single
-    assert lasting(single.compute([case], jobs=1)[case_key(case)]) == before
+    assert lasting(single.compute([case])[case_key(case)]) == before
 
 
 def lasting(outcome: Outcome) -> Mapping[str, object]:
@@ -132,8 +134,8 @@ def test_a_workers_refusal_reaches_the_caller_and_keeps_what_is_done(tmp_path: P
     store = Store(tmp_path)
     # The plant refuses this, not the configuration.
     impossible = Case(PLANAR, {"body.gain": 1e4, "duration_s": 0.1})
-    with pytest.raises(ConfigError, match="overshoot"):
-        store.compute([planar(), impossible], jobs=1)
+    with Processes(1) as one, pytest.raises(ConfigError, match="overshoot"):
+        Store(tmp_path, one).compute([planar(), impossible])
     assert planar() in store
     assert impossible not in store
 
@@ -145,11 +147,13 @@ from annelid.experiment.case import Case
 from annelid_studies.worms import PLANAR
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.store import Store
+from annelid.experiment.workers import Processes
 
 if __name__ == "__main__":
     cases = [Case(PLANAR, {"duration_s": 0.2}), Case(PLANAR, {"duration_s": 3000.0, "record.signals_interval_s": 1.0})]
     try:
-        Store(Path(sys.argv[1])).compute(cases, jobs=2)
+        with Processes(2) as workers:
+            Store(Path(sys.argv[1]), workers).compute(cases)
     except KeyboardInterrupt:
         sys.exit(130)
 """

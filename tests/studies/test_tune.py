@@ -346,7 +346,7 @@ def test_a_generation_fills_the_cores_evenly() -> None:
 def test_a_second_search_computes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     task = replace(toy_task(2), changes={"duration_s": 0.4})
     folder = tmp_path / "runs"
-    first = [trial for generation in search(task, Store(folder), jobs=2) for trial in generation]
+    first = [trial for generation in search(task, Store(folder)) for trial in generation]
     assert {trial.judged.problem for trial in first} == {"out of order: too short: fewer than two cycles"}
     monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
     assert [trial for generation in search(task, Store(folder)) for trial in generation] == first

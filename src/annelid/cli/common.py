@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from annelid.config import RunConfig
-    from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store
-    from annelid.experiment.workers import Workers
     from annelid.simulation.runfile import Run
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
@@ -78,30 +76,19 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output file tha
 
 
 @contextmanager
-def study_runs(
-    output: Path, *, jobs: int | None, cluster: str | None, quiet: bool
-) -> Iterator[tuple[Workers, StudyProgress | None]]:
-    """Gives the workers of a study and its progress display, and keeps other writers out of its folder.
+def kept_runs(output: Path, *, jobs: int | None, cluster: str | None, quiet: bool) -> Iterator[Store]:
+    """Gives the store of a study's runs, ``runs`` in its folder, with its workers and its progress display.
 
-    Runs are kept in ``runs`` below it. The workers are processes of this machine where no cluster is named.
+    Other writers are kept out of the folder.
     """
     from annelid.config import find_cluster
     from annelid.experiment.cluster import workers_of
     from annelid.experiment.progress import study_progress
-    from annelid.experiment.workers import Processes
-
-    lock(output)
-    named = Processes(jobs) if cluster is None else workers_of(find_cluster(cluster), jobs)
-    with going_on(output / "runs"), named as workers, study_progress(quiet=quiet) as progress:
-        yield workers, progress
-
-
-@contextmanager
-def kept_runs(output: Path, *, jobs: int | None, cluster: str | None, quiet: bool) -> Iterator[Store]:
-    """Gives the store of a study's runs, which has its workers and its progress display, otherwise as `study_runs`."""
     from annelid.experiment.store import Store
 
-    with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
+    lock(output)
+    named = workers_of(find_cluster("processes" if cluster is None else cluster), jobs)
+    with going_on(output / "runs"), named as workers, study_progress(quiet=quiet) as progress:
         yield Store(output / "runs", workers, progress=progress)
 
 

@@ -215,29 +215,22 @@ def load_frame_command(
     annelid experiment load-frame
     annelid experiment load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
-    from annelid.experiment.load_frame import (
-        MM,
-        cable_force,
-        draw_loops,
-        frame_table,
-        load_frame,
-        read_loop,
-        write_loop,
-    )
+    from annelid.experiment import load_frame as frame
     from annelid.experiment.progress import study_progress
 
     table = output / "load_frame.csv"
     lock(output)
     refuse_existing(table, force)
-    measured = read_loop(data)
+    measured = frame.read_loop(data)
     config = config_of(preset, overrides_of(assignments), fidelity=fidelity)
     with study_progress(quiet=quiet) as progress:
         report = None if progress is None else partial(progress, "load frame", 0, 0)
-        tension = load_frame(config, displacement_m=displacement * MM, speed_m_per_s=speed * MM, progress=report)
-    loop = cable_force(tension, cable_friction)
+        sizes = {"displacement_m": displacement * frame.MM, "speed_m_per_s": speed * frame.MM}
+        tension = frame.load_frame(config, **sizes, progress=report)
+    loop = frame.cable_force(tension, cable_friction)
     loops = {config.name: loop, "measured": measured}
-    written = write_loop(loop, tension, table), draw_loops(loops, table.with_suffix(""))
-    print_results(written, frame_table(loops), quiet=quiet)
+    written = frame.write_loop(loop, tension, table), frame.draw_loops(loops, table.with_suffix(""))
+    print_results(written, frame.frame_table(loops), quiet=quiet)
 
 
 @study("weak-middle")

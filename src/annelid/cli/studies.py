@@ -28,7 +28,6 @@ from annelid.cli.common import (
     overrides_of,
     print_results,
     refuse_existing,
-    study_runs,
 )
 from annelid.cli.entry import EXIT_ALL_FAILED, complain, end_study, lock, typed_command
 from annelid.errors import RunFileError
@@ -130,9 +129,9 @@ def paper_command(
         claims = with_suffix(claims, (".md",), "Markdown", default=".md")
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
-    with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
         effort = "quick" if quick else "full"
-        report = reproduce(output, effort, only=only or None, workers=workers, progress=progress)
+        report = reproduce(output, effort, only=only or None, workers=store.workers, progress=store.progress)
         html = write_report(report, output)
     written = [html, html.with_suffix(".md")]
     if claims is not None:
@@ -219,15 +218,15 @@ def robustness_command(
     """
     from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
-    with study_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as (workers, progress):
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
         judged = robustness(
             output,
             points,
             controllers=tuple(controller or CONTROLLERS),
             n_segments=segments,
             keep=keep,
-            workers=workers,
-            progress=progress,
+            workers=store.workers,
+            progress=store.progress,
         )
     if not quiet:
         typer.echo(shares_table(shares(judged)))
@@ -341,7 +340,7 @@ def tune_command(
     found: list[tune.Trial] = []
     written: list[Path] = []
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
-        for generation in tune.search(task, store, progress=store.progress):
+        for generation in tune.search(task, store):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)
     print_results(written, tune.results_table(task, found), quiet=quiet)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from annelid.experiment.fingerprint import code_fingerprint
     from annelid.experiment.lifeline import end_after
     from annelid.experiment.outcome import Hold, Outcome
-    from annelid.experiment.progress import StudyProgress, in_stage
+    from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import Judged, judge
     from annelid.experiment.workers import Workers
@@ -38,7 +38,6 @@ __all__ = [
     "case_key",
     "code_fingerprint",
     "end_after",
-    "in_stage",
     "judge",
 ]
 

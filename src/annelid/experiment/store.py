@@ -85,11 +85,11 @@ class Store:
 
         Args:
             folder: The folder.
-            workers: Who computes its runs; None for processes of this machine.
+            workers: Who computes its runs; None for a process of this machine on every core.
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
             progress: Called as runs go on, with what `compute` names their stage; None for nothing.
         """
-        self.folder, self.progress, self._workers = folder, progress, workers
+        self.folder, self.workers, self.progress = folder, workers, progress
         self._keep: Keep = keep
 
     def path(self, case: Case) -> Path:
@@ -100,14 +100,18 @@ class Store:
         return self._stored(case) is not None
 
     def __getitem__(self, case: Case) -> Outcome:
-        """Outcome of a case that has been computed; KeyError if it has not."""
+        """Outcome of a case that has been computed; a KeyError if it has not."""
         found = self._stored(case)
         if found is None:
             raise KeyError(case.command)
         return found
 
     def run(self, case: Case) -> Run:
-        """Opens the run of a case that has been computed; a RunFileError if it has not."""
+        """Opens the run of a case that has been computed.
+
+        Raises:
+            RunFileError: It has not, or its file is damaged.
+        """
         return open_run(self.path(case))
 
     def _stored(self, case: Case) -> Outcome | None:
@@ -118,7 +122,6 @@ class Store:
         cases: Iterable[Case],
         stage: str = "",
         *,
-        jobs: int | None = None,
         progress: Progress | None = None,
         failed: MutableMapping[str, Exception] | None = None,
     ) -> Mapping[str, Outcome]:
@@ -127,7 +130,6 @@ class Store:
         Args:
             cases: The cases; a case given twice runs once.
             stage: What is done, in a few words, for the store's ``progress``.
-            jobs: Processes, by default as many as there are cores; has no effect on workers given to the store.
             progress: Called at the start and after every run, in place of the store's own.
             failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
                 end the call.
@@ -155,8 +157,7 @@ class Store:
         report()
         if not missing:
             return found
-        given = self._workers
-        with Processes(jobs) if given is None else nullcontext(given) as workers:
+        with Processes() if self.workers is None else nullcontext(self.workers) as workers:
             for case, error in self._computed(workers, missing):
                 left_s, done = left_s - case.cost_s, done + 1
                 if error is None:
@@ -172,13 +173,16 @@ class Store:
                 shutil.rmtree(draft, ignore_errors=True)
         return {key: found[key] for key in wanted if key in found}
 
-    def finish(
-        self, cases: Sequence[Case], stage: str, *, jobs: int | None = None, progress: StudyProgress | None = None
-    ) -> list[Done]:
+    def finish(self, cases: Sequence[Case], stage: str, *, progress: StudyProgress | None = None) -> list[Done]:
         """Runs cases as `compute` does, but for those that mean nothing, and goes on where runs fail.
 
-        ``stage`` is what ``progress``, by default the store's, is called with as they are run. Returns what became of
-        each case, in their order.
+        Args:
+            cases: The cases.
+            stage: What is done, in a few words.
+            progress: Called as cases are checked and run, in place of the store's own.
+
+        Returns:
+            What became of every case, in their order.
         """
         report: StudyProgress = progress or self.progress or (lambda *_: None)
         refused: dict[int, ConfigError] = {}
@@ -191,7 +195,6 @@ class Store:
         failed: dict[str, Exception] = {}
         outcomes = self.compute(
             [case for i, case in enumerate(cases) if i not in refused],
-            jobs=jobs,
             progress=lambda *state: report(f"{stage}, {len(failed)} failed" if failed else stage, *state),
             failed=failed,
         )

@@ -234,7 +234,7 @@ def swept(
     plan = plan_of(study)
     with its_workers as workers:
         cases = [case for _, case in plan.points]
-        done = Store(folder / RUNS, workers, study.keep).finish(cases, "sweep", progress=progress)
+        done = Store(folder / RUNS, workers, study.keep, progress).finish(cases, "sweep")
     if all(one.refused for one in done) and done[0].error is not None:
         raise done[0].error
     return Sweep(plan, numbers, tuple(done), folder)

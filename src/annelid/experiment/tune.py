@@ -23,7 +23,7 @@ from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case, write_worm
 from annelid.experiment.optimisers import optimiser_of
 from annelid.experiment.outcome import Outcome
-from annelid.experiment.progress import StudyProgress, in_stage
+from annelid.experiment.progress import in_stage
 from annelid.experiment.space import Choice, Variable, variables_of
 from annelid.experiment.store import Done, Store, case_key
 from annelid.output import write_csv
@@ -197,9 +197,7 @@ class Trial:
     """Whether it could not be computed, though it could be built."""
 
 
-def search(
-    task: Task, store: Store, *, jobs: int | None = None, progress: StudyProgress | None = None
-) -> Iterator[list[Trial]]:
+def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     """Searches, and yields the trials generation by generation; first the start alone.
 
     One objective over numbers is searched by CMA-ES, which starts at the source's own values if they lie in the ranges;
@@ -213,16 +211,16 @@ def search(
     found: list[Trial] = []
 
     def report(stage: str, done: int, _: int, __: float) -> None:
-        if progress is not None:
+        if store.progress is not None:
             done += max(len(found) - 1, 0)
-            progress(stage, done, task.n_trials, done / task.n_trials)
+            store.progress(stage, done, task.n_trials, done / task.n_trials)
 
     start = task.start
     own = {one.field: field_value(start.config, one.field) for one in task.variables}
     inside = all(own[one.field] in one for one in task.variables)
     optimiser = optimiser_of(task.variables, len(task.objectives), own if inside else None, task.seed)
     generation = next(optimiser)
-    outcomes = store.compute([start], jobs=jobs, progress=in_stage(report, "the gait it starts from"))
+    outcomes = store.compute([start], progress=in_stage(report, "the gait it starts from"))
     found.append(_trial(START, {}, start, Done(outcomes[case_key(start)])))
     yield list(found)
     while (done := len(found) - 1) < task.n_trials:
@@ -231,7 +229,7 @@ def search(
         leaders = {objective: leader(found, [objective]) for objective in task.objectives}
         words = [f"{one.name} {best.judged.value(one):.3g}" for one, best in leaders.items() if best is not None]
         stage = f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
-        results = store.finish(cases, stage, jobs=jobs, progress=report)
+        results = store.finish(cases, stage, progress=report)
         trials = [_trial(done + i, *of_it) for i, of_it in enumerate(zip(values, cases, results, strict=True))]
         found += trials
         yield trials

@@ -26,6 +26,7 @@ from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Progress, Store, case_key
+from annelid.experiment.workers import Processes
 from annelid.output import whole_file, write_csv, write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import FILE_NAME, read_config, refuse_used_folder
@@ -266,7 +267,8 @@ def uncertainty(
         refuse_used_folder(folder, overwrite)
     elif (folder / FILE_NAME).exists() and read_config(folder) != config:
         raise ConfigError(f"the output folder {folder} has another run in it: name another, or allow overwriting")
-    outcomes = Store(folder / RUNS).compute([case for _, case in variants], jobs=jobs, progress=progress)
+    with Processes(jobs) as workers:
+        outcomes = Store(folder / RUNS, workers).compute([case for _, case in variants], progress=progress)
     found = [outcomes[case_key(case)] for _, case in variants]
     done = tuple(
         VariantRun(kind, case.changes, of.path, of.rhythm.verdict, of.rhythm.reason, of.message, readings(of.summary))

@@ -33,7 +33,11 @@ class Workers(ABC):
 
     @abstractmethod
     def slots(self) -> int:
-        """Returns how many runs can be under way now; a `ClusterError` where the workers are lost for good."""
+        """Returns how many runs can be under way now.
+
+        Raises:
+            ClusterError: The workers are lost for good.
+        """
 
     @abstractmethod
     def submit(self, task: Task) -> Result:

@@ -62,6 +62,10 @@ class Format:
     def target(self, run: Run, output: Path | None) -> Path:
         """Returns what is written: the path that was named, or the default in the run's folder.
 
+        Args:
+            run: The run that is exported.
+            output: The path, if one was named.
+
         Raises:
             RunFileError: The path has another suffix, or is a folder where a file is written or the reverse.
         """

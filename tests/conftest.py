@@ -10,10 +10,16 @@ from concurrent.futures import Executor, Future
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 from annelid.config import load_config
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
+
+
+# No test is judged by its time: a busy machine is no failure.
+settings.register_profile("annelid", deadline=None)
+settings.load_profile("annelid")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

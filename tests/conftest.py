@@ -16,7 +16,6 @@ from annelid.config import load_config
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 
-
 # No test is judged by its time: a busy machine is no failure.
 settings.register_profile("annelid", deadline=None)
 settings.load_profile("annelid")

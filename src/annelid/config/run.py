@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from annelid.config.arena import ArenaKind
 from annelid.config.kinds import BodyKind, Choice, ControllerKind, TurningKind, default_of, kinds_of
-from annelid.config.sections import Line, NonNegative, Positive, Section, Seed
+from annelid.config.sections import Line, NonNegative, Positive, Section, Seed, Share
 from annelid.errors import listed
 from annelid.textfiles import parse_toml
 
@@ -89,6 +89,49 @@ class Guard(Section):
     )
 
 
+class Trial(Section):
+    """What goes wrong on purpose, and what a controller may not know; fields that are not set do nothing.
+
+    Every random draw depends on the run's seed and the time alone, so that a run continues bit for bit.
+    """
+
+    blind: bool = Field(
+        default=False, description="the controller is built without arena, noise, trial or seed; reset with 0"
+    )
+    drift_m_per_s: NonNegative = Field(default=0.0, description="largest rate at which a reading of stretch drifts")
+    resolution_m: NonNegative = Field(default=0.0, description="stretch is read in multiples of this")
+    loss: Share = Field(default=0.0, description="share of the time in which a sensor keeps its last reading")
+    loss_s: Annotated[float, Field(ge=0.01, le=1e4)] = Field(default=0.2, description="time that one loss lasts")
+    delay_s: Annotated[float, Field(ge=0, le=2)] = Field(default=0.0, description="age of what the controller senses")
+    backlash: Share = Field(default=0.0, description="change of a command that is lost where it reverses")
+    weak_segment: int = Field(default=1, ge=1, le=200, description="segment that weakens")
+    weak_strength: Share = Field(default=1.0, description="share of its activation that it is left")
+    weak_from_s: NonNegative = Field(default=0.0, description="when it weakens")
+    push_N: NonNegative = Field(default=0.0, description="force that pushes the ring of the middle segment to its left")
+    push_from_s: NonNegative = Field(default=0.0, description="when the push begins")
+    push_s: Positive = Field(default=0.5, description="time that it lasts")
+    silent_s: NonNegative = Field(default=0.0, description="until then no command reaches a muscle")
+    random_s: NonNegative = Field(default=0.0, description="until then random commands reach the muscles")
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has the segment that weakens, and can be pushed."""
+        if self.weak_segment > config.body.n_segments:
+            raise ValueError(
+                f"trial.weak_segment = {self.weak_segment}: must be in 1 .. {config.body.n_segments}, the segments of "
+                "the body"
+            )
+        if self.push_N and config.body.is_planar:
+            raise ValueError(f"trial.push_N = {self.push_N:g}: a planar worm cannot be pushed; leave it at 0")
+
+    def blinded(self, config: RunConfig) -> RunConfig:
+        """Returns what a controller may know of a configuration."""
+        if not self.blind:
+            return config
+        arena = None if config.arena is None else default_of(ArenaKind)
+        sensor = config.sensor.model_copy(update={"noise_m": 0.0})
+        return config.model_copy(update={"arena": arena, "sensor": sensor, "trial": None, "seed": 0})
+
+
 class RunConfig(Section):
     """Everything that defines a run; the run file carries it whole."""
 
@@ -110,6 +153,7 @@ class RunConfig(Section):
         default=None, description="what scales the two sides of a worm with half-rings"
     )
     sensor: StretchSensor = StretchSensor()
+    trial: Trial | None = Field(default=None, description="what goes wrong on purpose; nothing by default")
     clock: Clock = Clock()
     record: Record = Record()
     guard: Guard = Guard()
@@ -126,7 +170,7 @@ class RunConfig(Section):
 
     @model_validator(mode="after")
     def _sections_fit_together(self) -> Self:
-        for section in (self.body, self.arena, self.controller, self.turning):
+        for section in (self.body, self.arena, self.controller, self.turning, self.trial):
             if section is not None:
                 section.check_with(self)
         return self

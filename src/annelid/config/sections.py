@@ -20,6 +20,7 @@ Line = Annotated[str, AfterValidator(_line)]
 """Text that is shown in tables, titles and file names."""
 Positive = Annotated[float, Field(gt=0, le=1e15)]
 NonNegative = Annotated[float, Field(ge=0, le=1e15)]
+Share = Annotated[float, Field(ge=0, le=1)]
 Length = Annotated[float, Field(ge=1e-6, le=1e3)]
 """Of a part of a body, m."""
 Modulus = Annotated[float, Field(ge=1.0, le=1e13)]

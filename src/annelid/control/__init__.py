@@ -3,6 +3,7 @@
 from annelid.control.base import CallableController, OpenLoopController, SegmentController
 from annelid.control.open_loop import ProgramController, SineController, TimedController
 from annelid.control.oscillators import HeteroclinicController, PhaseChainController
+from annelid.control.own import own_controller
 from annelid.control.sns import AdaptiveController, CopySettings, SnsController
 from annelid.control.stretch_sensor import StretchSensor
 
@@ -19,4 +20,5 @@ __all__ = [
     "SnsController",
     "StretchSensor",
     "TimedController",
+    "own_controller",
 ]

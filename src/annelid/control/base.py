@@ -16,9 +16,19 @@ from annelid.config.sections import Positive, Section
 from annelid.errors import ConfigError
 from annelid.nervous import Network, NetworkState, Scheme
 from annelid.nervous.half_centre import HalfCentre
-from annelid.protocols import Array, Recordable, SavedAndRecorded, Sensation, Values
+from annelid.protocols import (
+    Array,
+    Controller,
+    Recordable,
+    Records,
+    SavedAndRecorded,
+    Sensation,
+    State,
+    Stateful,
+    Values,
+    Watched,
+)
 
-Share = Annotated[float, Field(ge=0, le=1)]
 Level = Annotated[float, Field(gt=0, le=1)]
 Slope = Annotated[float, Field(ge=-100, le=100)]
 TimeConstant = Annotated[float, Field(ge=1e-3, le=1e4)]
@@ -202,6 +212,62 @@ class NeuralController(SegmentController):
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         return {"neuron": list(self._stepper.arrays.neurons), "segment": list(range(1, self._n_segments + 1))}
+
+
+class WrappedController(ABC):
+    """A controller with something between it and the body, which has a state and signals of its own.
+
+    Attributes:
+        name: The controller's own.
+    """
+
+    def __init__(self, inner: Controller, between: SavedAndRecorded) -> None:
+        """Wraps a controller."""
+        self.name = getattr(inner, "name", type(inner).__name__)
+        self._inner, self._between = inner, between
+
+    @abstractmethod
+    def step(self, sensation: Sensation) -> Array:
+        """Advances by one control step, as `annelid.protocols.Controller.step`."""
+
+    def recordable(self) -> Recordable:
+        """Names the controller's signals, then those of what is between."""
+        inner = self._inner.recordable() if isinstance(self._inner, Records) else Recordable()
+        own = self._between.recordable()
+        attrs = {**inner.attrs, **own.attrs}
+        return Recordable((*inner.signals, *own.signals), {**inner.coords, **own.coords}, attrs)
+
+    def read(self, frame: bool) -> Values:
+        """Reads the signals that `recordable` names."""
+        inner = self._inner.read(frame) if isinstance(self._inner, Records) else {}
+        return {**inner, **self._between.read(frame)}
+
+    def alarm(self) -> str | None:
+        """Returns the controller's alarm."""
+        return self._inner.alarm() if isinstance(self._inner, Watched) else None
+
+
+class SavedWrapper(WrappedController):
+    """A wrapped controller whose state can be saved, since the controller's can.
+
+    Attributes:
+        prefixes: What the names of the controller's state and of the state between begin with.
+    """
+
+    prefixes: ClassVar[tuple[str, str]]
+
+    def _saved(self) -> dict[str, Stateful]:
+        assert isinstance(self._inner, Stateful)
+        return dict(zip(self.prefixes, (self._inner, self._between), strict=True))
+
+    def get_state(self) -> State:
+        """Returns copies of all that the next step depends on."""
+        return {start + name: each for start, part in self._saved().items() for name, each in part.get_state().items()}
+
+    def set_state(self, state: State) -> None:
+        """Restores what `get_state` returned."""
+        for start, part in self._saved().items():
+            part.set_state({name.removeprefix(start): each for name, each in state.items() if name.startswith(start)})
 
 
 class CallableController:

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.config.kinds import ControllerKind, Knob
-from annelid.config.sections import NonNegative, Positive
-from annelid.control.base import SegmentController, Share, Slope
+from annelid.config.sections import NonNegative, Positive, Share
+from annelid.control.base import SegmentController, Slope
 from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError

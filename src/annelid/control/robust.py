@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from annelid.config.kinds import Knob
-from annelid.config.sections import Positive, Section
-from annelid.control.base import HalfCentreKind, NeuralController, Share, TimeConstant, design_of
+from annelid.config.sections import Positive, Section, Share
+from annelid.control.base import HalfCentreKind, NeuralController, TimeConstant, design_of
 from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError

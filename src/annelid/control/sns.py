@@ -15,8 +15,8 @@ from pydantic import Field, model_validator
 
 from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.run import StretchSensor
-from annelid.config.sections import NonNegative, Positive
-from annelid.control.base import HalfCentreKind, NeuralController, Share, Slope, TimeConstant, design_of
+from annelid.config.sections import NonNegative, Positive, Share
+from annelid.control.base import HalfCentreKind, NeuralController, Slope, TimeConstant, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError

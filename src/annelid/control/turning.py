@@ -17,22 +17,17 @@ from pydantic import Field
 from annelid.clock import SLACK_S
 from annelid.config.kinds import Goals, TurningKind
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.base import Level, SegmentController, TimeConstant
+from annelid.control.base import Level, SavedWrapper, TimeConstant
 from annelid.errors import ConfigError
 from annelid.protocols import (
     SIDES,
     Array,
     Controller,
-    Recordable,
-    Records,
     SavedAndRecorded,
     Sensation,
-    Signal,
-    State,
     Stateful,
     StridingController,
     Values,
-    Watched,
 )
 
 if TYPE_CHECKING:
@@ -251,6 +246,8 @@ class TouchTurning(SteeringKind):
 class Steering(SavedAndRecorded):
     """What is left of the activation of the two halves of every ring, at every control step."""
 
+    recorded = (("half_scale", ("segment", "half"), "1", "share of its activation that half a ring is left"),)
+
     def __init__(self, rule: SteeringKind, n_segments: int, control_timestep_s: float) -> None:
         """Begins with all halves whole, by the rule of its section of the configuration."""
         self._rule, self._n_segments, self._timestep_s = rule, n_segments, control_timestep_s
@@ -270,8 +267,17 @@ class Steering(SavedAndRecorded):
         """Returns the scales after the latest step, in [0, 1], ``(n_segments, 2)``: left and right half."""
         return self._rule._scales(self._now, self._n_segments)
 
+    def _values(self) -> Values:
+        return {"half_scale": self.scales()}
 
-class TurningController(SegmentController):
+    def _coords(self) -> dict[str, list[int] | list[str]]:
+        return {"segment": list(range(1, self._n_segments + 1)), "half": list(HALVES)}
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        return {"turning": self._rule.kind}
+
+
+class TurningController(SavedWrapper):
     """A controller whose pattern another one makes, and whose sides a steering scales.
 
     The pattern senses that it is scaled only through the body: its rhythm is its own.
@@ -280,25 +286,24 @@ class TurningController(SegmentController):
         ConfigError: Whole rings, or a pattern whose state cannot be saved.
     """
 
+    prefixes = ("pattern_", "turning_")
+    _between: Steering
+
     def __init__(
         self, pattern: Controller, section: TurningKind, n_segments: int, n_muscles: int, control_timestep_s: float
     ) -> None:
         """Wraps the controller that makes the pattern for all ``n_muscles``."""
-        super().__init__(n_segments, n_muscles)
-        if self._muscles_per_segment != len(HALVES):
+        if n_muscles != len(HALVES) * n_segments:
             raise ConfigError(f"turning needs half-rings: {2 * n_segments} muscles, not {n_muscles}")
         if not isinstance(pattern, Stateful):
             raise ConfigError(f"turning needs a pattern whose state can be saved, not {type(pattern).__name__}")
-        self._pattern = pattern
-        self._kind = section.kind
-        self._steering = section.build(n_segments, control_timestep_s)
-        self._parts: dict[str, Stateful] = {"pattern_": pattern, "turning_": self._steering}
+        super().__init__(pattern, section.build(n_segments, control_timestep_s))
         self._timestep_s = control_timestep_s
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; ``seed`` is the pattern's."""
-        self._pattern.reset(seed)
-        self._steering.reset()
+        self._inner.reset(seed)
+        self._between.reset()
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `stride`."""
@@ -306,43 +311,12 @@ class TurningController(SegmentController):
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
-        scales = self._steering.advance(sensation, n_steps)
-        if isinstance(self._pattern, StridingController):
-            activation = self._pattern.stride(sensation, n_steps)
+        scales = self._between.advance(sensation, n_steps)
+        if isinstance(self._inner, StridingController):
+            activation = self._inner.stride(sensation, n_steps)
         else:
             first = round(sensation.time_s / self._timestep_s)
-            activation = self._pattern.step(sensation)
+            activation = self._inner.step(sensation)
             for later in range(1, n_steps):
-                activation = self._pattern.step(replace(sensation, time_s=(first + later) * self._timestep_s))
+                activation = self._inner.step(replace(sensation, time_s=(first + later) * self._timestep_s))
         return (activation.reshape(scales.shape) * scales).reshape(-1)
-
-    def recordable(self) -> Recordable:
-        """Names the scales of the sides, and what the pattern names."""
-        own = self._pattern.recordable() if isinstance(self._pattern, Records) else Recordable()
-        shape = self._steering.scales().shape
-        scale = Signal(
-            "half_scale", ("segment", "half"), shape, "1", "share of its activation that half a ring is left"
-        )
-        return Recordable(
-            signals=(*own.signals, scale),
-            coords={**own.coords, "segment": list(range(1, shape[0] + 1)), "half": list(HALVES)},
-            attrs={**own.attrs, "turning": self._kind},
-        )
-
-    def read(self, frame: bool) -> Values:
-        """Reads the signals that `recordable` names."""
-        own = self._pattern.read(frame) if isinstance(self._pattern, Records) else {}
-        return own if frame else {**own, "half_scale": self._steering.scales()}
-
-    def get_state(self) -> State:
-        """Returns the states of pattern and steering."""
-        return {start + name: each for start, part in self._parts.items() for name, each in part.get_state().items()}
-
-    def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned."""
-        for start, part in self._parts.items():
-            part.set_state({name.removeprefix(start): each for name, each in state.items() if name.startswith(start)})
-
-    def alarm(self) -> str | None:
-        """Returns the pattern's alarm."""
-        return self._pattern.alarm() if isinstance(self._pattern, Watched) else None

@@ -172,6 +172,8 @@ def checked_configs(
     for one in own:
         if not isinstance(one.body, WormBody):
             raise ConfigError(f"body.kind = {one.body.kind!r} cannot be batched; only the 3D worm ('worm') can")
+        if one.trial is not None and one.trial.push_N:
+            raise ConfigError(f"trial.push_N = {one.trial.push_N:g}: worms of a batch cannot be pushed; leave it at 0")
     parts = tuple(f"{part}." for part in ALIKE)
     first, *others = (
         {path: field_value(one, path) for path in fields_of(one) if f"{path}.".startswith(parts)} for one in own

@@ -48,7 +48,7 @@ def build_plant(config: RunConfig) -> Plant:
 
 
 def build_controller(config: RunConfig, plant: Plant) -> Controller:
-    """Builds the controller of a configuration, turning included.
+    """Builds the controller of a configuration, with its turning and what goes wrong on its way to the body.
 
     Args:
         config: The run's configuration.
@@ -60,6 +60,15 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
+    trial = config.trial
+    if trial is None:
+        return _own_controller(config, plant)
+    from annelid.control.trial import seen
+
+    return _tried(_own_controller(trial.blinded(config), seen(trial, plant)), config, plant)
+
+
+def _own_controller(config: RunConfig, plant: Plant) -> Controller:
     pattern = config.controller.build(config, plant)
     if config.turning is None:
         return pattern
@@ -69,6 +78,14 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     return TurningController(pattern, config.turning, plant.n_segments, plant.n_muscles, step_s)
 
 
+def _tried(controller: Controller, config: RunConfig, plant: Plant) -> Controller:
+    if config.trial is None:
+        return controller
+    from annelid.control.trial import tried
+
+    return tried(controller, config.trial, plant, config.clock.control_timestep_s)
+
+
 def as_controller(
     controller: Controller | Callable[[Sensation], ArrayLike] | None, config: RunConfig, plant: Plant
 ) -> Controller:
@@ -76,10 +93,11 @@ def as_controller(
     if controller is None:
         return build_controller(config, plant)
     if hasattr(controller, "step"):
-        return cast(Controller, controller)
+        return _tried(cast(Controller, controller), config, plant)
     from annelid.control.base import CallableController
 
-    return CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)
+    own = CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)
+    return _tried(own, config, plant)
 
 
 class Simulation:

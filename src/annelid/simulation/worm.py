@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.course import LEFT
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.body.damping import MaterialDamping, add_damper_rows
@@ -389,12 +390,20 @@ class WormPlant(Worm):
         self.qpos, self.plastic, self.act, self.warned = data.qpos, data.plastic, data.act, data.warning.number
         names = (*self.anatomy.outputs, *self.anatomy.energy_meter.outputs)
         self.engine = {name: getattr(data, name) for name in names}
+        if config.trial is not None:
+            ring = self.geometry.rings[self.n_segments // 2]
+            self._pushed_N = np.zeros((len(self.anatomy.crossing_body), 3))
+            self._pushed_N[ring] = config.trial.push_N / len(ring) * (heading_turn(self._body.heading_deg) @ LEFT)
         self.reset(0)
 
     def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps with this worm's own engine, as `Worm.move`."""
         data = self.data
         data.ctrl[:] = self.control(activation, n_steps)
+        trial = self._config.trial
+        if trial is not None and trial.push_N:
+            pushed = trial.push_from_s <= self._time_s < trial.push_from_s + trial.push_s
+            self.push(self._pushed_N if pushed else np.zeros_like(self._pushed_N))
         try:
             for _ in range(n_steps):
                 if self.ground is not None:

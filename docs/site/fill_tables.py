@@ -2,6 +2,8 @@
 
     python docs/site/fill_tables.py              after a result file or a marker has changed
     python docs/site/fill_tables.py --check      names the pages that differ from their files; ends with 1 if any does
+    python docs/site/fill_tables.py --measured slip.csv riddle2025-muscles crawler
+                                                 notes which worms a result file was just measured on, in worms.toml
 
 A table stands between two comments. The first names the result files, the command that makes them, and the table, with
 Python's ``{expression:format}`` for numbers; published numbers are written out:
@@ -27,6 +29,7 @@ does not exist yet stays as it is.
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import math
 import re
@@ -37,6 +40,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import tomlkit
+
+from annelid.config import load_config
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
@@ -47,6 +53,8 @@ MARKED = re.compile(
     re.MULTILINE,
 )
 FILE = re.compile(r"results/\w+\.(?:csv|json:\w+|json)")
+WORMS = "results/worms.toml"
+"""Result files, each with the presets that its numbers are of, and what these were then."""
 EACH = re.compile(r"for each(?: if (?P<condition>.+))?:")
 
 
@@ -183,5 +191,33 @@ def main(check: bool, root: Path = ROOT) -> int:
     return int(check and differing)
 
 
+def worm(preset: str) -> str:
+    """Returns a digest of all that a preset says of its worm; another one has other numbers."""
+    text = load_config(preset).model_dump_json(
+        exclude={"name", "summary", "published", "duration_s"}, exclude_none=True
+    )
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def measured(file: str, presets: Sequence[str], docs: Path = DOCS) -> None:
+    """Notes that a result file has just been measured on presets as they are now.
+
+    Raises:
+        FillError: There is no such file.
+    """
+    if not presets or not (docs / "results" / file).is_file():
+        raise FillError(
+            f"--measured FILE PRESET..: {file!r} must be a file of {docs / 'results'}, of one preset at least"
+        )
+    known = tomlkit.parse((docs / WORMS).read_text(encoding="utf-8"))
+    table = tomlkit.inline_table()
+    table.update({preset: worm(preset) for preset in presets})
+    known[file] = table
+    (docs / WORMS).write_text(tomlkit.dumps(known), encoding="utf-8")
+
+
 if __name__ == "__main__":
-    sys.exit(main(check="--check" in sys.argv[1:]))
+    if sys.argv[1:2] == ["--measured"]:
+        measured(sys.argv[2], sys.argv[3:])
+    else:
+        sys.exit(main(check="--check" in sys.argv[1:]))

@@ -16,7 +16,9 @@ from doc_commands import PAGES, ROOT, Command
 from test_doc_commands import check_annelid, check_program
 
 import measure_runs
-from fill_tables import DOCS, MARKED, FillError, filled, main, waiting
+from annelid.body import WormBody
+from annelid.config import load_config, preset_names
+from fill_tables import DOCS, MARKED, WORMS, FillError, filled, main, measured, waiting, worm
 
 MOST = 5
 """Cells with a number that a table may have and not be one of results."""
@@ -45,6 +47,23 @@ EXCEPTIONS = {
     ("docs/weak_middle.md", "cause"): "printed by `annelid experiment weak-middle`, which writes it into no file",
 }
 """Tables of numbers without a result file, by page and first head, and why."""
+
+NO_WORM = {
+    "bench.json": "every case names the digest of its own configuration",
+    "robust_network.csv": "networks without a body",
+    "lateral_damping.csv": "rods with and without the damping that it is about",
+    "calibration_authors_springs.json": "fits to the load frame, each with a body of its own",
+    "calibration_default.json": "the same",
+    "calibration_no_cable_friction.json": "the same",
+    "calibration_no_crossing_friction.json": "the same",
+    "calibration_spring_rate.json": "the same",
+    "calibration_thin_strands.json": "the same",
+    "material.csv": "the swept materials are its rows",
+}
+"""Result files that are not of presets, and why."""
+
+STALE = ()
+"""Result files whose worms have changed since: to be measured again."""
 
 LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))
 PAGE = """# Gaits
@@ -112,6 +131,34 @@ def test_every_result_file_is_shown() -> None:
     }
     there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
     assert {file for file in there - named if not any(f"]({file})" in page for page in PAGES.values())} == set()
+
+
+def test_numbers_are_of_worms_as_they_are() -> None:
+    known = tomllib.loads((DOCS / WORMS).read_text(encoding="utf-8"))
+    there = {path.name for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
+    assert set(known) == there - set(NO_WORM), "run: python docs/site/fill_tables.py --measured FILE PRESET.."
+    changed = {file for file, worms in known.items() if any(worm(preset) != digest for preset, digest in worms.items())}
+    assert changed == set(STALE)
+
+
+def test_rods_are_damped_by_their_material() -> None:
+    """The paper's worm is of chains, as published; all others resolve with the time step."""
+    for preset in preset_names():
+        body = load_config(preset).body
+        if isinstance(body, WormBody) and body.formulation.damps_material:
+            assert body.strands.damping_time_s, preset
+
+
+def test_a_result_file_is_noted_with_its_worms(docs: Path) -> None:
+    (docs / WORMS).write_text('# which worms\n"old.csv" = { crawler = "1" }\n')
+    measured("gaits.csv", ["crawler", "riddle2022-planar"], docs)
+    noted = (docs / WORMS).read_text()
+    assert noted.startswith("# which worms")
+    known = tomllib.loads(noted)["gaits.csv"]
+    assert known == {"crawler": worm("crawler"), "riddle2022-planar": worm("riddle2022-planar")}
+    assert len(set(known.values())) == 2
+    with pytest.raises(FillError, match=r"missing.csv"):
+        measured("missing.csv", ["crawler"], docs)
 
 
 def test_commands_that_make_results_are_understood() -> None:

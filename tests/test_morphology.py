@@ -33,7 +33,7 @@ def vertex_of(mesh: MeshGeometry, which: int) -> np.ndarray:
     return mesh.vertices_m[mesh.crossing_strands[:, which], mesh.crossing_vertex[mesh.crossing_plane]]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_every_crossing_lies_on_both_of_its_strands(mesh: MeshGeometry) -> None:
     size = mesh.radius_m + mesh.length_m
@@ -41,7 +41,7 @@ def test_every_crossing_lies_on_both_of_its_strands(mesh: MeshGeometry) -> None:
     assert np.allclose(vertex_of(mesh, 0), mesh.crossings_m, atol=1e-11 * size)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_all_meetings_of_strands_are_crossings(mesh: MeshGeometry) -> None:
     """Brute force: along each pair of strands the angle between them vanishes just at their crossings."""
@@ -57,7 +57,7 @@ def test_all_meetings_of_strands_are_crossings(mesh: MeshGeometry) -> None:
     assert np.all(np.diff(x) > 0)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_handedness_is_balanced_and_all_lie_on_the_cylinder(mesh: MeshGeometry) -> None:
     centred = mesh.vertices_m - [0, 0, mesh.radius_m]
@@ -71,7 +71,7 @@ def test_handedness_is_balanced_and_all_lie_on_the_cylinder(mesh: MeshGeometry) 
         assert set(count) == {len(mesh.plane_x_m)}
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_rings_close_round_the_body(mesh: MeshGeometry) -> None:
     corners = mesh.crossings_m[mesh.rings] - [0, 0, mesh.radius_m]
@@ -82,7 +82,7 @@ def test_rings_close_round_the_body(mesh: MeshGeometry) -> None:
     assert np.allclose(mesh.ring_length_m, 2 * mesh.n_per_plane * mesh.radius_m * np.sin(pi / mesh.n_per_plane))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_springs_are_axial_and_sensor_springs_span_their_ring(mesh: MeshGeometry) -> None:
     ends = mesh.crossings_m[mesh.springs]
@@ -97,7 +97,7 @@ def test_springs_are_axial_and_sensor_springs_span_their_ring(mesh: MeshGeometry
     assert np.all(mesh.crossing_strands[first_helix, 0] == 0)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_counts_follow_the_formulas(mesh: MeshGeometry) -> None:
     half, planes = mesh.n_per_plane, len(mesh.plane_x_m)
@@ -108,7 +108,7 @@ def test_counts_follow_the_formulas(mesh: MeshGeometry) -> None:
     assert mesh.length_m == pytest.approx(planes * 2 * pi / (mesh.n_strands * mesh.angular_rate_rad_per_m))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(meshes())
 def test_rhombi_have_four_equal_sides_along_strands(mesh: MeshGeometry) -> None:
     corners = mesh.crossings_m[mesh.rhombi]

@@ -38,7 +38,7 @@ def same(one: Any, other: Any) -> bool:
     return type(one) is type(other) and one == other
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.dictionaries(TEXTS, VALUES, max_size=4), TEXTS)
 def test_a_document_is_read_as_it_was_written(tree: dict[str, Any], heading: str) -> None:
     assert same(parse_toml(toml_text(tree), "it"), tree)
@@ -46,7 +46,7 @@ def test_a_document_is_read_as_it_was_written(tree: dict[str, Any], heading: str
     assert same(parse_toml(toml_text(tree, heading), "it"), tree)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(VALUES)
 def test_a_value_is_set_as_it_was_written(value: Any) -> None:
     text = toml_value(value)
@@ -87,7 +87,7 @@ connections = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.data(), TEXTS, st.lists(TEXTS, min_size=1, max_size=3, unique=True))
 def test_a_network_is_read_as_it_was_written(data: st.DataObject, name: str, names: list[str]) -> None:
     network = Network(name)
@@ -152,7 +152,7 @@ QUOTED = st.builds(
 LONG_KEY = f"{'.'.join('a' * (MOST_LEVELS + 2))} = 1"
 
 
-@settings(max_examples=1000, deadline=None)
+@settings(max_examples=1000)
 @given(st.lists(QUOTED, min_size=1, max_size=3))
 def test_keys_are_told_from_texts_as_the_parser_does(values: list[str]) -> None:
     text = "".join(f"k{i} = {value}\n" for i, value in enumerate(values))

@@ -3,7 +3,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
@@ -19,7 +19,6 @@ def test_deficits_of_the_published_elongations() -> None:
     assert end_difference(robot) == pytest.approx(0.0275, abs=2e-3)
 
 
-@settings(deadline=None)
 @given(st.lists(st.floats(1e-3, 1.0), min_size=3, max_size=12), st.floats(0.1, 10.0))
 def test_deficits_do_not_depend_on_the_unit(lengths: list[float], factor: float) -> None:
     scaled = [factor * length for length in lengths]

@@ -86,7 +86,7 @@ def hopf_cycle(mu: float, omega: float, step: float = 0.01, **options) -> tuple[
     return flow, find_limit_cycle(flow, start, NONE, Section(0, 0.0), n_phases=20, **options)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(mu=st.floats(0.05, 0.6), omega=st.floats(2.0, 6.0))
 def test_hopf_normal_form_has_its_known_multipliers_and_phase_response(mu, omega):
     _, cycle = hopf_cycle(mu, omega)

@@ -43,7 +43,7 @@ PIPES = (
 
 
 @pytest.mark.parametrize("pipe", PIPES, ids=lambda pipe: f"{pipe.course}, {pipe.profile}")
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(start=st.floats(-0.1, 0.3), speed=st.floats(0.01, 0.3))
 def test_rings_are_where_they_were_laid_and_speed_is_along_the_line(pipe: Pipe, start: float, speed: float) -> None:
     time = np.arange(0.0, 8.0, 0.1)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import wave_activation
 
@@ -22,7 +22,6 @@ def test_touching_the_threshold_from_below_is_one_onset_at_that_sample() -> None
     assert contractions([0.0, 1.0, 2.0], [0.0, 0.5, 1.0])[:, 0] == pytest.approx([1.0])
 
 
-@settings(deadline=None)
 @given(
     n_segments=st.integers(3, 12),
     period_s=st.floats(0.9, 6.0),
@@ -47,7 +46,6 @@ def test_a_shifted_and_scaled_wave_gives_its_period_order_and_cycles(
     assert found.full_cycles == cycles
 
 
-@settings(deadline=None)
 @given(gain=st.floats(0.2, 5.0), shift_s=st.floats(-100.0, 100.0))
 def test_stretching_and_shifting_time_stretches_and_shifts_the_rhythm(gain: float, shift_s: float) -> None:
     time = np.arange(0.0, 6.0, 0.005)

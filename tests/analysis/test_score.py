@@ -53,7 +53,7 @@ def wave_phases(n: int, fronts: int, direction: int) -> np.ndarray:
     return (np.arange(n) * direction * fronts / n) % 1.0
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     n=st.integers(3, 12),
     fronts=st.integers(1, 5),
@@ -80,7 +80,7 @@ def test_an_even_wave_gives_its_fronts_direction_and_period(
     assert found.mean_contracted == pytest.approx(fronts, rel=0.15)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(n=st.integers(3, 12), period_s=st.floats(0.9, 6.0), start_s=st.floats(0.05, 1.0), cycles=st.integers(2, 4))
 def test_the_paper_s_wave_agrees_with_the_rhythm(n: int, period_s: float, start_s: float, cycles: int) -> None:
     time = np.arange(0.0, start_s + (cycles - 0.5 / n) * period_s, 0.002)
@@ -149,7 +149,7 @@ def test_segments_that_contract_together_are_no_wave() -> None:
     assert score(*train(np.array([0.0, 0.0, 0.5]), 2.0)).reason == "regular but not a wave"
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(n=st.integers(3, 8), when=st.floats(0.3, 0.8), extra=st.integers(0, 7))
 def test_silence_is_seen_whenever_it_begins(n: int, when: float, extra: int) -> None:
     period_s, duration_s = 0.6 * n, 40.0
@@ -267,7 +267,7 @@ def test_jitter_lowers_regularity_until_it_is_disorder() -> None:
     assert {one.verdict for one in found[-1]} == {"disordered"}
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 999), n=st.integers(3, 6))
 def test_flicker_round_the_threshold_makes_no_onsets(seed: int, n: int) -> None:
     """Slow ramps under noise cross the threshold many times; spikes of 15 ms do so anywhere."""

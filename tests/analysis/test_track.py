@@ -43,7 +43,7 @@ def on_a_circle(curvature_per_m: float, speed_m_per_s: float, duration_s: float,
     return moved(time, angle + swing, -chord * np.cos(angle / 2.0), -chord * np.sin(angle / 2.0))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(-1.5, 1.5), st.floats(0.02, 0.2), st.floats(0.0, 0.1))
 def test_the_turn_of_a_circle_is_its_curvature_whatever_the_swing(curvature: float, speed: float, swing: float) -> None:
     turn = turn_of(on_a_circle(curvature, speed, 20.0, swing), PERIOD_S, after_s=1.0)
@@ -74,7 +74,7 @@ def test_headings_are_unwrapped_and_the_front_leads() -> None:
     assert np.allclose(np.arctan2(-ahead[:, 1], -ahead[:, 0]), np.angle(np.exp(1j * track.heading_rad)), atol=0.02)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(-math.pi, math.pi))
 def test_the_outline_is_as_long_and_wide_as_the_mesh_however_it_lies(angle: float) -> None:
     track = moved(np.zeros(1), np.array([angle]), np.array([3.0]), np.array([-2.0]))

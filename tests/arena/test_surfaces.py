@@ -6,7 +6,7 @@ from math import pi, radians, sin, sqrt, tan
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.arena.kinds.floor import Floor
@@ -108,7 +108,6 @@ def test_a_bend_is_a_torus(radius: float, round_it: float, along: float, off_axi
     assert surface_of(arena).distance_m(point) == pytest.approx(0.16 - off_axis, abs=1e-9)
 
 
-@settings(deadline=None)
 @given(st.floats(0.05, 9.0), st.floats(0.0, 2 * pi), st.floats(0.01, 0.17), st.booleans())
 def test_a_helix_is_a_tube_about_its_line(turns_rad: float, round_it: float, off_axis: float, right: bool) -> None:
     """Its own definition: radius and rise about an axis that leans as far as the helix climbs."""

@@ -52,7 +52,7 @@ def tube(n_planes: int, n_around: int) -> tuple[Indices, Array]:
     return both_ways(edges), np.array(np.repeat(np.arange(n_planes), n_around), dtype=np.float64)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(2, 60), st.integers(1, 12), st.integers(0, 2**32 - 1))
 def test_every_vertex_is_eliminated_once_on_any_graph(n_vertices: int, largest_part: int, seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -63,7 +63,7 @@ def test_every_vertex_is_eliminated_once_on_any_graph(n_vertices: int, largest_p
     assert sorted(order.tolist()) == list(range(n_vertices))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(2, 40), st.integers(0, 2**32 - 1))
 def test_minimum_degree_fills_nothing_in_a_tree(n_vertices: int, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -53,7 +53,7 @@ def gap_under(model: mujoco.MjModel, force_N: float, duration_s: float) -> float
     return float(data.qpos[0] - data.qpos[3])
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(stiffness=st.floats(5, 500), force_N=st.floats(0.01, 2), timestep_s=st.sampled_from([0.001, 0.005, 0.01]))
 def test_a_tie_gives_by_force_over_stiffness(stiffness: float, force_N: float, timestep_s: float) -> None:
     model = tied_points(timestep_s, stiffness, 0.04 * stiffness, 1e-3)

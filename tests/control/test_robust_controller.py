@@ -150,7 +150,7 @@ def driven(**changes: float) -> RobustController:
 
 
 @given(arrays(float, (N, 3), elements=st.floats(0.0, 100.0)))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_on_open_ground_the_adaptive_wave_is_the_fixed_one(elsewhere: np.ndarray) -> None:
     fixed = RobustController(RobustSns(turn_ms=300.0), N, N, TIMESTEP_S)
     touch = np.zeros((N, len(SIDES)))

@@ -195,7 +195,7 @@ def same_state(one: SnsController, other: SnsController) -> None:
 chunk_sizes = st.lists(st.integers(1, 30), min_size=1, max_size=8)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     chunks=chunk_sizes,
     hold_s=st.floats(0.0, 0.08),
@@ -222,7 +222,7 @@ def test_a_stride_is_bitwise_so_many_steps(chunks, hold_s, tolerance_m, hysteres
         taken += n_steps
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     chunks=chunk_sizes,
     n_copies=st.integers(1, 9),

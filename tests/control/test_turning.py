@@ -174,7 +174,7 @@ def test_a_modulation_takes_from_one_side_only(modulation: float) -> None:
     assert max(left, right) == 1.0
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.floats(0.0, 0.05), min_size=5, max_size=5))
 def test_zero_modulation_is_the_plain_nervous_system_bit_for_bit(lengthenings_m: list[float]) -> None:
     plain, turning = sns(), turned(ConstantTurning(modulation=0.0), sns())

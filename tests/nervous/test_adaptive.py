@@ -78,7 +78,7 @@ def test_without_capacitance_the_period_is_that_of_slow_motion() -> None:
     assert (np.abs(gaps[1]) < 0.5 * np.abs(gaps[0])).all()
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(drive=st.floats(0.0, 0.95), scale=st.floats(0.2, 5.0))
 @pytest.mark.slow
 def test_slow_motion_scales_with_the_gate_and_quickens_with_the_drive(drive: float, scale: float) -> None:

@@ -98,7 +98,7 @@ def test_turns_are_the_closed_form_s_plus_the_flip(n_segments: int, turn_ms: flo
     assert 0.0 <= np.diff(late).mean() - expected <= FLIP_MS
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(arrays(float, (8, 5), elements=st.floats(0.0, 1.0)))
 def test_whatever_presses_one_segment_at_a_time_contracts_in_order_and_no_slower(blocks: np.ndarray) -> None:
     n, parameters = 4, RobustParameters(turn_ms=300.0)

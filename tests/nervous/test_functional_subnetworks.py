@@ -50,7 +50,7 @@ def gamma_of(s: Signals, gain: float = 1.0) -> float:
     return gain * R / (s.excitatory_mV - gain * R)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(s=carriers, u=signal, gain=st.floats(0.2, 3.0))
 def test_transmission_is_exact_at_both_ends_and_known_in_between(s, u, gain):
     def through(potential):
@@ -62,7 +62,7 @@ def test_transmission_is_exact_at_both_ends_and_known_in_between(s, u, gain):
     assert through(u) - gain * u == pytest.approx(gain**2 * u * (R - u) / (e - gain * (R - u)), abs=1e-8)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(s=carriers, first=signal, second=signal, gain=st.floats(0.2, 0.5))
 def test_addition(s, first, second, gain):
     total = gain * (first + second)
@@ -81,7 +81,7 @@ def test_addition_tends_to_the_sum_as_the_reversal_potential_rises():
     assert errors[2] / errors[1] == pytest.approx(0.1, rel=0.1)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(s=carriers, plus=signal, minus=signal, gain=st.floats(0.2, 2.0))
 def test_subtraction(s, plus, minus, gain):
     network = subtraction(gain, s)
@@ -94,7 +94,7 @@ def test_subtraction(s, plus, minus, gain):
     assert settled(network, s, plus=plus, minus=plus) == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(s=carriers, dividend=signal, divisor=signal, ratio=st.floats(0.05, 0.9))
 def test_division(s, dividend, divisor, ratio):
     network = division(ratio, s)
@@ -107,7 +107,7 @@ def test_division(s, dividend, divisor, ratio):
     assert settled(network, s, dividend=R, divisor=R) == pytest.approx(ratio * R, abs=1e-8)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(s=carriers, first=signal, second=signal, residue=st.floats(0.3, 4.0))
 def test_multiplication(s, first, second, residue):
     network = multiplication(residue, s)
@@ -159,7 +159,7 @@ def test_frequency_response_of_the_difference(period_ms):
     assert np.ptp(difference) / 2 == pytest.approx(expected, rel=0.01)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(s=carriers, rate=st.floats(2e-4, 5e-3), share=st.floats(0.05, 0.9))
 def test_integration_is_exact_in_the_difference_and_holds(s, rate, share):
     network = integration(rate, s)

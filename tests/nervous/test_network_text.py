@@ -77,7 +77,7 @@ def contents(network: Network):
     )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(network=networks())
 def test_toml_round_trip_is_exact(network):
     text = network.to_toml()
@@ -192,7 +192,7 @@ def corners_of(shape: ElementTree.Element) -> np.ndarray:
     return np.array([pair.split(",") for pair in shape.attrib["points"].split()], dtype=float)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(network=networks())
 def test_svg_is_well_formed_and_holds_everything_within_its_frame(network):
     root = ElementTree.fromstring(network.diagram().svg)

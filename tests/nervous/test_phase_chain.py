@@ -64,7 +64,7 @@ def chain_of(frequency_Hz: np.ndarray, amplitude: float, coupling: float, lag: f
     return PhaseNetwork(responses, plain.coupling_per_s, plain.phase_bias_rad)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     frequency=st.lists(st.floats(0.8, 1.2), min_size=2, max_size=5),
     amplitude=st.floats(0.5, 1.0),

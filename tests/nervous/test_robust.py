@@ -86,7 +86,7 @@ def adversary(kind: str, shape: tuple[int, int], seed: int) -> Signal:
 ADVERSARIES = ("on", "off", "telegraph", "noise", "swing", "while contracted", "while expanded")
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8, derandomize=True)
 @given(data=st.data(), kind=st.sampled_from(ADVERSARIES), seed=st.integers(0, 2**20), n=st.sampled_from([3, 4, 5]))
 def test_one_wave_from_any_state_under_any_signal(data: st.DataObject, kind: str, seed: int, n: int) -> None:
     n_copies = 4

@@ -43,7 +43,7 @@ def spike_times(
     return [step * (1 + np.flatnonzero(column)) for column in fired.T]
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     capacitance=st.floats(2, 20),
     leak=st.floats(0.5, 2),
@@ -104,7 +104,7 @@ def test_adaptation_slows_to_the_periodic_solution_of_membrane_and_threshold():
     assert intervals[-50:].mean() == pytest.approx(low, abs=0.025)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(tau=st.floats(1, 50), increment=st.floats(0.05, 1.0), period=st.integers(2, 40))
 def test_release_of_a_spiking_synapse_jumps_and_decays(tau, increment, period):
     network = Network()
@@ -165,7 +165,7 @@ def test_copies_of_a_batch_spike_for_themselves_and_a_copied_state_continues_ali
     leaks=st.tuples(st.floats(0.5, 2), st.floats(0.5, 2)),
     rectified=st.booleans(),
 )
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_electrical_synapse_between_unlike_neurons(left, right, conductance, leaks, rectified):
     network = Network()
     network.add_neuron("left", Neuron(leak_conductance_uS=leaks[0], bias_nA=left))
@@ -196,7 +196,7 @@ def opening(s: float) -> float:
     return min(max(s, 0.0), 1.0)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(factor=factor, share=share, current=st.floats(-10, 10), rest=st.floats(-5, 5))
 def test_modulated_leak_sets_the_steady_state(factor, share, current, rest):
     network = modulated(Neuron(rest_mV=rest), ModulatorySynapse("leak", factor))

@@ -110,7 +110,7 @@ def test_batch_equals_single_runs(recipe, scheme, n_worms, seed):
         np.testing.assert_array_equal(together[:, worm], alone[:, 0])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     n_segments=st.integers(3, 9),
     n_worms=st.integers(1, 40),

@@ -166,7 +166,7 @@ def networks(draw) -> Network:
     return network
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(network=networks(), scheme=st.sampled_from(["euler", "toolbox"]), seed=st.integers(0, 99))
 def test_every_step_is_that_of_the_equations(network, scheme, seed):
     stepper = network.compile(0.5, scheme, n_worms=2)

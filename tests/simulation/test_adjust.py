@@ -48,7 +48,7 @@ def posture_after(simulation: Simulation) -> np.ndarray:
     return simulation.plant.qpos.copy()
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @given(friction=st.floats(0.05, 2.0))
 def test_friction_changed_live_is_friction_built_in(friction: float) -> None:
     before = load_config("riddle2023-rods")

@@ -217,7 +217,7 @@ def test_impossible_bookkeeping_is_damage(run: Run, tmp_path: Path, name: str, v
 
 
 @given(share=st.floats(0.0, 0.999))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_truncated_file_is_refused_wherever_it_is_cut(run: Run, share: float) -> None:
     content = run.path.read_bytes()
     cut = run.path.with_name("cut.nc")
@@ -227,7 +227,7 @@ def test_a_truncated_file_is_refused_wherever_it_is_cut(run: Run, share: float) 
 
 
 @given(where=st.floats(0.0, 1.0), junk=st.binary(min_size=1, max_size=64))
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 def test_damage_gives_a_run_or_a_sentence(run: Run, where: float, junk: bytes) -> None:
     content = bytearray(run.path.read_bytes())
     # Metadata come first in the file; damage there is what a reader can stumble over.
@@ -417,7 +417,7 @@ def test_a_disk_that_takes_a_few_bytes_at_a_time_gets_them_all(tmp_path: Path, m
     lengths=st.lists(st.integers(1, 40), min_size=1, max_size=5),
     kinds=st.lists(st.sampled_from(["<f8", "<i8", "u1"]), min_size=1, max_size=5),
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 def test_what_is_written_raw_is_what_xarray_reads(
     tmp_path_factory: pytest.TempPathFactory, lengths: Sequence[int], kinds: Sequence[str]
 ) -> None:

@@ -35,7 +35,7 @@ def test_samples_and_frames_come_at_their_intervals_and_include_both_ends(tmp_pa
 
 
 @given(total=st.integers(1, 2000), every=st.integers(1, 300), share=st.floats(0, 1), step=st.sampled_from([1e-3, 5e-3]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_times_of_a_run_and_of_its_continuation_join_to_those_of_the_whole(
     total: int, every: int, share: float, step: float
 ) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from toy import ForgetfulController, SavedToyPlant, ToyController, ToyPlant, toy_config, without_digest
 
@@ -176,7 +176,6 @@ def test_the_newest_slot_is_used_and_a_torn_one_is_not(tmp_path: Path, monkeypat
     cut=st.integers(0, 319),
     sequence=st.integers(1, 10**6),
 )
-@settings(deadline=None)
 def test_a_write_cut_off_anywhere_leaves_a_whole_checkpoint(old: bytes, new: bytes, cut: int, sequence: int) -> None:
     previous = to_slot(sequence, b"before").ljust(400, b"\0")
     target = to_slot(max(sequence - 1, 1), old).ljust(400, b"\0") if sequence > 1 else bytes(400)
@@ -194,7 +193,6 @@ def test_slots_never_written_hold_nothing() -> None:
 
 
 @given(seed=st.integers(0, 2**64), draws=st.integers(0, 5))
-@settings(deadline=None)
 def test_a_restored_generator_draws_the_same_numbers(seed: int, draws: int) -> None:
     generator = np.random.Generator(np.random.PCG64(seed))
     generator.normal(size=draws)

@@ -73,7 +73,7 @@ def coupled(config: RunConfig, plant: Plant) -> Simulation:
     return start(config, plant, SnsController(config.controller, config.sensor, N, N, 0.001), None)  # type: ignore[arg-type]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     move_every=st.integers(1, 25),
     sample_every=st.integers(1, 30),

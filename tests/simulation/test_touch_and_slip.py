@@ -146,7 +146,7 @@ def test_sides_are_quarters_and_mirror_images(turn: float, reach: float) -> None
     assert expected[int(side)] == pytest.approx(max(expected.values()), abs=1e-6)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seed=st.integers(0, 10_000))
 def test_on_any_plane_only_the_way_along_it_costs(seed: int) -> None:
     """Pressing in and out is no slip; a way along the plane loses friction times way, shared among the segments."""

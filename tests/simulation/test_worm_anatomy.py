@@ -31,7 +31,7 @@ def anatomy(body: str) -> Anatomy:
 
 
 @pytest.mark.parametrize("body", BODIES)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(n_worms=st.integers(1, 9), seed=st.integers(0, 1000))
 def test_many_worms_read_like_each_alone(body: str, n_worms: int, seed: int) -> None:
     part, random = anatomy(body), np.random.default_rng(seed)

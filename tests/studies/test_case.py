@@ -26,7 +26,7 @@ def assert_same_run(case: Case) -> None:
     assert typed(case.command).model_dump(exclude={"record"}) == case.config.model_dump(exclude={"record"})
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     friction=st.floats(0.01, 2.0),
     noise=st.floats(0.0, 0.01),
@@ -52,7 +52,7 @@ milliseconds = st.integers(1, 2000).map(lambda n: n * 5 / 1000)
 positive = st.floats(1e-3, 10.0)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(hold_s=milliseconds, rest_s=milliseconds, n_segments=st.integers(3, 6))
 def test_open_loop_commands_make_the_run_of_their_case(hold_s: float, rest_s: float, n_segments: int) -> None:
     case = rods({"body.mesh.n_segments": n_segments, **one_after_the_other(n_segments, hold_s, rest_s)})
@@ -63,7 +63,7 @@ def test_open_loop_commands_make_the_run_of_their_case(hold_s: float, rest_s: fl
     assert program.contractions[-1].stop_s == pytest.approx(case.config.duration_s, abs=2e-9)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(st.integers(1, 3), st.floats(0.0, 5.0), positive, st.floats(0.01, 1.0)), max_size=4))
 def test_program_controllers_survive_the_shell(rows: list[tuple[int, float, float, float]]) -> None:
     contractions = [

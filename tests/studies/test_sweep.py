@@ -87,7 +87,7 @@ def grids(draw: st.DrawFn) -> list[dict[str, Any]]:
     return vary
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(vary=grids(), repeats=st.integers(1, 3))
 def test_a_grid_has_every_combination_once_at_its_own_place(vary: list[dict[str, Any]], repeats: int) -> None:
     plan = plan_of(study(vary, repeats=repeats))
@@ -101,7 +101,7 @@ def test_a_grid_has_every_combination_once_at_its_own_place(vary: list[dict[str,
     assert len({json.dumps(dict(case.changes)) for _, case in plan.points}) == len(plan.points)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(
     design=st.sampled_from(["random", "sobol"]),
     few=st.integers(1, 40),
@@ -117,7 +117,7 @@ def test_more_samples_leave_the_earlier_ones_as_they_are(design: str, few: int, 
     assert drawn(few, seed + 1).samples != first.samples
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(design=st.sampled_from(["random", "lhs", "sobol"]), n=st.integers(1, 64), seed=st.integers(0, 99))
 def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int) -> None:
     vary = [*RANGES, {"field": SEGMENTS, "from": 3, "to": 6}, LISTED[1]]
@@ -129,7 +129,7 @@ def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int
         assert scheme in ("euler", "heun")
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(n=st.integers(1, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
 def test_a_latin_hypercube_has_one_sample_in_every_stratum_of_every_variable(n: int, p: int, seed: int) -> None:
     shares = unit_samples("lhs", n, p, seed)

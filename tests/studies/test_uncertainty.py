@@ -64,7 +64,7 @@ def variant(config: RunConfig, changed: Mapping[str, Any]) -> Case:
 # The draw
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(n=st.integers(2, 20), seed=st.integers(0, 10**6))
 def test_draws_are_reproducible_and_depend_on_the_seed(n: int, seed: int) -> None:
     known = read_spread()
@@ -89,7 +89,7 @@ def covariance(known: Spread) -> np.ndarray:
     return known.correlation * np.outer(known.relative_error, known.relative_error)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(known=spreads(), more=st.integers(1, 20), seed=st.integers(0, 10**6))
 def test_a_sample_has_the_mean_errors_and_correlation_that_were_asked_for(known: Spread, more: int, seed: int) -> None:
     drawn = draw(len(known.names) + more, known, seed)
@@ -97,7 +97,7 @@ def test_a_sample_has_the_mean_errors_and_correlation_that_were_asked_for(known:
     assert np.atleast_2d(np.cov(drawn.T)) == pytest.approx(covariance(known), abs=1e-7)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(p=st.integers(1, 4), n=st.integers(2, 5), seed=st.integers(0, 10**6))
 def test_too_few_worms_have_the_same_total_variance(p: int, n: int, seed: int) -> None:
     drawn = draw(n, spread(dict.fromkeys(NAMES[:p], 0.1)), seed)
@@ -119,7 +119,7 @@ def test_many_draws_are_normal() -> None:
         assert levels == pytest.approx((np.arange(1000) + 0.5) / 1000, abs=0.02)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(slope=st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), seed=st.integers(0, 10**6))
 def test_the_scatter_of_a_linear_answer_is_that_of_linear_propagation(slope: list[float], seed: int) -> None:
     known = read_spread()
@@ -130,7 +130,7 @@ def test_the_scatter_of_a_linear_answer_is_that_of_linear_propagation(slope: lis
 # The parameters
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(change=st.floats(-0.5, 0.5))
 def test_the_shear_modulus_keeps_its_ratio(change: float) -> None:
     config = load_config("wang")
@@ -335,7 +335,7 @@ def test_values_are_written_to_two_digits_of_their_error() -> None:
 # The runs of a study
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(
     control_ms=st.integers(1, 5),
     ratio=st.integers(1, 24),

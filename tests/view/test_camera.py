@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, MARGIN, VIEWS_DEG, fitting_distance, view_angles
@@ -13,7 +13,6 @@ from annelid.errors import RunFileError
 points = st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=1, max_size=20)
 
 
-@settings(deadline=None)
 @given(points, st.sampled_from(sorted(VIEWS_DEG)), st.floats(0.5, 3.0))
 def test_every_point_is_in_the_picture(offsets: list, view: str, aspect: float) -> None:
     azimuth, elevation = (math.radians(angle) for angle in VIEWS_DEG[view])

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import LogFormatter
 from rich.table import Table as TerminalTable
 
 from annelid.draw import canvas, panel_title, save_both, segment_colors
@@ -95,6 +96,8 @@ def ranking_figure(found: Sequence[Standing], stem: Path) -> Path:
             _point(robust, one.entrant, (one.robust, one.robust_low, one.robust_high), y, color)
         panel_title(energy, "Speed against energy")
         energy.set(xlabel="electrical energy (J/m)", ylabel="speed over the reference's, mean of tasks", xscale="log")
+        for show in (energy.xaxis.set_major_formatter, energy.xaxis.set_minor_formatter):
+            show(LogFormatter(minor_thresholds=(2, 1)))
         panel_title(robust, "Speed against robustness")
         robust.set(xlabel="share of runs that travel in order", xlim=(-0.05, 1.05))
         return save_both(figure, stem)

@@ -28,7 +28,9 @@ def candidates(entrant: Entrant) -> Iterator[tuple[dict[str, float], Entrant]]:
             *sections, leaf = path.split(".")
             table = fields
             for section in sections:
-                table = table[section] = dict(table.get(section, {}))
+                inner = dict(table.get(section, {}))
+                table[section] = inner
+                table = inner
             table[leaf] = value
         yield chosen, check_section(Entrant, fields)
 

@@ -46,7 +46,7 @@ class Standing:
 
     Intervals are of 95 %, of shares after Wilson, else by bootstrap over draws; NaN where there is nothing to tell. A
     gain is the mean difference to the reference on the same draws, a ratio the mean speed over the reference's; over
-    all tasks both are means of the tasks'. Energies are sums over runs that were not refused, over their whole distance.
+    all tasks both are means of the tasks'. Energies are sums over runs that were not refused, over their whole way.
     """
 
     entrant: str

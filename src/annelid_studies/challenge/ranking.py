@@ -91,7 +91,9 @@ def interval(values: Array, statistic: Callable[[Array], Array]) -> tuple[float,
     draws = np.arange(len(values))
     if len(draws) < 2:
         return float(of_draws(draws)), nan, nan
-    found = bootstrap((draws,), of_draws, n_resamples=RESAMPLES, method="percentile", rng=0).confidence_interval
+    # It computes a standard error as well, which an infinite number does not have.
+    with np.errstate(invalid="ignore"):
+        found = bootstrap((draws,), of_draws, n_resamples=RESAMPLES, method="percentile", rng=0).confidence_interval
     return float(of_draws(draws)), float(found.low), float(found.high)
 
 

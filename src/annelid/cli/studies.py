@@ -255,8 +255,10 @@ def challenge_command(
     ] = False,
     half_step: Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")] = False,
     against: Annotated[
-        Path | None,
-        typer.Option(metavar="RUNS.csv", help="Compare the ranking with that of another call, by Kendall's tau."),
+        list[Path] | None,
+        typer.Option(
+            metavar="RUNS.csv", help="Compare rankings with another call's, by Kendall's tau; may be repeated."
+        ),
     ] = None,
     tune: Annotated[
         bool, typer.Option("--tune", help="Instead, tune the entrants on training draws, as their search says.")
@@ -270,15 +272,16 @@ def challenge_command(
 
     Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
     always runs too, as the reference. Writes runs.csv, a row a run; scores.csv, means with 95 % intervals by entrant
-    and task; challenge.png and .svg. Runs are kept, so that a second call takes seconds and an interrupted one goes
-    on. The whole takes a few hours on two cores; docs/challenge.md has the tasks, the rules and the results.
+    and task; tasks.csv, a row a task; challenge.png and .svg. Runs are kept, so that a second call takes seconds and an
+    interrupted one goes on. The whole takes a few hours on two cores; docs/challenge.md has tasks, rules and results.
 
     \b
     annelid challenge --quick                                   in minutes
     annelid challenge                                           all entrants, all tasks
     annelid challenge mine:Controller --task slope --draws 4    your own, against the reference
     annelid challenge timed sine --tune -o tuning               what timed and sine are set to
-    annelid challenge --half-step -o half --against challenge/runs.csv
+    annelid challenge --half-step -o half
+    annelid challenge --against half/runs.csv                   is the ranking the same?
     """
     from annelid_studies.challenge import report, tasks
     from annelid_studies.challenge.ranking import Standing, agreement, mean_speeds, read_speeds, standings
@@ -290,7 +293,7 @@ def challenge_command(
         draws = min(draws, tasks.QUICK_DRAWS)
     seed = (0 if tune else tasks.FIRST_TEST_SEED) if first_seed is None else first_seed
     found, seeds = tasks.find_entrants(entrants or []), range(seed, seed + draws)
-    before = None if against is None else read_speeds(against)
+    others = [read_speeds(path) for path in against or []]
     if tune:
         with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
             written = tune_all(store, {name: found[name] for name in entrants or found}, seeds, output)
@@ -301,17 +304,14 @@ def challenge_command(
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
         scores = challenge(store, wanted)
     ranked = standings(scores)
+    taus = [agreement(mean_speeds(scores), other) for other in others]
     written = [
         report.write_rows(Score, scores, output / "runs.csv"),
         report.write_rows(Standing, ranked, output / "scores.csv"),
+        report.write_tasks(ranked, taus, output / "tasks.csv"),
         report.ranking_figure(ranked, output / "challenge"),
     ]
-    tables = [report.ranking_table(ranked), report.speed_table(ranked)]
-    if before is not None:
-        taus = agreement(mean_speeds(scores), before)
-        written.append(report.write_stability(taus, output / "stability.csv"))
-        tables.append(report.stability_table(taus))
-    print_results(written, *tables, quiet=quiet)
+    print_results(written, report.ranking_table(ranked), report.speed_table(ranked, taus), quiet=quiet)
 
 
 def sweep_command(

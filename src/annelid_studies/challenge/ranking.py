@@ -177,12 +177,13 @@ def agreement(one: Mapping[tuple[str, str], float], other: Mapping[tuple[str, st
         other: Likewise.
 
     Returns:
-        Tau by task; NaN where fewer than two entrants differ.
+        Tau by every task of the first; NaN where fewer than two of its entrants are in both and differ.
     """
     from scipy.stats import kendalltau
 
     taus: dict[str, float] = {}
-    for task, keys in grouped((key for key in one if key in other), lambda key: key[1]).items():
+    for task, own in grouped(one, lambda key: key[1]).items():
+        keys = [key for key in own if key in other]
         found: Any = kendalltau([one[key] for key in keys], [other[key] for key in keys])
         taus[task] = float(found.statistic)
     return taus

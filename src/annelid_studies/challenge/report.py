@@ -16,6 +16,7 @@ from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.challenge.ranking import ALL, Standing
+from annelid_studies.challenge.tasks import REFERENCE
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
 CM = 100.0
@@ -23,11 +24,7 @@ CM = 100.0
 
 def write_rows(kind: type[Any], rows: Sequence[Any], path: Path) -> Path:
     """Writes scores or standings as CSV, a column for every field; what there is nothing to tell of stays empty."""
-
-    def cell(value: object) -> object:
-        return None if isinstance(value, float) and not isfinite(value) else value
-
-    return write_csv(path, kind.__slots__, ([cell(value) for value in astuple(row)] for row in rows))
+    return write_csv(path, kind.__slots__, ([_cell(value) for value in astuple(row)] for row in rows))
 
 
 def _with_interval(number: float, low: float, high: float, digits: int = 2) -> str:
@@ -53,17 +50,17 @@ def ranking_table(found: Sequence[Standing]) -> TerminalTable:
     return terminal_table(tabulated(overall, columns), "All tasks", caption="with 95 % intervals over draws")
 
 
-def speed_table(found: Sequence[Standing]) -> TerminalTable:
-    """Lays out mean speeds, a row a task and a column an entrant; * where it differs from the reference's."""
+def speed_table(found: Sequence[Standing], taus: Sequence[Mapping[str, float]] = ()) -> TerminalTable:
+    """Lays out mean speeds, a row a task and a column an entrant, and Kendall's tau of comparisons that were made."""
     overall = [one.entrant for one in found if one.task == ALL]
     rows = []
-    for task, own in grouped((one for one in found if one.task != ALL), lambda one: one.task).items():
+    for task, own in _by_task(found).items():
         of = {one.entrant: one for one in own}
-        rows.append(
-            [task, *(f"{CM * of[name].speed_m_per_s:.2f}{'*' if differs(of[name]) else ''}" for name in overall)]
-        )
+        speeds = (f"{CM * of[name].speed_m_per_s:.2f}{'*' if differs(of[name]) else ''}" for name in overall)
+        rows.append([task, *speeds, *(f"{tau[task]:.2f}" for tau in taus)])
     caption = "* the 95 % interval of the difference to the reference excludes zero"
-    return terminal_table(Table(["task", *overall], rows), "Mean speed (cm/s)", caption=caption)
+    heads = ["task", *overall, *(f"tau {i}" for i in range(1, len(taus) + 1))]
+    return terminal_table(Table(heads, rows), "Mean speed (cm/s)", caption=caption)
 
 
 def differs(one: Standing) -> bool:
@@ -71,18 +68,35 @@ def differs(one: Standing) -> bool:
     return one.gain_low > 0.0 or one.gain_high < 0.0
 
 
-def stability_table(taus: Mapping[str, float]) -> TerminalTable:
-    """Lays out Kendall's tau by task."""
-    return terminal_table(
-        Table(["task", "Kendall's tau"], [[task, f"{tau:.2f}"] for task, tau in taus.items()]), "Stability"
-    )
+def write_tasks(found: Sequence[Standing], taus: Sequence[Mapping[str, float]], path: Path) -> Path:
+    """Writes a row a task as CSV: the reference, the fastest other entrant beside it, and every entrant's mean speed.
+
+    Args:
+        found: Standings.
+        taus: Kendall's tau by task, from comparisons with other rankings; a column each.
+        path: File to write.
+    """
+    entrants = [one.entrant for one in found if one.task == ALL]
+    rows = []
+    for task, own in _by_task(found).items():
+        of = {one.entrant: one for one in own}
+        baseline = of[REFERENCE]
+        best = max((one for one in own if one is not baseline), key=lambda one: one.speed_m_per_s, default=baseline)
+        numbers = [baseline.speed_m_per_s, baseline.speed_low, baseline.speed_high, best.entrant, best.speed_m_per_s]
+        numbers += [best.gain_m_per_s, best.gain_low, best.gain_high]
+        rows.append([task, *numbers, *(tau[task] for tau in taus), *(of[name].speed_m_per_s for name in entrants)])
+    baseline_columns = ["reference_m_per_s", "reference_low", "reference_high"]
+    best_columns = ["best", "best_m_per_s", "gain_m_per_s", "gain_low", "gain_high"]
+    columns = ["task", *baseline_columns, *best_columns, *(f"tau_{i}" for i in range(1, len(taus) + 1)), *entrants]
+    return write_csv(path, columns, ([_cell(value) for value in row] for row in rows))
 
 
-def write_stability(taus: Mapping[str, float], path: Path) -> Path:
-    """Writes Kendall's tau by task as CSV."""
-    return write_csv(
-        path, ["task", "tau"], ([task, f"{tau:.4g}" if isfinite(tau) else None] for task, tau in taus.items())
-    )
+def _by_task(found: Sequence[Standing]) -> dict[str, list[Standing]]:
+    return grouped((one for one in found if one.task != ALL), lambda one: one.task)
+
+
+def _cell(value: object) -> object:
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def ranking_figure(found: Sequence[Standing], stem: Path) -> Path:

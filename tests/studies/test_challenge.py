@@ -182,7 +182,7 @@ def test_the_ranking_is_the_mean_of_ratios_over_tasks() -> None:
     rows = []
     for seed, speed in enumerate((0.04, 0.06)):
         rows.append(replace(SCORE, seed=seed, speed_m_per_s=speed))
-        rows.append(replace(SCORE, seed=seed, speed_m_per_s=0.1 * speed, task="flat-low"))
+        rows.append(replace(SCORE, seed=seed, speed_m_per_s=0.2 * speed, task="flat-low"))
         rows.append(replace(SCORE, entrant="mine", seed=seed, speed_m_per_s=speed + 0.05))
         rows.append(replace(SCORE, entrant="mine", seed=seed, speed_m_per_s=0.0, task="flat-low", in_order=False))
     found = ranked(*rows)
@@ -272,3 +272,43 @@ def test_tuning_writes_an_entrant_that_says_so(tmp_path: Path, monkeypatch: pyte
         tune_all(Store(tmp_path / "runs"), {"sine": sine}, [FIRST_TEST_SEED], tmp_path)
     with pytest.raises(ConfigError, match="none of mine has a search"):
         tune_all(Store(tmp_path / "runs"), {"mine": Entrant(controller={"kind": "sine"})}, [0], tmp_path)
+
+
+def pumping(segments: tuple[int, ...], period_s: float) -> dict[str, Any]:
+    """A controller under which some segments contract for half of each period, all at once."""
+    starts = [round(period_s * i, 6) for i in range(round(12.0 / period_s))]
+    turns = [
+        {"segment": segment, "start_s": start, "stop_s": round(start + period_s / 2, 6)}
+        for start in starts
+        for segment in segments
+    ]
+    return {"kind": "program", "contractions": turns}
+
+
+CHEATS: dict[str, tuple[str, dict[str, Any]]] = {
+    "its front drags the rest along": ("flat-middle", pumping((1,), 0.5)),
+    "its ends drag the rest along": ("flat-low", pumping((1, 3), 0.4)),
+    "it shivers, too fast for the steps": ("flat-middle", {"kind": "sine", "period_s": 0.03}),
+    "it slips, all at once": ("flat-low", {"kind": "sine", "period_s": 0.6, "waves": 0.0}),
+    "it rams the wall": ("narrow", {"kind": "timed", "rise_s": 0.0, "hold_s": 0.1, "fall_s": 0.0, "interval_s": 0.05}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cheat", CHEATS)
+def test_a_cheat_loses_to_the_baseline_or_is_refused(cheat: str, tmp_path: Path) -> None:
+    task, controller = CHEATS[cheat]
+    entrants = {**find_entrants([REFERENCE]), "cheat": Entrant(controller=controller)}
+    store, wanted = Store(tmp_path), trials(entrants, [task], [1000])
+    baseline, found = challenge(store, wanted)
+    print(f"{cheat}: {found.speed_m_per_s:.4f} m/s {found.refused}; baseline {baseline.speed_m_per_s:.4f} m/s")
+    assert not baseline.refused
+    assert baseline.speed_m_per_s > 0.005
+    assert found.refused or found.speed_m_per_s < baseline.speed_m_per_s
+    arena = wanted[1].case.config.arena
+    if arena is not None and (line := arena.centre_line()) is not None and (bore := arena.bore()) is not None:
+        for trial in wanted:
+            skin = store.run(trial.case).data["crossing_position"].values
+            near = line.nearest(skin)
+            beyond = np.linalg.norm(skin - near.point_m, axis=-1) - bore.at(near.arc_m)[0]
+            assert np.nanmax(beyond) < 0.005, "nobody goes through a wall"

@@ -21,6 +21,8 @@ ALL = "all"
 """What stands for a task in the ranking over all of them."""
 TRAVELS, LEAST_M_PER_S = 0.1, 0.001
 """A run travels above this share of the reference's mean speed on the task, and above this speed."""
+LEAST_REFERENCE_M_PER_S = 0.005
+"""A ratio is to the reference's mean speed, but to no less than this."""
 RESAMPLES = 2000
 Array = NDArray[np.float64]
 COLUMNS = (
@@ -142,14 +144,24 @@ def standings(scores: Sequence[Score]) -> list[Standing]:
 
 def _values(scores: Sequence[Score], reference_m_per_s: Array) -> Array:
     """The columns of one entrant's runs at a task, ``(n_draws, n_columns)``."""
-    mean = max(float(reference_m_per_s.mean()), LEAST_M_PER_S)
+    mean = float(reference_m_per_s.mean())
     rows = []
     for one, beside in zip(scores, reference_m_per_s.tolist(), strict=True):
         speed = one.speed_m_per_s
         travels = speed > max(TRAVELS * mean, LEAST_M_PER_S)
         shares = travels and one.in_order, one.in_order, travels, bool(one.refused)
         spent = (0.0,) * 3 if one.refused else (one.slip_J, one.work_J, one.electric_J)
-        rows.append([speed, speed - beside, speed / mean, *shares, *spent, one.distance_m, one.recovery_s])
+        rows.append(
+            [
+                speed,
+                speed - beside,
+                speed / max(mean, LEAST_REFERENCE_M_PER_S),
+                *shares,
+                *spent,
+                one.distance_m,
+                one.recovery_s,
+            ]
+        )
     return np.array(rows, dtype=float)
 
 

@@ -27,6 +27,8 @@ NUMBER = re.compile(r"^\W*\d[\d.,]*(?![\d-])")
 WAITING = (
     "results/arena_contacts.csv",
     "results/batch_throughput.csv",
+    "results/challenge.csv",
+    "results/challenge_tasks.csv",
     "results/environments.csv",
     "results/slip_parts.csv",
     "results/weak_middle.csv",

@@ -6,6 +6,7 @@ from annelid.cli.run import run_command
 from annelid.cli.studies import (
     bench_command,
     calibrate_command,
+    challenge_command,
     limit_cycle_command,
     paper_command,
     robustness_command,
@@ -31,6 +32,7 @@ for _name, _command in (
     ("limit-cycle", limit_cycle_command),
     ("paper", paper_command),
     ("bench", bench_command),
+    ("challenge", challenge_command),
     ("robustness", robustness_command),
     ("sweep", sweep_command),
     ("tune", tune_command),

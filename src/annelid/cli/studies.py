@@ -1,4 +1,4 @@
-"""The commands that compute many runs: `paper`, `bench`, `robustness`, `sweep`, `tune`, `calibrate`, `limit-cycle`."""
+"""The commands that compute many runs: `paper`, `bench`, `challenge`, `robustness`, `sweep`, `tune` and more."""
 
 from __future__ import annotations
 
@@ -231,6 +231,87 @@ def robustness_command(
     if not quiet:
         typer.echo(shares_table(shares(judged)))
     print_results((output / "robustness.json", output / "robustness.md"), quiet=quiet)
+
+
+def challenge_command(
+    entrants: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[ENTRANT]...",
+            help="Names of entrants, files of entrants (.toml), or module:name of a controller of your own."
+            "  [default: all that annelid has]",
+        ),
+    ] = None,
+    task: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Only this task; may be repeated.  [default: all]")
+    ] = None,
+    draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
+    first_seed: Annotated[
+        int | None,
+        typer.Option(min=0, max=2**32 - 1, help="Seed of the first draw.  [default: 1000, or 0 with --tune]"),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Three tasks, three entrants, two draws, short runs: under five minutes.")
+    ] = False,
+    half_step: Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")] = False,
+    against: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RUNS.csv", help="Compare rankings with another call's, by Kendall's tau; may be repeated."
+        ),
+    ] = None,
+    tune: Annotated[
+        bool, typer.Option("--tune", help="Instead, tune the entrants on training draws, as their search says.")
+    ] = False,
+    output: Output = Path("challenge"),
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Rank controllers in the benchmark of soft peristaltic locomotion.
+
+    Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
+    always runs too, as the reference. Writes runs.csv, a row a run; scores.csv, means with 95 % intervals by entrant
+    and task; tasks.csv, a row a task; challenge.png and .svg. Runs are kept, so that a second call takes seconds and an
+    interrupted one goes on. The whole takes a few hours on two cores; docs/challenge.md has tasks, rules and results.
+
+    \b
+    annelid challenge --quick                                   in minutes
+    annelid challenge                                           all entrants, all tasks
+    annelid challenge mine:Controller --task slope --draws 4    your own, against the reference
+    annelid challenge timed sine --tune -o tuning               what timed and sine are set to
+    annelid challenge --half-step -o half
+    annelid challenge --against half/runs.csv                   is the ranking the same?
+    """
+    from annelid_studies.challenge import report, tasks
+    from annelid_studies.challenge.ranking import Standing, agreement, mean_speeds, read_speeds, standings
+    from annelid_studies.challenge.scores import Score, challenge
+    from annelid_studies.challenge.tuning import tune_all
+
+    if quick:
+        entrants, task = entrants or [*tasks.QUICK_ENTRANTS], task or [*tasks.QUICK_TASKS]
+        draws = min(draws, tasks.QUICK_DRAWS)
+    seed = (0 if tune else tasks.FIRST_TEST_SEED) if first_seed is None else first_seed
+    found, seeds = tasks.find_entrants(entrants or []), range(seed, seed + draws)
+    others = [read_speeds(path) for path in against or []]
+    if tune:
+        with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+            written = tune_all(store, {name: found[name] for name in entrants or found}, seeds, output)
+        print_results(written, quiet=quiet)
+        return
+    duration_s = tasks.QUICK_DURATION_S if quick else None
+    wanted = tasks.trials(found, task or [], seeds, half_step=half_step, duration_s=duration_s)
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        scores = challenge(store, wanted)
+    ranked = standings(scores)
+    taus = [agreement(mean_speeds(scores), other) for other in others]
+    written = [
+        report.write_rows(Score, scores, output / "runs.csv"),
+        report.write_rows(Standing, ranked, output / "scores.csv"),
+        report.write_tasks(ranked, taus, output / "tasks.csv"),
+        report.ranking_figure(ranked, output / "challenge"),
+    ]
+    print_results(written, report.ranking_table(ranked), report.speed_table(ranked, taus), quiet=quiet)
 
 
 def sweep_command(

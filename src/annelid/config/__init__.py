@@ -13,7 +13,15 @@ from importlib import import_module
 from typing import Any
 
 from annelid.config.arena import ArenaKind
-from annelid.config.checking import check_config, field_paths, field_value, fields_of, unit_of, whole_path
+from annelid.config.checking import (
+    check_config,
+    check_section,
+    field_paths,
+    field_value,
+    fields_of,
+    unit_of,
+    whole_path,
+)
 from annelid.config.cluster import Cluster, find_cluster
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
 from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, class_named, kinds_of
@@ -62,6 +70,7 @@ __all__ = [
     "arena_text",
     "as_config",
     "check_config",
+    "check_section",
     "field_paths",
     "field_value",
     "fields_of",

@@ -23,7 +23,15 @@ def check_config(tree: Mapping[str, Any]) -> RunConfig:
 
 
 def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
-    """Turns a nested mapping into a checked section of any kind, or raises `ConfigError` naming the field."""
+    """Turns a nested mapping into a checked section of any kind.
+
+    Args:
+        section: Class of the section.
+        tree: Its fields, nested.
+
+    Raises:
+        ConfigError: A field is unknown or out of its range; the sentence names it.
+    """
     try:
         return section.model_validate(tree)
     except ValidationError as error:

@@ -1,0 +1,223 @@
+"""From scores to a ranking: means with bootstrap intervals, differences to the reference, shares, and stability."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.errors import RunFileError
+from annelid_studies.challenge.scores import Score
+from annelid_studies.challenge.tasks import REFERENCE
+from annelid_studies.tables import grouped
+
+ALL = "all"
+"""What stands for a task in the ranking over all of them."""
+TRAVELS, LEAST_M_PER_S = 0.1, 0.001
+"""A run travels above this share of the reference's mean speed on the task, and above this speed."""
+LEAST_REFERENCE_M_PER_S = 0.005
+"""A ratio is to the reference's mean speed, but to no less than this."""
+RESAMPLES = 2000
+Array = NDArray[np.float64]
+COLUMNS = (
+    "speed",
+    "gain",
+    "ratio",
+    "robust",
+    "in_order",
+    "travels",
+    "refused",
+    "slip",
+    "work",
+    "electric",
+    "distance",
+    "recovery",
+)
+"""What is kept of every run for the means."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How an entrant did on a task, or on all of them.
+
+    Intervals are of 95 %, of shares after Wilson, else by bootstrap over draws; NaN where there is nothing to tell. A
+    gain is the mean difference to the reference on the same draws, a ratio the mean speed over the reference's; over
+    all tasks both are means of the tasks'. Energies are sums over runs that were not refused, over their whole way.
+    """
+
+    entrant: str
+    task: str  # `ALL` for all
+    draws: int  # Of every task
+    speed_m_per_s: float
+    speed_low: float
+    speed_high: float
+    worst_m_per_s: float  # Slowest run
+    gain_m_per_s: float
+    gain_low: float
+    gain_high: float
+    ratio: float
+    ratio_low: float
+    ratio_high: float
+    robust: float  # Share of runs that travel in order
+    robust_low: float
+    robust_high: float
+    in_order: float  # Share in order
+    travels: float  # Share that travels
+    refused: float  # Share that was refused
+    recovery_s: float  # Mean of the runs that recovered
+    slip_J_per_m: float
+    work_J_per_m: float
+    electric_J_per_m: float
+    electric_low: float
+    electric_high: float
+
+
+def interval(values: Array, statistic: Callable[[Array], Array]) -> tuple[float, float, float]:
+    """Returns a statistic, and its 95 % bootstrap interval over draws (percentiles); NaN for a single draw.
+
+    Args:
+        values: Numbers of every draw, ``(n_draws, n_tasks, n_columns)``.
+        statistic: From means over draws, ``(.., n_tasks, n_columns)``, to numbers, ``(..)``.
+    """
+    from scipy.stats import bootstrap
+
+    def of_draws(index: NDArray[np.int64], axis: int = -1) -> Array:
+        return statistic(values[index].mean(axis=index.ndim - 1))
+
+    draws = np.arange(len(values))
+    if len(draws) < 2:
+        return float(of_draws(draws)), nan, nan
+    # It computes a standard error as well, which an infinite number does not have.
+    with np.errstate(invalid="ignore"):
+        found = bootstrap((draws,), of_draws, n_resamples=RESAMPLES, method="percentile", rng=0).confidence_interval
+    return float(of_draws(draws)), float(found.low), float(found.high)
+
+
+def _mean(column: str) -> Callable[[Array], Array]:
+    """The mean of a column over tasks."""
+    return lambda means: means[..., COLUMNS.index(column)].mean(axis=-1)
+
+
+def _share(which: Array) -> tuple[float, float, float]:
+    """A share of runs with its 95 % interval after Wilson 1927, which is no point where all runs agree."""
+    from scipy.stats import binomtest
+
+    found = binomtest(int(which.sum()), which.size).proportion_ci(method="wilson")
+    return float(which.mean()), float(found.low), float(found.high)
+
+
+def _per_metre(column: str) -> Callable[[Array], Array]:
+    """The sum of a column over the sum of distances; infinite for a worm that gets nowhere."""
+
+    def over(means: Array) -> Array:
+        energy, way = (means[..., COLUMNS.index(name)].sum(axis=-1) for name in (column, "distance"))
+        return np.where(way > 0.0, energy / np.where(way > 0.0, way, 1.0), np.inf)
+
+    return over
+
+
+def standings(scores: Sequence[Score]) -> list[Standing]:
+    """Ranks entrants: those over all tasks first, the fastest first, then those of each task.
+
+    Every entrant must have run every task with the same draws, the reference among them.
+    """
+    by_task = grouped(scores, lambda one: one.task)
+    of: dict[str, list[Array]] = {}
+    for own in by_task.values():
+        by_entrant = grouped(sorted(own, key=lambda one: one.seed), lambda one: one.entrant)
+        reference = np.array([one.speed_m_per_s for one in by_entrant[REFERENCE]])
+        for name, each in by_entrant.items():
+            of.setdefault(name, []).append(_values(each, reference))
+    overall = [_standing(name, ALL, np.stack(values, axis=1)) for name, values in of.items()]
+    overall.sort(key=lambda one: -one.ratio)
+    best = [one.entrant for one in overall]
+    return overall + [
+        _standing(name, task, of[name][i][:, np.newaxis]) for i, task in enumerate(by_task) for name in best
+    ]
+
+
+def _values(scores: Sequence[Score], reference_m_per_s: Array) -> Array:
+    """The columns of one entrant's runs at a task, ``(n_draws, n_columns)``."""
+    mean = float(reference_m_per_s.mean())
+    rows = []
+    for one, beside in zip(scores, reference_m_per_s.tolist(), strict=True):
+        speed = one.speed_m_per_s
+        travels = speed > max(TRAVELS * mean, LEAST_M_PER_S)
+        shares = travels and one.in_order, one.in_order, travels, bool(one.refused)
+        spent = (0.0,) * 3 if one.refused else (one.slip_J, one.work_J, one.electric_J)
+        rows.append(
+            [
+                speed,
+                speed - beside,
+                speed / max(mean, LEAST_REFERENCE_M_PER_S),
+                *shares,
+                *spent,
+                one.distance_m,
+                one.recovery_s,
+            ]
+        )
+    return np.array(rows, dtype=float)
+
+
+def _standing(name: str, task: str, values: Array) -> Standing:
+    means, recovery = values.mean(axis=0), values[..., COLUMNS.index("recovery")]
+    numbers = (
+        *interval(values, _mean("speed")),
+        float(values[..., COLUMNS.index("speed")].min()),
+        *interval(values, _mean("gain")),
+        *interval(values, _mean("ratio")),
+        *_share(values[..., COLUMNS.index("robust")]),
+        *(float(_mean(column)(means)) for column in ("in_order", "travels", "refused")),
+        float(np.nanmean(recovery)) if np.isfinite(recovery).any() else nan,
+        *(float(_per_metre(column)(means)) for column in ("slip", "work")),
+        *interval(values, _per_metre("electric")),
+    )
+    return Standing(name, task, len(values), *(float(f"{number:.5g}") for number in numbers))
+
+
+def agreement(one: Mapping[tuple[str, str], float], other: Mapping[tuple[str, str], float]) -> dict[str, float]:
+    """Compares two rankings by task: Kendall's tau of the mean speeds of the entrants that are in both.
+
+    Args:
+        one: Mean speeds by entrant and task, from `mean_speeds` or `read_speeds`.
+        other: Likewise.
+
+    Returns:
+        Tau by every task of the first; NaN where fewer than two of its entrants are in both and differ.
+    """
+    from scipy.stats import kendalltau
+
+    taus: dict[str, float] = {}
+    for task, own in grouped(one, lambda key: key[1]).items():
+        keys = [key for key in own if key in other]
+        found: Any = kendalltau([one[key] for key in keys], [other[key] for key in keys])
+        taus[task] = float(found.statistic)
+    return taus
+
+
+def mean_speeds(scores: Sequence[Score]) -> dict[tuple[str, str], float]:
+    """Returns mean speeds by entrant and task, m/s."""
+    by_pair = grouped(scores, lambda one: (one.entrant, one.task))
+    return {pair: float(np.mean([one.speed_m_per_s for one in own])) for pair, own in by_pair.items()}
+
+
+def read_speeds(path: Path) -> dict[tuple[str, str], float]:
+    """Reads mean speeds by entrant and task, m/s, from the runs that an earlier call wrote as CSV.
+
+    Raises:
+        RunFileError: It is not such a file.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            by_pair = grouped(csv.DictReader(file), lambda row: (row["entrant"], row["task"]))
+            return {
+                pair: float(np.mean([float(row["speed_m_per_s"]) for row in rows])) for pair, rows in by_pair.items()
+            }
+    except (OSError, ValueError, KeyError) as error:
+        raise RunFileError(f"{path} is no runs.csv of annelid challenge: {error}") from None

@@ -1,0 +1,119 @@
+"""Scores of a run, from its file alone: speed towards the goal, what it costs, order, recovery, and refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, nan, radians, sin
+
+import numpy as np
+
+from annelid.analysis import lengthening_score, passage_of
+from annelid.config import field_value
+from annelid.experiment import Outcome, Store, case_key
+from annelid.simulation import Run
+from annelid_studies.challenge.tasks import Task, Trial, all_tasks
+
+STALL_FORCE_N, FREE_SPEED_M_PER_S = 13.0, 0.064
+"""Of the motor: cable force at which the robot's servos stall, and cable speed without load (docs/presets.md, wang)."""
+NUMERICAL_SHARE = 0.3
+"""Share of the muscles' work that the integrator may take or add; beyond that a run is refused."""
+RECOVERY_GRID_S = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What one run scored; what an entrant that was refused would have scored is not told."""
+
+    entrant: str
+    task: str
+    version: int  # Of the tasks
+    seed: int  # Of the draw
+    drawn: str  # What was drawn
+    key: str  # Digest of the run's configuration, of the code that computes it, and of the engine
+    refused: str  # Why it does not count; empty if it does
+    speed_m_per_s: float  # Mean speed towards the goal after settling; 0 where refused
+    distance_m: float  # That way; 0 where refused
+    slip_J: float  # Work lost to friction in that time
+    work_J: float  # Positive work of the muscles in that time
+    electric_J: float  # Energy that the motors of `electric_energy_J` take in that time
+    in_order: bool  # Whether segments lengthen in one wave from front to rear, to the end
+    recovery_s: float  # Time from the event until they do so to the end; NaN without an event or without a recovery
+
+
+def challenge(store: Store, wanted: Sequence[Trial], stage: str = "challenge") -> list[Score]:
+    """Runs trials, as far as the store does not have them, and scores them in their order."""
+    done = store.finish([trial.case for trial in wanted], stage)
+    return [_score(trial, one.reason or _numerics(one.outcome), store) for trial, one in zip(wanted, done, strict=True)]
+
+
+def _numerics(outcome: Outcome | None) -> str:
+    """Says what is wrong with the energy balance of a run; nothing if it can be believed."""
+    energy = None if outcome is None else outcome.gait.energy
+    share = None if energy is None else energy.numerical_share
+    if share is None or abs(share) <= NUMERICAL_SHARE:
+        return ""
+    return f"the integrator {'took' if share > 0 else 'added'} {abs(share):.0%} of the muscles' work"
+
+
+def _score(trial: Trial, refused: str, store: Store) -> Score:
+    found, key = all_tasks(), case_key(trial.case) if trial.case in store else ""
+    task, settling_s = found.tasks[trial.task], found.settling_s
+    drawn = " ".join(f"{field}={value:g}" for field, value in trial.drawn.items())
+    named = (trial.entrant, trial.task, found.version, trial.seed, drawn, key, refused)
+    if refused:
+        return Score(*named, 0.0, 0.0, nan, nan, nan, False, nan)
+    run = store.run(trial.case)
+    time, way = progress(run, task)
+    first = int(np.searchsorted(time, settling_s - 1e-9))
+    distance = float(way[-1] - way[first])
+    judged = run.data.isel(time=run.data["time"].values >= settling_s - 1e-9)
+    slip, work = (float((judged[name][-1] - judged[name][0]).sum()) for name in ("slip_loss", "positive_work"))
+    electric = electric_energy_J(judged["time"].values, judged["muscle_force"].values, judged["ring_length"].values)
+    speed = distance / float(time[-1] - time[first])
+    speed, distance, slip, work, electric = (float(f"{one:.6g}") for one in (speed, distance, slip, work, electric))
+    return Score(*named, speed, distance, slip, work, electric, *order(run, task, settling_s))
+
+
+def progress(run: Run, task: Task) -> tuple[np.ndarray, np.ndarray]:
+    """Returns times, s, and how far the worm is towards the goal then, m, ``(n,)`` each.
+
+    In a pipe it is the mean arc length of the rings along the centre line, at the times of the postures; else the
+    centre of mass along the initial heading, or the heading that is wanted.
+    """
+    if task.goal == "pipe":
+        passage = passage_of(run)
+        return passage.time_s, passage.middle_m
+    to_left = radians(field_value(run.config, "turning.heading_deg")) if task.goal == "heading" else 0.0
+    x, y = (run.data["center_of_mass"].sel(axis=axis).values for axis in "xy")
+    return run.data["time"].values, -x * cos(to_left) - y * sin(to_left)
+
+
+def electric_energy_J(time_s: np.ndarray, force_N: np.ndarray, length_m: np.ndarray) -> float:
+    """Energy that direct-current motors would take to pull as the muscles did.
+
+    A motor that stalls at F0 and runs at v0 without load takes ``max(0, F v + F^2 v0 / F0)`` at a force F and a speed v
+    of shortening: the mechanical power and the heat of the current. It gives nothing back.
+
+    Args:
+        time_s: Times of the samples, s, ``(n,)``.
+        force_N: Force of every muscle, N, ``(n, n_muscles)``; a sample's acted during the step before it.
+        length_m: Length of every ring or half-ring, m, likewise.
+    """
+    step = np.diff(time_s)[:, np.newaxis]
+    force, shortening = force_N[1:], -np.diff(length_m, axis=0) / step
+    power = force * shortening + force**2 * FREE_SPEED_M_PER_S / STALL_FORCE_N
+    return float((power.clip(0.0) * step).sum())
+
+
+def order(run: Run, task: Task, settling_s: float) -> tuple[bool, float]:
+    """Returns whether segments lengthen in one wave to the end, and how long after the event they begin to.
+
+    Order is judged after settling, counted from the event where there is one; recovery on a grid of 0.25 s.
+    """
+    if task.event_s is None:
+        return lengthening_score(run, settling_s).is_one_wave, nan
+    in_order = lengthening_score(run, task.event_s + settling_s).is_one_wave
+    grid = np.arange(0.0, run.config.duration_s - task.event_s, RECOVERY_GRID_S)
+    recovered = (after for after in grid if lengthening_score(run, task.event_s + after).is_one_wave)
+    return in_order, float(next(recovered, nan))

@@ -1,0 +1,314 @@
+"""The benchmark: tasks that do not change, entrants that cannot cheat, scores, and the ranking made of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isnan, nan
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+
+from annelid.config import ControllerKind, RunConfig
+from annelid.errors import ConfigError, RunFileError
+from annelid.experiment import Store
+from annelid.protocols import Array, Controller, Plant, Sensation
+from annelid_studies.challenge import report, scores, tasks
+from annelid_studies.challenge.ranking import ALL, agreement, mean_speeds, read_speeds, standings
+from annelid_studies.challenge.scores import Score, challenge, electric_energy_J
+from annelid_studies.challenge.tasks import FIRST_TEST_SEED, REFERENCE, Entrant, all_tasks, find_entrants, trials
+from annelid_studies.challenge.tuning import candidates, tune_all
+
+pytestmark = pytest.mark.usefixtures("runs_in_this_process")
+
+SCORE = Score(REFERENCE, "slope", 1, 1000, "", "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True, nan)
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs are judged from their beginning, so that they may be short."""
+    early = all_tasks().model_copy(update={"settling_s": 0.04})
+    monkeypatch.setattr(tasks, "all_tasks", lambda: early)
+    monkeypatch.setattr(scores, "all_tasks", lambda: early)
+
+
+def test_draws_of_a_version_stay_what_they_are() -> None:
+    """Whoever changes a number here changes the benchmark, and must raise its version."""
+    found = all_tasks()
+    assert found.version == 1
+    assert found.drawn("friction", 1000) == {"arena.friction": 0.1779}
+    assert found.drawn("slope", 1000) == {"arena.slope_deg": 5.067, "arena.friction": 0.5955}
+    assert found.drawn("delay", 1001) == {"trial.delay_s": 0.02109, "arena.friction": 0.6036}
+
+
+@pytest.mark.parametrize("name", all_tasks().tasks)
+def test_draws_lie_in_their_range_and_differ_by_seed(name: str) -> None:
+    task, seeds = all_tasks().tasks[name], range(40)
+    draws = [all_tasks().drawn(name, seed) for seed in seeds]
+    assert len({str(each) for each in draws}) > len(seeds) / 2
+    for field, among in task.draw.items():
+        values = np.array([abs(each[field]) for each in draws])
+        spread = 0.01 if field == "arena.friction" else 0.0
+        assert np.all((values >= among.low * (1 - spread) - 1e-9) & (values <= among.high * (1 + spread) + 1e-9))
+        if among.either_side:
+            assert {np.sign(each[field]) for each in draws} == {-1.0, 1.0}
+    if "arena.friction" not in task.draw:
+        friction = {**all_tasks().set, **task.set}["arena.friction"]
+        assert all(abs(each["arena.friction"] / friction - 1.0) <= 0.0101 for each in draws)
+
+
+@pytest.mark.parametrize("name", all_tasks().tasks)
+def test_a_task_makes_blind_runs_whose_step_can_be_halved(name: str) -> None:
+    reference = {REFERENCE: find_entrants([])[REFERENCE]}
+    [whole], [half] = (trials(reference, [name], [1000], half_step=half_step) for half_step in (False, True))
+    config = whole.case.config
+    assert config.trial is not None
+    assert config.trial.blind
+    assert half.case.config.clock.physics_timestep_s == config.clock.physics_timestep_s / 2
+    assert half.case.config.clock.control_timestep_s == config.clock.control_timestep_s
+    event_s = all_tasks().tasks[name].event_s
+    if event_s is not None:
+        ends = [config.trial.weak_from_s, config.trial.silent_s, config.trial.random_s]
+        ends.append(config.trial.push_from_s + config.trial.push_s if config.trial.push_N else 0.0)
+        assert max(ends) == event_s
+
+
+def test_all_entrants_run_in_the_same_conditions() -> None:
+    found = find_entrants([])
+    for name in ("heading", "twelve"):
+        configs = [trial.case.config for trial in trials(found, [name], [1000])]
+        assert len(configs) == len(found)
+        assert len({config.model_dump_json(exclude={"controller"}) for config in configs}) == 1
+    sine = trials({"sine": found["sine"]}, ["flat-low", "twelve"], [1000])
+    periods = [trial.case.config.controller.period_s for trial in sine]  # type: ignore[attr-defined]
+    assert periods[1] == pytest.approx(4 * periods[0])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[mine]\ncontroller.kind = 'sine'\ntuned_on = [0, 1000, 1003]", "mine: .*all tasks: 1000, 1003"),
+        ("[mine]\ncontroller.kind = 'sine'\ntuned_on.slope = [7, 2001]", "slope: 2001"),
+        ("[mine]\ncontroller.kind = 'sine'\narena.friction = 5.0", "arena"),
+        ("[mine]\ncontroller.kind = 'sine'\nguard.depth_m = 1.0", "guard"),
+        ("[timed]\ncontroller.kind = 'sine'", "another entrant 'timed'"),
+        ("mine = 3", "mine is no table"),
+    ],
+)
+def test_an_entrant_that_was_tuned_on_tests_or_changes_the_task_is_refused(
+    text: str, says: str, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(ConfigError, match=says):
+        find_entrants([str(tmp_path / "mine.toml")])
+
+
+def test_unknown_names_are_refused_with_the_nearest() -> None:
+    with pytest.raises(ConfigError, match="did you mean 'sine'"):
+        find_entrants(["sin"])
+    with pytest.raises(ConfigError, match="did you mean 'slope'"):
+        trials(find_entrants(["sine"]), ["slop"], [0])
+
+
+def test_a_file_enters_beside_the_reference(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[mine]\ncontroller.kind = 'sine'\nper_segment.period_s = 0.5\ntuned_on = [1]")
+    found = find_entrants([str(tmp_path / "mine.toml")])
+    assert list(found) == [REFERENCE, "mine"]
+    assert found["mine"].fields(6) == {"kind": "sine", "period_s": 3.0}
+
+
+class SeedReader:
+    """Contracts by what it finds out about the run: its seed, its ground and its noise."""
+
+    def __init__(self, told: float, n_muscles: int) -> None:
+        self._told, self._n_muscles = told, n_muscles
+
+    def reset(self, seed: int) -> None:
+        self._level = (seed + self._told) % 1.0
+
+    def step(self, sensation: Sensation) -> Array:
+        return np.full(self._n_muscles, self._level)
+
+
+class SeedReading(ControllerKind):
+    """A kind that looks at the whole configuration and at the body that it is built for."""
+
+    kind: Literal["seed-reading"] = "seed-reading"
+
+    def build(self, config: RunConfig, plant: Plant) -> Controller:
+        model = getattr(plant, "model", None)
+        ground = 0.0 if model is None else float(model.geom_friction[0, 0])
+        arena = 0.0 if config.arena is None else config.arena.friction
+        return SeedReader(0.1 * config.seed + arena + 100 * config.sensor.noise_m + ground, plant.n_muscles)
+
+
+@pytest.mark.usefixtures("short")
+def test_an_entrant_that_reads_the_seed_reads_nothing(tmp_path: Path) -> None:
+    """It contracts alike in every draw, though its runs have other seeds, friction and noise."""
+    mine, store = Entrant(controller={"kind": "seed-reading"}), Store(tmp_path)
+    wanted = trials({"mine": mine}, ["noise"], [1000, 1001], duration_s=0.06)
+    assert not any(one.refused for one in challenge(store, wanted))
+    levels = {float(level) for each in wanted for level in store.run(each.case).data["activation"].values[1:].ravel()}
+    assert len(levels) == 1
+    sighted = [each.case.but({"trial.blind": False}) for each in wanted]
+    store.compute(sighted)
+    assert len({float(store.run(case).data["activation"].values[-1, 0]) for case in sighted}) == len(sighted)
+
+
+def test_motors_take_the_power_of_a_direct_current_motor() -> None:
+    time_s, ones = np.linspace(0.0, 1.0, 11), np.ones((11, 1))
+    stalled = electric_energy_J(time_s, 13.0 * ones, 0.9 * ones)
+    assert stalled == pytest.approx(13.0 * 0.064)
+    shortening = 0.9 - 0.064 * time_s[:, np.newaxis]
+    assert electric_energy_J(time_s, 5.0 * ones, shortening) == pytest.approx(5.0 * 0.064 + 25.0 / 13.0 * 0.064)
+    assert electric_energy_J(time_s, 5.0 * ones, 2.0 - shortening) == 0.0, "nothing is given back"
+
+
+@pytest.mark.parametrize(("share", "says"), [(0.29, ""), (0.31, "took 31%"), (-0.4, "added 40%"), (None, "")])
+def test_a_run_that_lives_on_the_integrator_is_refused(share: float | None, says: str) -> None:
+    outcome: Any = SimpleNamespace(gait=SimpleNamespace(energy=SimpleNamespace(numerical_share=share)))
+    found = scores._numerics(outcome)
+    assert says in found
+    assert bool(found) == bool(says)
+
+
+def ranked(*rows: Score) -> dict[tuple[str, str], Any]:
+    return {(one.entrant, one.task): one for one in standings(rows)}
+
+
+def test_the_ranking_is_the_mean_of_ratios_over_tasks() -> None:
+    rows = []
+    for seed, speed in enumerate((0.04, 0.06)):
+        rows.append(replace(SCORE, seed=seed, speed_m_per_s=speed))
+        rows.append(replace(SCORE, seed=seed, speed_m_per_s=0.2 * speed, task="flat-low"))
+        rows.append(replace(SCORE, entrant="mine", seed=seed, speed_m_per_s=speed + 0.05))
+        rows.append(replace(SCORE, entrant="mine", seed=seed, speed_m_per_s=0.0, task="flat-low", in_order=False))
+    found = ranked(*rows)
+    assert found[REFERENCE, ALL].ratio == pytest.approx(1.0)
+    assert found["mine", ALL].ratio == pytest.approx((2.0 + 0.0) / 2)
+    mine = found["mine", "slope"]
+    assert (mine.gain_m_per_s, mine.gain_low, mine.gain_high) == pytest.approx((0.05, 0.05, 0.05)), "paired by draw"
+    assert mine.worst_m_per_s == pytest.approx(0.09)
+    assert mine.speed_low < mine.speed_m_per_s < mine.speed_high
+    assert found["mine", ALL].robust == 0.5
+    assert 0.0 < found["mine", ALL].robust_low < 0.5 < found["mine", ALL].robust_high < 1.0
+
+
+def test_a_refused_run_stands_still_and_spends_nothing() -> None:
+    lost = {"speed_m_per_s": 0.0, "distance_m": 0.0, "slip_J": nan, "work_J": nan, "electric_J": nan}
+    rows = [replace(SCORE, seed=seed) for seed in (0, 1)]
+    rows += [replace(SCORE, entrant="mine", seed=0)]
+    rows += [replace(SCORE, entrant="mine", seed=1, refused="wild", in_order=False, **lost)]
+    mine = ranked(*rows)["mine", ALL]
+    assert (mine.ratio, mine.refused, mine.travels) == (0.5, 0.5, 0.5)
+    assert (mine.slip_J_per_m, mine.electric_J_per_m) == (2.0, 24.0)
+
+
+def test_a_worm_that_gets_nowhere_has_no_energy_per_metre(tmp_path: Path) -> None:
+    rows = [replace(SCORE, seed=seed) for seed in (0, 1)]
+    rows += [replace(SCORE, entrant="mine", seed=seed, speed_m_per_s=-0.01, distance_m=-0.1) for seed in (0, 1)]
+    found = standings(rows)
+    path = report.write_rows(type(found[0]), found, tmp_path / "scores.csv")
+    line = next(line for line in path.read_text().splitlines() if line.startswith("mine,all"))
+    assert line.endswith(",,,,,")
+    assert report.ranking_figure(found, tmp_path / "figure").exists()
+
+
+def test_rankings_agree_or_are_reversed(tmp_path: Path) -> None:
+    rows = [replace(SCORE, entrant=name, speed_m_per_s=speed) for name, speed in (("a", 0.1), ("b", 0.2), ("c", 0.3))]
+    path = report.write_rows(Score, rows, tmp_path / "runs.csv")
+    again = read_speeds(path)
+    assert again == pytest.approx(mean_speeds(rows))
+    assert agreement(again, mean_speeds(rows)) == {"slope": pytest.approx(1.0)}
+    reversed_rows = [replace(one, speed_m_per_s=-one.speed_m_per_s) for one in rows]
+    assert agreement(mean_speeds(reversed_rows), again) == {"slope": pytest.approx(-1.0)}
+    path.write_text("entrant,task\na,slope\n")
+    with pytest.raises(RunFileError, match=r"no runs\.csv"):
+        read_speeds(path)
+
+
+@pytest.mark.usefixtures("short")
+def test_runs_are_scored_kept_and_refused_ones_told(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[mine]\ncontroller = {kind = 'timed', hold_s = 9.0}")
+    entrants = find_entrants([str(tmp_path / "mine.toml")])
+    wanted = trials(entrants, ["push"], [1000], duration_s=0.2)
+    store = Store(tmp_path / "runs")
+    timed, mine = found = challenge(store, wanted)
+    assert not timed.refused
+    assert len(timed.key) == 16
+    assert timed.work_J > 0
+    assert timed.electric_J > 0
+    assert isnan(timed.recovery_s)
+    assert "the cycle of 3 segments" in mine.refused
+    assert (mine.speed_m_per_s, mine.key, mine.in_order) == (0.0, "", False)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")}
+    # NaN is not equal to itself.
+    assert repr(challenge(store, wanted)) == repr(found)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == before
+
+
+def test_a_search_is_every_combination() -> None:
+    timed = find_entrants([])[REFERENCE].model_copy(
+        update={"search": {"controller.hold_s": (0.2, 0.3), "controller.interval_s": (0.4, 0.5)}}
+    )
+    found = [one.controller for _, one in candidates(timed)]
+    assert [(each["hold_s"], each["interval_s"]) for each in found] == [(0.2, 0.4), (0.2, 0.5), (0.3, 0.4), (0.3, 0.5)]
+    assert all(each["rise_s"] == timed.controller["rise_s"] for each in found)
+
+
+@pytest.mark.usefixtures("short")
+def test_tuning_writes_an_entrant_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    laid_out = tasks.trials
+    monkeypatch.setattr("annelid_studies.challenge.tuning.trials", lambda *given: laid_out(*given, duration_s=0.06))
+    sine = find_entrants(["sine"])["sine"].model_copy(update={"search": {"per_segment.period_s": (0.1, 0.9)}})
+    tuned, tried = tune_all(Store(tmp_path / "runs"), {"sine": sine}, [3], tmp_path)
+    [one] = (each for name, each in find_entrants([str(tuned)]).items() if name == "sine-tuned")
+    assert one.tuned_on == dict.fromkeys(tasks.TUNED_AT, (3,))
+    assert one.per_segment["period_s"] in (0.1, 0.9)
+    assert len(tried.read_text().splitlines()) == 3
+    with pytest.raises(ConfigError, match="1000 are test seeds"):
+        tune_all(Store(tmp_path / "runs"), {"sine": sine}, [FIRST_TEST_SEED], tmp_path)
+    with pytest.raises(ConfigError, match="none of mine has a search"):
+        tune_all(Store(tmp_path / "runs"), {"mine": Entrant(controller={"kind": "sine"})}, [0], tmp_path)
+
+
+def pumping(segments: tuple[int, ...], period_s: float) -> dict[str, Any]:
+    """A controller under which some segments contract for half of each period, all at once."""
+    starts = [round(period_s * i, 6) for i in range(round(12.0 / period_s))]
+    turns = [
+        {"segment": segment, "start_s": start, "stop_s": round(start + period_s / 2, 6)}
+        for start in starts
+        for segment in segments
+    ]
+    return {"kind": "program", "contractions": turns}
+
+
+CHEATS: dict[str, tuple[str, dict[str, Any]]] = {
+    "its front drags the rest along": ("flat-middle", pumping((1,), 0.5)),
+    "its ends drag the rest along": ("flat-low", pumping((1, 3), 0.4)),
+    "it shivers, too fast for the steps": ("flat-middle", {"kind": "sine", "period_s": 0.03}),
+    "it slips, all at once": ("flat-low", {"kind": "sine", "period_s": 0.6, "waves": 0.0}),
+    "it rams the wall": ("narrow", {"kind": "timed", "rise_s": 0.0, "hold_s": 0.1, "fall_s": 0.0, "interval_s": 0.05}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cheat", CHEATS)
+def test_a_cheat_loses_to_the_baseline_or_is_refused(cheat: str, tmp_path: Path) -> None:
+    task, controller = CHEATS[cheat]
+    entrants = {**find_entrants([REFERENCE]), "cheat": Entrant(controller=controller)}
+    store, wanted = Store(tmp_path), trials(entrants, [task], [1000])
+    baseline, found = challenge(store, wanted)
+    print(f"{cheat}: {found.speed_m_per_s:.4f} m/s {found.refused}; baseline {baseline.speed_m_per_s:.4f} m/s")
+    assert not baseline.refused
+    assert baseline.speed_m_per_s > 0.005
+    assert found.refused or found.speed_m_per_s < baseline.speed_m_per_s
+    arena = wanted[1].case.config.arena
+    if arena is not None and (line := arena.centre_line()) is not None and (bore := arena.bore()) is not None:
+        for trial in wanted:
+            skin = store.run(trial.case).data["crossing_position"].values
+            near = line.nearest(skin)
+            beyond = np.linalg.norm(skin - near.point_m, axis=-1) - bore.at(near.arc_m)[0]
+            assert np.nanmax(beyond) < 0.005, "nobody goes through a wall"

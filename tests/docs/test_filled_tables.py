@@ -63,7 +63,14 @@ NO_WORM = {
 }
 """Result files that are not of presets, and why."""
 
-STALE = ()
+STALE = (
+    "energy_balance.csv",
+    "pipes.csv",
+    "slip.csv",
+    "slip_crawler.csv",
+    "slip_detector.csv",
+    "turning.csv",
+)
 """Result files whose worms have changed since: to be measured again."""
 
 LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))
@@ -143,11 +150,12 @@ def test_numbers_are_of_worms_as_they_are() -> None:
 
 
 def test_rods_are_damped_by_their_material() -> None:
-    """The paper's worm is of chains, as published; all others resolve with the time step."""
-    for preset in preset_names():
-        body = load_config(preset).body
-        if isinstance(body, WormBody) and body.formulation.damps_material:
-            assert body.strands.damping_time_s, preset
+    """The paper's worm is of chains, as published; of all others wang alone is still to be tuned on this damping."""
+    bodies = {preset: load_config(preset).body for preset in preset_names()}
+    rods = {
+        name: body for name, body in bodies.items() if isinstance(body, WormBody) and body.formulation.damps_material
+    }
+    assert {name for name, body in rods.items() if not body.strands.damping_time_s} == {"wang"}
 
 
 def test_a_result_file_is_noted_with_its_worms(docs: Path) -> None:

@@ -23,7 +23,7 @@ from annelid_studies.challenge.tuning import candidates, tune_all
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
-SCORE = Score(REFERENCE, "slope", 1, 1000, "", "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True, nan)
+SCORE = Score(REFERENCE, "slope", 1, 1000, "", 3, "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True, 1.2, nan)
 
 
 @pytest.fixture
@@ -194,6 +194,19 @@ def test_the_ranking_is_the_mean_of_ratios_over_tasks() -> None:
     assert mine.speed_low < mine.speed_m_per_s < mine.speed_high
     assert found["mine", ALL].robust == 0.5
     assert 0.0 < found["mine", ALL].robust_low < 0.5 < found["mine", ALL].robust_high < 1.0
+
+
+def test_runs_in_time_have_their_entrants_own_period() -> None:
+    periods = (1.2, 1.25, 1.25, 1.4, 2.5, 1.25)
+    rows = [replace(SCORE, seed=seed, period_s=period) for seed, period in enumerate(periods)]
+    rows[-1] = replace(rows[-1], in_order=False, period_s=nan)
+    rows += [replace(SCORE, entrant="mine", seed=seed, period_s=period * 4) for seed, period in enumerate(periods)]
+    rows += [replace(one, task="six", segments=6, period_s=2 * one.period_s) for one in rows]
+    found = ranked(*rows)
+    assert found[REFERENCE, ALL].in_time == 0.5
+    assert found["mine", ALL].in_time == pytest.approx(4 / 6, rel=1e-4)
+    assert found["mine", ALL].in_time_low < 4 / 6 < found["mine", ALL].in_time_high < 1.0
+    assert found[REFERENCE, ALL].in_order == pytest.approx(5 / 6, rel=1e-4)
 
 
 def test_a_refused_run_stands_still_and_spends_nothing() -> None:

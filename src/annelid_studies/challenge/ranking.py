@@ -23,6 +23,8 @@ TRAVELS, LEAST_M_PER_S = 0.1, 0.001
 """A run travels above this share of the reference's mean speed on the task, and above this speed."""
 LEAST_REFERENCE_M_PER_S = 0.005
 """A ratio is to the reference's mean speed, but to no less than this."""
+PERIOD_TOLERANCE = 0.1
+"""A run is in time if it is in order with a period this near to the median of its entrant's, for its segments."""
 RESAMPLES = 2000
 Array = NDArray[np.float64]
 COLUMNS = (
@@ -31,6 +33,7 @@ COLUMNS = (
     "ratio",
     "robust",
     "in_order",
+    "in_time",
     "travels",
     "refused",
     "slip",
@@ -68,7 +71,12 @@ class Standing:
     robust_low: float
     robust_high: float
     in_order: float  # Share in order
+    in_time: float  # Share in time
+    in_time_low: float
+    in_time_high: float
     travels: float  # Share that travels
+    travels_low: float
+    travels_high: float
     refused: float  # Share that was refused
     recovery_s: float  # Mean of the runs that recovered
     slip_J_per_m: float
@@ -129,11 +137,13 @@ def standings(scores: Sequence[Score]) -> list[Standing]:
     """
     by_task = grouped(scores, lambda one: one.task)
     of: dict[str, list[Array]] = {}
+    periods = grouped((one for one in scores if one.in_order), lambda one: (one.entrant, one.segments))
+    own_period_s = {key: float(np.median([one.period_s for one in own])) for key, own in periods.items()}
     for own in by_task.values():
         by_entrant = grouped(sorted(own, key=lambda one: one.seed), lambda one: one.entrant)
         reference = np.array([one.speed_m_per_s for one in by_entrant[REFERENCE]])
         for name, each in by_entrant.items():
-            of.setdefault(name, []).append(_values(each, reference))
+            of.setdefault(name, []).append(_values(each, reference, own_period_s))
     overall = [_standing(name, ALL, np.stack(values, axis=1)) for name, values in of.items()]
     overall.sort(key=lambda one: -one.ratio)
     best = [one.entrant for one in overall]
@@ -142,14 +152,16 @@ def standings(scores: Sequence[Score]) -> list[Standing]:
     ]
 
 
-def _values(scores: Sequence[Score], reference_m_per_s: Array) -> Array:
+def _values(scores: Sequence[Score], reference_m_per_s: Array, own_period_s: Mapping[tuple[str, int], float]) -> Array:
     """The columns of one entrant's runs at a task, ``(n_draws, n_columns)``."""
     mean = float(reference_m_per_s.mean())
     rows = []
     for one, beside in zip(scores, reference_m_per_s.tolist(), strict=True):
         speed = one.speed_m_per_s
         travels = speed > max(TRAVELS * mean, LEAST_M_PER_S)
-        shares = travels and one.in_order, one.in_order, travels, bool(one.refused)
+        of_own = one.period_s / own_period_s[one.entrant, one.segments] if one.in_order else nan
+        in_time = abs(of_own - 1.0) <= PERIOD_TOLERANCE
+        shares = travels and one.in_order, one.in_order, in_time, travels, bool(one.refused)
         spent = (0.0,) * 3 if one.refused else (one.slip_J, one.work_J, one.electric_J)
         rows.append(
             [
@@ -173,7 +185,10 @@ def _standing(name: str, task: str, values: Array) -> Standing:
         *interval(values, _mean("gain")),
         *interval(values, _mean("ratio")),
         *_share(values[..., COLUMNS.index("robust")]),
-        *(float(_mean(column)(means)) for column in ("in_order", "travels", "refused")),
+        float(_mean("in_order")(means)),
+        *_share(values[..., COLUMNS.index("in_time")]),
+        *_share(values[..., COLUMNS.index("travels")]),
+        float(_mean("refused")(means)),
         float(np.nanmean(recovery)) if np.isfinite(recovery).any() else nan,
         *(float(_per_metre(column)(means)) for column in ("slip", "work")),
         *interval(values, _per_metre("electric")),

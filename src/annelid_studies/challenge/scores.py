@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, nan, radians, sin
 
@@ -30,6 +30,7 @@ class Score:
     version: int  # Of the tasks
     seed: int  # Of the draw
     drawn: str  # What was drawn
+    segments: int  # Of the worm
     key: str  # Digest of the run's configuration, of the code that computes it, and of the engine
     refused: str  # Why it does not count; empty if it does
     speed_m_per_s: float  # Mean speed towards the goal after settling; 0 where refused
@@ -38,6 +39,7 @@ class Score:
     work_J: float  # Positive work of the muscles in that time
     electric_J: float  # Energy that the motors of `electric_energy_J` take in that time
     in_order: bool  # Whether segments lengthen in one wave from front to rear, to the end
+    period_s: float  # Mean period of that wave, s; NaN where not in order
     recovery_s: float  # Time from the event until they do so to the end; NaN without an event or without a recovery
 
 
@@ -60,9 +62,9 @@ def _score(trial: Trial, refused: str, store: Store) -> Score:
     found, key = all_tasks(), case_key(trial.case) if trial.case in store else ""
     task, settling_s = found.tasks[trial.task], found.settling_s
     drawn = " ".join(f"{field}={value:g}" for field, value in trial.drawn.items())
-    named = (trial.entrant, trial.task, found.version, trial.seed, drawn, key, refused)
+    named = (trial.entrant, trial.task, found.version, trial.seed, drawn, trial.segments, key, refused)
     if refused:
-        return Score(*named, 0.0, 0.0, nan, nan, nan, False, nan)
+        return Score(*named, 0.0, 0.0, nan, nan, nan, False, nan, nan)
     run = store.run(trial.case)
     time, way = progress(run, task)
     first = int(np.searchsorted(time, settling_s - 1e-9))
@@ -106,14 +108,16 @@ def electric_energy_J(time_s: np.ndarray, force_N: np.ndarray, length_m: np.ndar
     return float((power.clip(0.0) * step).sum())
 
 
-def order(run: Run, task: Task, settling_s: float) -> tuple[bool, float]:
-    """Returns whether segments lengthen in one wave to the end, and how long after the event they begin to.
+def order(run: Run, task: Task, settling_s: float) -> tuple[bool, float, float]:
+    """Returns whether segments lengthen in one wave to the end, its period, s, and how long after the event it begins.
 
     Order is judged after settling, counted from the event where there is one; recovery on a grid of 0.25 s.
     """
-    if task.event_s is None:
-        return lengthening_score(run, settling_s).is_one_wave, nan
-    in_order = lengthening_score(run, task.event_s + settling_s).is_one_wave
-    grid = np.arange(0.0, run.config.duration_s - task.event_s, RECOVERY_GRID_S)
-    recovered = (after for after in grid if lengthening_score(run, task.event_s + after).is_one_wave)
-    return in_order, float(next(recovered, nan))
+    event_s = 0.0 if task.event_s is None else task.event_s
+    score = lengthening_score(run, event_s + settling_s)
+    period_s = score.period_s if score.is_one_wave and score.period_s is not None else nan
+    recovered: Iterator[float] = iter(())
+    if task.event_s is not None:
+        grid = np.arange(0.0, run.config.duration_s - event_s, RECOVERY_GRID_S).tolist()
+        recovered = (after for after in grid if lengthening_score(run, event_s + after).is_one_wave)
+    return score.is_one_wave, float(f"{period_s:.6g}"), next(recovered, nan)

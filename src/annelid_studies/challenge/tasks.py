@@ -109,6 +109,7 @@ class Trial:
     task: str  # Name of the task
     seed: int  # Of the draw
     drawn: Mapping[str, float]  # Fields that were drawn
+    segments: int  # Of the worm
     case: Case  # Its run
 
 
@@ -202,12 +203,11 @@ def trials(
             shared["clock.physics_timestep_s"] = round(shared["clock.physics_timestep_s"] / 2, 9)
         if duration_s is not None:
             shared["duration_s"] = duration_s
+        segments = int(shared.get("body.mesh.n_segments", 3))
         for seed in seeds:
             drawn = found.drawn(name, seed)
             changes = {**shared, **drawn, "seed": seed}
             for entrant, its in entrants.items():
-                controller = its.fields(int(shared.get("body.mesh.n_segments", 3)))
-                made.append(
-                    Trial(entrant, name, seed, drawn, Case(found.preset, {**changes, "controller": controller}))
-                )
+                case = Case(found.preset, {**changes, "controller": its.fields(segments)})
+                made.append(Trial(entrant, name, seed, drawn, segments, case))
     return made

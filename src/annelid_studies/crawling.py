@@ -25,7 +25,7 @@ from annelid_studies.worms import Effort
 
 GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""
-HEADLINES = ("riddle2025", "riddle2025-3x1", "riddle2025-2x2", "riddle2025-muscles", "crawler", "crawler-servo")
+HEADLINES = ("riddle2025", "riddle2025-muscles", "crawler", "crawler-timed", "crawler-servo")
 """The gaits that have a headline by default."""
 PERTURBED: Mapping[Effort, int] = {"full": 8, "quick": 2}
 """How many runs with a friction of their own a headline has."""

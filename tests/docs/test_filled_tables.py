@@ -27,7 +27,6 @@ WAITING = (
     "results/batch_throughput.csv",
     "results/environments.csv",
     "results/slip_parts.csv",
-    "results/tune_front.csv",
     "results/weak_middle.csv",
 )
 """Result files that do not exist yet: their tables have the numbers of earlier runs."""

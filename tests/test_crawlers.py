@@ -10,7 +10,7 @@ import pytest
 from annelid.analysis import gait, summary
 from annelid.config import load_config
 from annelid.simulation import simulate
-from annelid_studies.crawling import PERTURBED
+from annelid_studies.crawling import HEADLINES, PERTURBED
 
 GAITS = Path(__file__).parent.parent / "docs" / "results" / "gaits.csv"
 """What `annelid experiment gaits` found."""
@@ -23,8 +23,8 @@ def headlines() -> dict[str, dict[str, str]]:
     return {row["gait"]: row for row in csv.DictReader(GAITS.open())}
 
 
-@pytest.mark.parametrize("preset", CRAWLERS)
-def test_a_crawler_s_measured_speed_is_the_same_in_perturbed_runs_and_at_finer_resolution(preset: str) -> None:
+@pytest.mark.parametrize("preset", HEADLINES)
+def test_a_gait_s_measured_speed_is_the_same_in_perturbed_runs_and_at_finer_resolution(preset: str) -> None:
     row = headlines()[preset]
     assert int(row["walking"]) == PERTURBED["full"]
     assert row["problem"] == ""

@@ -1,8 +1,12 @@
-"""How fast a gait crawls over ground of any friction, and with any number of segments."""
+"""How fast a gait crawls: over friction and number of segments, and with error bars.
+
+A *headline* is the mean of a gait's numbers over runs that differ in the friction of the ground, by up to one percent
+either way, with its 95 % interval, and beside it the change of each number at finer steps and with more elements.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -13,7 +17,7 @@ from annelid.body import WormBody
 from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
-from annelid.experiment import Case, Judged, Store, judge
+from annelid.experiment import Case, Judged, Store, finer_steps, judge, more_elements
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import grouped, terminal_table
@@ -21,6 +25,12 @@ from annelid_studies.worms import Effort
 
 GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""
+HEADLINES = ("riddle2025", "riddle2025-3x1", "riddle2025-2x2", "riddle2025-muscles", "crawler", "crawler-servo")
+"""The gaits that have a headline by default."""
+PERTURBED = 8
+FRICTION_SPREAD = 0.01
+"""Largest relative change of the friction in a perturbed run."""
+CONFIDENCE = 0.95
 
 Quantity = Literal["friction", "segments"]
 VALUES: Mapping[Quantity, Mapping[Effort, tuple[float, ...]]] = {
@@ -62,8 +72,7 @@ class Reading(NamedTuple):
 
     def number(self, name: str) -> float | None:
         """Returns a number of the gait by its column's name; None where it does not walk."""
-        gait = self.judged.gait
-        return None if gait is None or self.judged.problem else getattr(gait, name)
+        return number_of(self.judged, name)
 
     @property
     def cells(self) -> list[str]:
@@ -157,3 +166,116 @@ def write_figure(readings: Sequence[Reading], stem: Path) -> Path:
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
         return save_both(figure, stem)
+
+
+class Headline(NamedTuple):
+    """A gait with error bars: its own run, perturbed ones, and finer ones by what is finer about them."""
+
+    gait: str
+    own: Judged
+    perturbed: Sequence[Judged]
+    finer: Mapping[str, Judged]
+
+    @property
+    def n_walking(self) -> int:
+        """How many of the perturbed runs walk."""
+        return sum(not one.problem for one in self.perturbed)
+
+    @property
+    def problem(self) -> str:
+        """Which runs do not walk, and why; empty where all do."""
+        named = {"itself": self.own, **{f"run {i}": one for i, one in enumerate(self.perturbed, start=1)}, **self.finer}
+        return "; ".join(f"{name}: {one.problem}" for name, one in named.items() if one.problem)
+
+    def interval(self, name: str) -> tuple[float | None, float | None, float | None]:
+        """Returns mean, lower and upper end of a number over the perturbed runs that walk, by Student's t."""
+        from scipy.stats import sem, t
+
+        known = [one for judged in self.perturbed if (one := number_of(judged, name)) is not None]
+        if not known:
+            return None, None, None
+        mean = float(np.mean(known))
+        if len(known) == 1:
+            return mean, None, None
+        half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(known) - 1) * sem(known))
+        return mean, mean - half, mean + half
+
+    def changes(self, name: str) -> dict[str, float | None]:
+        """Returns by how much of itself a number changes in each finer run; None where one of both does not walk."""
+        own = number_of(self.own, name)
+        finer = {what: number_of(judged, name) for what, judged in self.finer.items()}
+        return {what: one / own - 1.0 if own and one is not None else None for what, one in finer.items()}
+
+
+def number_of(judged: Judged, name: str) -> float | None:
+    """Returns a number of a run by its column's name; None where it does not walk."""
+    return None if judged.gait is None or judged.problem else getattr(judged.gait, name)
+
+
+def variants(gait: str) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Returns what is changed in the perturbed runs of a gait, and in its finer ones by what is finer about them.
+
+    Raises:
+        ConfigError: The gait is unknown or no 3D worm's.
+    """
+    config = load_config(gait)
+    if not isinstance(config.body, WormBody) or config.arena is None:
+        raise ConfigError(f"{gait} is a planar worm: this study needs a 3D worm")
+    drawn = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, PERTURBED)
+    perturbed = [
+        {"arena.friction": round(config.arena.friction * (1.0 + change), 6), "seed": seed}
+        for seed, change in enumerate(drawn.tolist(), start=1)
+    ]
+    half = finer_steps(config)[0]
+    # A quarter in two halvings: of 10 ms with control steps of 1 ms that is 2 ms.
+    quarter = finer_steps(load_config(config.model_dump(), half))[0]
+    names = ("element_more", "elements_more")
+    elements = {
+        name: {"body.mesh.elements_per_side": count} for name, count in zip(names, more_elements(config), strict=True)
+    }
+    return perturbed, {"half_step": half, "quarter_step": quarter, **elements}
+
+
+def headlines(store: Store, gaits: Sequence[str]) -> Iterator[Headline]:
+    """Runs every gait with its perturbed and finer runs, and yields its headline as soon as it is there.
+
+    Raises:
+        ConfigError: A gait is unknown or no 3D worm's.
+        AnnelidError: A run cannot be built or written.
+    """
+    plans = {gait: variants(gait) for gait in gaits}
+    for gait, (perturbed, finer) in plans.items():
+        cases = [Case(gait, changes) for changes in ({}, *perturbed, *finer.values())]
+        store.compute(cases, gait)
+        own, *others = (judge(store[case]) for case in cases)
+        found = dict(zip(finer, others[len(perturbed) :], strict=True))
+        yield Headline(gait, own, others[: len(perturbed)], found)
+
+
+def write_headlines(found: Sequence[Headline], path: Path) -> Path:
+    """Writes one row a gait as CSV, and returns its path: of every number its mean, interval and relative changes."""
+    rows = []
+    for one in found:
+        row: dict[str, Any] = {"gait": Path(one.gait).name.removesuffix(".toml"), "walking": one.n_walking}
+        for name in COLUMNS:
+            row |= zip((name, f"{name}_low", f"{name}_high"), one.interval(name), strict=True)
+            row |= {f"{name}_{what}": change for what, change in one.changes(name).items()}
+        rows.append({**row, "problem": one.problem})
+    return write_csv(path, rows[0], ([_rounded(value) for value in row.values()] for row in rows))
+
+
+def _rounded(value: object) -> object:
+    return f"{value:.5g}" if isinstance(value, float) else value
+
+
+def headline_table(found: Sequence[Headline]) -> TerminalTable:
+    """Tabulates speeds with their intervals and changes, one row a gait."""
+    rows = []
+    for one in found:
+        mean, low, high = one.interval(shown := "speed_body_lengths_per_s")
+        ends = "" if low is None else f"{low:.4f} .. {high:.4f}"
+        changed = ["" if part is None else f"{100 * part:+.1f} %" for part in one.changes(shown).values()]
+        rows.append([one.gait, "" if mean is None else f"{mean:.4f}", ends, str(one.n_walking), *changed])
+    finer = [name.replace("_", " ") for name in found[0].finer]
+    header = ["gait", COLUMNS["speed_body_lengths_per_s"], "95 % interval", f"walking of {PERTURBED}", *finer]
+    return terminal_table(Table(header, rows), "Gaits with error bars")

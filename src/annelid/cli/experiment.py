@@ -65,6 +65,41 @@ def speed_command(
     print_results((path, crawling.write_figure(readings, path.with_suffix(""))), *tables, quiet=quiet)
 
 
+@study("gaits")
+def gaits_command(
+    gaits: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PRESET|FILE.toml]...", help="Gaits.  [default: those of the six-segment robot]"),
+    ] = None,
+    output: Output = Path("gaits"),
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure gaits with error bars: is a speed an accident of its run, or of the resolution?
+
+    Every gait runs eight times with a friction drawn within one percent of its own, at half and a quarter of the
+    physics step, and with one and two more elements a side. Of speed, stride, period, slip and cost of transport it
+    gives the mean, its 95 % interval by Student's t, and the relative change at each resolution.
+
+    Writes gaits.csv, and keeps runs, so that an interrupted call goes on. Thirteen runs a gait, of which the finer ones
+    take longest; docs/speed_of_travel.md explains the results.
+
+    \b
+    annelid experiment gaits crawler
+    annelid experiment gaits crawler tune/best.toml -o mine
+    """
+    from annelid_studies import crawling
+
+    found: list[crawling.Headline] = []
+    path = output / "gaits.csv"
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        for one in crawling.headlines(store, gaits or crawling.HEADLINES):
+            found.append(one)
+            crawling.write_headlines(found, path)
+    print_results((path,), crawling.headline_table(found), quiet=quiet)
+
+
 @study("slip")
 def slip_command(
     output: Output = SLIP,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import Judged, judge
+    from annelid.experiment.uncertainty import finer_steps, more_elements
     from annelid.experiment.workers import Workers
 
 __all__ = [
@@ -38,7 +39,9 @@ __all__ = [
     "case_key",
     "code_fingerprint",
     "end_after",
+    "finer_steps",
     "judge",
+    "more_elements",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import nan, pi
+from math import ceil, nan, pi
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -26,7 +26,7 @@ from annelid.simulation import Run
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
 CM = 100.0
-Ground = Literal["flat", "bend"]
+Ground = Literal["flat", "straight pipe", "bend"]
 
 AXIS_M_PER_S = (0.020, 0.044)
 """Vertical axis of the authors' figure of the speed in bends (`Feedback_Control_Model/Turning_Speed_Figures.py`)."""
@@ -53,26 +53,23 @@ FRICTIONS: Mapping[str, tuple[float, ...]] = {
     "3x1, muscles": (0.1, 0.3, 0.7),
 }
 """Of flat ground; the authors have 0.01 and 0.1 to 1.0."""
-RADII_M: Mapping[str, tuple[float, ...]] = {"3x1": (0.3, 0.5, 0.7, 0.9, 1.1, 1.3), "3x1, touch": (0.3, 0.5, 0.7)}
+RADII_M: Mapping[str, tuple[float, ...]] = {"3x1": (0.3, 0.5, 0.7, 0.9, 1.1, 1.3), "3x1, touch": (0.5, 0.7)}
 """Of the bends' centre lines; the authors have 0.2 to 0.9 m with muscles, 0.5 to 1.3 m with servos."""
-BEND: Mapping[str, Any] = {
+STRAIGHT_M, PIPE_FRICTION = 0.25, 0.3
+PIPE: Mapping[str, Any] = {
     "kind": "pipe",
-    "course": "bend",
     "bore_m": 0.20,
-    "straight_m": 0.25,
     "contact_time_constant_s": 0.01,
     "contact_impedance": [0.99, 0.999, 0.001],
 }
-"""The authors' wide pipe: 0.20 m in radius, 0.25 m straight before the bend; contacts as the catalogue's pipes have."""
-BEND_FRICTION = 0.3
-FLAT_S = 18.0
-"""Three cycles; the authors simulate 80 s."""
-SLOWEST_M_PER_S = 0.03
+"""The authors' wide pipe, 0.20 m in radius, which is straight for 0.25 m before a bend; contacts as in the catalogue."""
+CYCLE_S = 6.0
+FLAT_S, AUTHORS_FLAT_S = 12.0, 80.0
+"""Two cycles of all three gaits, of which the second is repeated up to the 80 s that the authors simulate."""
+SLOWEST_M_PER_S = 0.035
 """Runs in bends last until a foremost ring of this mean speed has come out, the authors' 100 s."""
-LEAST_RUNS, HEADLINE_RUNS = 3, 8
-HEADLINE = ("flat", "3x1", 0.3)
-SPREAD = 0.01
-"""Runs of one point differ in friction, evenly spread by this share to either side."""
+SHARES = (1.0, 0.99, 1.01)
+"""Factors of a point's friction in its runs."""
 CONFIDENCE = 0.95
 
 
@@ -82,7 +79,7 @@ class Point(NamedTuple):
     ground: Ground
     gait: str
     friction: float
-    radius_m: float  # Of the bend's centre line; NaN on flat ground
+    radius_m: float  # Of the bend's centre line; NaN without one
     half_step: bool  # Whether physics steps are half the preset's: one run, to see what the step does
 
 
@@ -99,45 +96,41 @@ class Reading:
     speed_m_per_s: float  # Mean speed of the foremost ring, as the authors define it
     low_m_per_s: float  # Lower end of the mean's 95 % interval; NaN for one run
     high_m_per_s: float  # Upper end
-    came_out: int  # Runs whose foremost ring left the bend; 0 on flat ground
+    came_out: int  # Runs whose foremost ring left the bend; 0 without one
     passed: int  # Runs of which the middle of the worm left it
-    least_front_m: float  # The least arc length that a foremost ring came to, or distance on flat ground
+    least_front_m: float  # The least arc length that a foremost ring came to in a bend, or distance elsewhere
     command: str  # The command line that makes the run without a change of friction
 
 
 def points(quick: bool = False) -> list[Point]:
     """Lays out the points; quick: one friction and one bend, with the authors' 3x1 alone."""
     if quick:
-        return [Point("flat", "3x1", 0.3, nan, False), Point("bend", "3x1", BEND_FRICTION, 0.3, False)]
+        return [Point("flat", "3x1", 0.3, nan, False), Point("bend", "3x1", PIPE_FRICTION, 0.3, False)]
     flat = [Point("flat", gait, mu, nan, False) for gait in FLAT_GAITS for mu in FRICTIONS[gait]]
-    bends = [Point("bend", gait, BEND_FRICTION, radius, False) for gait in BEND_GAITS for radius in RADII_M[gait]]
+    bends = [Point("bend", gait, PIPE_FRICTION, radius, False) for gait in BEND_GAITS for radius in RADII_M[gait]]
     finer = [Point("flat", gait, 0.3, nan, True) for gait in ("3x1", "3x1, muscles")]
-    return [*flat, *bends, *finer, Point("bend", "3x1", BEND_FRICTION, 0.7, True)]
+    straight = Point("straight pipe", "3x1", PIPE_FRICTION, nan, False)
+    return [*flat, straight, *bends, *finer, Point("bend", "3x1", PIPE_FRICTION, 0.7, True)]
 
 
 def cases(point: Point) -> list[Case]:
-    """Returns the runs of a point, that with the point's own friction first where their number is odd."""
+    """Returns the runs of a point, that with the point's own friction first."""
     if point.ground == "flat":
         preset, own = FLAT_GAITS[point.gait]
         changes = {**own, "duration_s": FLAT_S}
     else:
         preset, own = "riddle2025-3x1", BEND_GAITS[point.gait]
-        arena = {**BEND, "radius_m": point.radius_m, "friction": point.friction}
-        to_the_exit = 0.5 * pi * point.radius_m + BEND["straight_m"] + 0.1
-        changes = {**own, "arena": arena, "duration_s": round(min(to_the_exit / SLOWEST_M_PER_S, 100.0), 0)}
-    changes["record.frames_interval_s"] = 0.1
-    changes["record.signals_interval_s"] = 0.02
+        arena, duration_s = {**PIPE, "friction": point.friction}, FLAT_S
+        if point.ground == "bend":
+            arena |= {"course": "bend", "straight_m": STRAIGHT_M, "radius_m": point.radius_m}
+            to_the_exit = 0.5 * pi * point.radius_m + STRAIGHT_M + 0.1
+            duration_s = round(min(to_the_exit / SLOWEST_M_PER_S, 100.0), 0)
+        changes = {**own, "arena": arena, "duration_s": duration_s}
+    changes |= {"record.frames_interval_s": 0.1, "record.signals_interval_s": 0.02}
     if point.half_step:
-        step = Case(preset).config.clock.physics_timestep_s / 2
-        changes["clock.physics_timestep_s"] = step
-    frictions = sorted(point.friction * shares(point), key=lambda mu: abs(mu - point.friction))
-    return [Case(preset, {**changes, "arena.friction": round(float(mu), 6)}) for mu in frictions]
-
-
-def shares(point: Point) -> Array:
-    """Returns the factors of a point's friction in its runs."""
-    n = 1 if point.half_step else HEADLINE_RUNS if point[:3] == HEADLINE else LEAST_RUNS
-    return np.ones(1) if n == 1 else 1.0 + np.linspace(-SPREAD, SPREAD, n)
+        changes["clock.physics_timestep_s"] = Case(preset).config.clock.physics_timestep_s / 2
+    frictions = [round(point.friction * share, 6) for share in SHARES[: 1 if point.half_step else None]]
+    return [Case(preset, {**changes, "arena.friction": friction}) for friction in frictions]
 
 
 def ahead_m(track: Track) -> Array:
@@ -145,6 +138,22 @@ def ahead_m(track: Track) -> Array:
     heading = track.heading_rad[0]
     along: Array = -(track.front_m - track.front_m[0]) @ np.array([np.cos(heading), np.sin(heading)])
     return along
+
+
+def repeated(time_s: Array, place_m: Array, until_s: float) -> tuple[Array, Array]:
+    """Goes on with a path by repeating its last cycle; times are evenly spaced, and a cycle is a whole number of them.
+
+    Returns:
+        Times, s, and places, m, ``(n,)`` each.
+    """
+    per_cycle = round(CYCLE_S / (time_s[1] - time_s[0]))
+    stride, last = place_m[-1] - place_m[-1 - per_cycle], place_m[-per_cycle:]
+    n = ceil((until_s - time_s[-1]) / CYCLE_S)
+    further_time = time_s[-per_cycle:] + CYCLE_S * np.arange(1, n + 1)[:, np.newaxis]
+    further = last + stride * np.arange(1, n + 1)[:, np.newaxis]
+    time, place = np.append(time_s, further_time), np.append(place_m, further)
+    kept = time <= until_s + 1e-9
+    return time[kept], place[kept]
 
 
 def speed_of_line(time_s: Array, place_m: Array) -> float:
@@ -158,10 +167,10 @@ def speed_of_line(time_s: Array, place_m: Array) -> float:
 
 def _of_run(point: Point, run: Run) -> tuple[float, float, bool, bool]:
     """Speed of the foremost ring, m/s, how far it came, m, and whether it and the middle left the bend."""
-    if point.ground == "flat":
+    if point.ground != "bend":
         track = track_of(run)
         place = ahead_m(track)
-        return speed_of_line(track.time_s, place), float(place[-1]), False, False
+        return speed_of_line(*repeated(track.time_s, place, AUTHORS_FLAT_S)), float(place[-1]), False, False
     passage = passage_of(run)
     farthest = float(passage.front_m.max())
     return passage.speed_m_per_s(), farthest, farthest >= passage.reach_m[1], passage.passed
@@ -188,16 +197,15 @@ def compare(store: Store, wanted: Sequence[Point]) -> list[Reading]:
     for point, own in runs.items():
         found = [_of_run(point, store.run(case)) for case in own]
         speeds, ways, out, passed = zip(*found, strict=True)
-        command = own[0].but({"arena.friction": point.friction}).command
         mean = mean_and_interval(speeds)
-        readings.append(Reading(*point, len(own), *mean, sum(out), sum(passed), min(ways), command))
+        readings.append(Reading(*point, len(own), *mean, sum(out), sum(passed), min(ways), own[0].command))
     return readings
 
 
 def comparison_table(readings: Sequence[Reading]) -> TerminalTable:
     """Lays out readings for the terminal."""
     columns = {
-        "ground": lambda one: one.ground if one.ground == "flat" else f"bend of {one.radius_m:g} m",
+        "ground": lambda one: f"bend of {one.radius_m:g} m" if one.ground == "bend" else one.ground,
         "gait": lambda one: one.gait + (", half the step" if one.half_step else ""),
         "friction": lambda one: f"{one.friction:g}",
         "runs": lambda one: str(one.runs),
@@ -205,7 +213,7 @@ def comparison_table(readings: Sequence[Reading]) -> TerminalTable:
         "95 % interval": lambda one: (
             "-" if one.runs < 2 else f"{CM * one.low_m_per_s:.2f} .. {CM * one.high_m_per_s:.2f}"
         ),
-        "front out": lambda one: "" if one.ground == "flat" else f"{one.came_out} of {one.runs}",
+        "front out": lambda one: f"{one.came_out} of {one.runs}" if one.ground == "bend" else "",
         "least way (m)": lambda one: f"{one.least_front_m:.2f}",
     }
     return terminal_table(tabulated(readings, columns), "The authors' later robot", n_words=2)
@@ -220,6 +228,8 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
         panel_title(bends, "b) bends of 90 degrees, friction 0.3: speed (cm/s)")
         _draw(flat, [one for one in whole if one.ground == "flat"], "friction")
         _draw(bends, [one for one in whole if one.ground == "bend"], "radius_m")
+        for one in [one for one in whole if one.ground == "straight pipe"]:
+            bends.axhline(CM * one.speed_m_per_s, color="0.3", linestyle=(0, (4, 3)), label="straight pipe")
         bends.axhspan(*(CM * speed for speed in AXIS_M_PER_S), color="0.9", zorder=0, label="the authors' axis")
         for height, (gait, least) in zip((0.97, 0.93), SMALLEST_DRAWN_M.items(), strict=True):
             line = bends.get_xaxis_transform()

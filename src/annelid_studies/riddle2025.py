@@ -32,8 +32,9 @@ AXIS_M_PER_S = (0.020, 0.044)
 """Vertical axis of the authors' figure of the speed in bends (`Feedback_Control_Model/Turning_Speed_Figures.py`)."""
 STRAIGHT_LABEL_M_PER_S = 0.0415
 """Where the label of the straight pipe's speed stands on that axis, its lower edge above the line that it names."""
-SMALLEST_DRAWN_M: Mapping[str, float] = {"3x1": 0.7, "3x1, touch": 0.5}
-"""Smallest radius, of 0.5 to 1.3 m, whose speed that figure has; the others are taken out in the script."""
+SMALLEST_RUN_M = 0.5
+SMALLEST_DRAWN_M: Mapping[str, float] = {"3x1": 0.7, "3x1, touch": 0.5, "3x1, as in 2026": 0.7}
+"""Smallest radius, of 0.5 to 1.3 m, whose speed that figure has; smaller ones are taken out in the script."""
 
 FLAT_GAITS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     "3x1": ("riddle2025-3x1", {}),
@@ -45,15 +46,24 @@ FLAT_GAITS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 }
 """Preset and changes. The authors ran flat ground with 3x1 on the muscles of their model of 2025, which has these
 lengths and the engine's default lmin; servos on half-rings are those of 2026."""
-BEND_GAITS: Mapping[str, Mapping[str, Any]] = {"3x1": {}, "3x1, touch": {"turning": {"kind": "touch"}}}
-"""Changes of the preset `riddle2025-3x1`: straight ahead, and turning away from contact as the authors published it."""
+PIPE_GAITS: Mapping[str, Mapping[str, Any]] = {
+    "3x1": {},
+    "3x1, touch": {"turning": {"kind": "touch"}},
+    "3x1, as in 2026": {"body.springs.stiffness_N_per_m": 75.0, "body.rings.force_limit_N": 100.0},
+}
+"""Changes of the preset `riddle2025-3x1`: straight ahead; turning away from contact as the authors published it; with
+the springs and the servos' force limit of the model with which they made their figure of the wide pipe."""
 FRICTIONS: Mapping[str, tuple[float, ...]] = {
     "3x1": (0.1, 0.3, 0.7, 1.0),
     "2x2": (0.3, 0.7),
     "3x1, muscles": (0.1, 0.3, 0.7),
 }
 """Of flat ground; the authors have 0.01 and 0.1 to 1.0."""
-RADII_M: Mapping[str, tuple[float, ...]] = {"3x1": (0.3, 0.5, 0.7, 0.9, 1.1, 1.3), "3x1, touch": (0.5, 0.7)}
+RADII_M: Mapping[str, tuple[float, ...]] = {
+    "3x1": (0.3, 0.5, 0.7, 0.9, 1.1, 1.3),
+    "3x1, touch": (0.5,),
+    "3x1, as in 2026": (0.5, 0.7),
+}
 """Of the bends' centre lines; the authors have 0.2 to 0.9 m with muscles, 0.5 to 1.3 m with servos."""
 STRAIGHT_M, PIPE_FRICTION = 0.25, 0.3
 PIPE: Mapping[str, Any] = {
@@ -62,7 +72,7 @@ PIPE: Mapping[str, Any] = {
     "contact_time_constant_s": 0.01,
     "contact_impedance": [0.99, 0.999, 0.001],
 }
-"""The authors' wide pipe, 0.20 m in radius, which is straight for 0.25 m before a bend; contacts as in the catalogue."""
+"""The authors' wide pipe, 0.20 m in radius, straight for 0.25 m before a bend; contacts as in the catalogue."""
 CYCLE_S = 6.0
 FLAT_S, AUTHORS_FLAT_S = 12.0, 80.0
 """Two cycles of all three gaits, of which the second is repeated up to the 80 s that the authors simulate."""
@@ -99,6 +109,7 @@ class Reading:
     came_out: int  # Runs whose foremost ring left the bend; 0 without one
     passed: int  # Runs of which the middle of the worm left it
     least_front_m: float  # The least arc length that a foremost ring came to in a bend, or distance elsewhere
+    figure: str  # What the authors' figure of the wide pipe has of it: "drawn", "taken out", "not run"; empty elsewhere
     command: str  # The command line that makes the run without a change of friction
 
 
@@ -107,10 +118,10 @@ def points(quick: bool = False) -> list[Point]:
     if quick:
         return [Point("flat", "3x1", 0.3, nan, False), Point("bend", "3x1", PIPE_FRICTION, 0.3, False)]
     flat = [Point("flat", gait, mu, nan, False) for gait in FLAT_GAITS for mu in FRICTIONS[gait]]
-    bends = [Point("bend", gait, PIPE_FRICTION, radius, False) for gait in BEND_GAITS for radius in RADII_M[gait]]
+    bends = [Point("bend", gait, PIPE_FRICTION, radius, False) for gait in PIPE_GAITS for radius in RADII_M[gait]]
     finer = [Point("flat", gait, 0.3, nan, True) for gait in ("3x1", "3x1, muscles")]
-    straight = Point("straight pipe", "3x1", PIPE_FRICTION, nan, False)
-    return [*flat, straight, *bends, *finer, Point("bend", "3x1", PIPE_FRICTION, 0.7, True)]
+    straight = [Point("straight pipe", gait, PIPE_FRICTION, nan, False) for gait in ("3x1", "3x1, as in 2026")]
+    return [*flat, *straight, *bends, *finer, Point("bend", "3x1", PIPE_FRICTION, 0.7, True)]
 
 
 def cases(point: Point) -> list[Case]:
@@ -119,7 +130,7 @@ def cases(point: Point) -> list[Case]:
         preset, own = FLAT_GAITS[point.gait]
         changes = {**own, "duration_s": FLAT_S}
     else:
-        preset, own = "riddle2025-3x1", BEND_GAITS[point.gait]
+        preset, own = "riddle2025-3x1", PIPE_GAITS[point.gait]
         arena, duration_s = {**PIPE, "friction": point.friction}, FLAT_S
         if point.ground == "bend":
             arena |= {"course": "bend", "straight_m": STRAIGHT_M, "radius_m": point.radius_m}
@@ -176,6 +187,15 @@ def _of_run(point: Point, run: Run) -> tuple[float, float, bool, bool]:
     return passage.speed_m_per_s(), farthest, farthest >= passage.reach_m[1], passage.passed
 
 
+def in_figure(point: Point) -> str:
+    """Returns what the authors' figure of the wide pipe has of a point, as `Reading` says."""
+    if point.ground != "bend":
+        return ""
+    if point.radius_m < SMALLEST_RUN_M:
+        return "not run"
+    return "drawn" if point.radius_m >= SMALLEST_DRAWN_M[point.gait] else "taken out"
+
+
 def mean_and_interval(values: Sequence[float]) -> tuple[float, float, float]:
     """Returns the mean of numbers and the ends of its 95 % interval by Student's t; NaN for ends of a single one."""
     mean, n = float(np.mean(values)), len(values)
@@ -198,7 +218,8 @@ def compare(store: Store, wanted: Sequence[Point]) -> list[Reading]:
         found = [_of_run(point, store.run(case)) for case in own]
         speeds, ways, out, passed = zip(*found, strict=True)
         mean = mean_and_interval(speeds)
-        readings.append(Reading(*point, len(own), *mean, sum(out), sum(passed), min(ways), own[0].command))
+        counts = sum(out), sum(passed), min(ways)
+        readings.append(Reading(*point, len(own), *mean, *counts, in_figure(point), own[0].command))
     return readings
 
 
@@ -228,10 +249,12 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
         panel_title(bends, "b) bends of 90 degrees, friction 0.3: speed (cm/s)")
         _draw(flat, [one for one in whole if one.ground == "flat"], "friction")
         _draw(bends, [one for one in whole if one.ground == "bend"], "radius_m")
-        for one in [one for one in whole if one.ground == "straight pipe"]:
-            bends.axhline(CM * one.speed_m_per_s, color="0.3", linestyle=(0, (4, 3)), label="straight pipe")
+        for one in [one for one in whole if one.ground == "straight pipe" and one.gait == "3x1"]:
+            bends.axhline(CM * one.speed_m_per_s, color="0.3", linestyle=(0, (4, 3)), label="3x1, straight pipe")
         bends.axhspan(*(CM * speed for speed in AXIS_M_PER_S), color="0.9", zorder=0, label="the authors' axis")
-        for height, (gait, least) in zip((0.97, 0.93), SMALLEST_DRAWN_M.items(), strict=True):
+        bends.axhline(CM * STRAIGHT_LABEL_M_PER_S, color="0.6", linestyle="dotted", label="their label: straight pipe")
+        for height, gait in ((0.97, "3x1"), (0.92, "3x1, touch")):
+            least = SMALLEST_DRAWN_M[gait]
             line = bends.get_xaxis_transform()
             bends.plot([least, 1.3], [height, height], color="0.4", linewidth=2.0, transform=line)
             bends.text(least - 0.02, height, f"they draw {gait}", transform=line, ha="right", va="center", fontsize=6.0)

@@ -21,6 +21,7 @@ from annelid_studies.riddle2025 import (
     cases,
     comparison_picture,
     comparison_table,
+    in_figure,
     mean_and_interval,
     points,
     repeated,
@@ -43,6 +44,7 @@ def reading(**changes: object) -> Reading:
         "came_out": 3,
         "passed": 2,
         "least_front_m": 1.1,
+        "figure": "taken out",
         "command": "annelid run x",
     }
     return Reading(**{**values, **changes})  # type: ignore[arg-type]
@@ -123,6 +125,14 @@ def test_the_foremost_ring_goes_ahead_on_flat_ground_and_along_a_bend(tmp_path: 
         run = open_run(simulate(config, tmp_path / point.ground, progress=False).path)
         way = ahead_m(track_of(run)) if point.ground == "flat" else passage_of(run).front_m
         assert way[-1] - way[0] > 0.1
+
+
+def test_what_the_authors_figure_has() -> None:
+    wanted = {0.3: "not run", 0.5: "taken out", 0.7: "drawn"}
+    for radius, word in wanted.items():
+        assert in_figure(Point("bend", "3x1", PIPE_FRICTION, radius, False)) == word
+    assert in_figure(Point("bend", "3x1, touch", PIPE_FRICTION, 0.5, False)) == "drawn"
+    assert in_figure(Point("flat", "3x1", PIPE_FRICTION, float("nan"), False)) == ""
 
 
 def test_the_bend_starts_as_far_ahead_as_the_authors_does() -> None:

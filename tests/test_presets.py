@@ -170,7 +170,7 @@ def test_the_four_segment_robot_s_modulus_lies_between_the_two_fits() -> None:
 def test_the_robot_with_muscles_differs_in_its_rings_and_timing_only() -> None:
     servos, muscles = (load_config(name).model_dump() for name in ("riddle2025", "riddle2025-muscles"))
     for tree in (servos, muscles):
-        for own in ("name", "summary", "duration_s", "sensor"):
+        for own in ("name", "summary", "duration_s", "sensor", "clock", "record"):
             del tree[own]
         del tree["body"]["rings"], tree["controller"]["gate_time_constant_ms"]
     assert servos == muscles
@@ -190,6 +190,8 @@ def test_the_crawlers_have_the_robot_s_body() -> None:
     """What a comparison of speeds forbids to tune: mass, mesh, springs, friction, and the rings' forces and speed."""
     own = {"name", "summary", "controller.gate_time_constant_ms", "sensor.tolerance_m"}
     assert differing("crawler", "riddle2025-muscles") == own
+    timed, untuned = (load_config(name).model_dump() for name in ("crawler-timed", "riddle2025-muscles"))
+    assert (timed["body"], timed["arena"]) == (untuned["body"], untuned["arena"])
     servos = {f"body.rings.{name}" for name in ("force_limit_N", "speed_limit_m_per_s")}
     assert differing("crawler-servo", "riddle2025") == own | servos | {"duration_s"}
     assert value_at("crawler-servo", "body.rings.speed_limit_m_per_s") == 0.064

@@ -151,13 +151,15 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     Returns:
         How far neighbours lift a segment, and the length beyond rest at which the releasing and the next segment are
         equally long; where the first is the larger, no tolerance is known to do. None for bodies that were not
-        measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s and muscles all round.
+        measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles all round and
+        springs that are at rest as drawn.
     """
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         return None
     damping_s, rings, rate = body.strands.material_damping_s, body.rings, body.springs.stiffness_N_per_m
     whole = body.formulation.has_rigid_crossings and rings.muscle is not None and rings.layout == "whole"
+    whole = whole and body.springs.rest_length_m is None
     # Beyond what was measured the lines that were fitted say nothing.
     if not whole or not rate or damping_s is None or not 0.05 <= damping_s <= 0.4:
         return None

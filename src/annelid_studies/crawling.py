@@ -27,7 +27,8 @@ GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""
 HEADLINES = ("riddle2025", "riddle2025-3x1", "riddle2025-2x2", "riddle2025-muscles", "crawler", "crawler-servo")
 """The gaits that have a headline by default."""
-PERTURBED = 8
+PERTURBED: Mapping[Effort, int] = {"full": 8, "quick": 2}
+"""How many runs with a friction of their own a headline has."""
 FRICTION_SPREAD = 0.01
 """Largest relative change of the friction in a perturbed run."""
 CONFIDENCE = 0.95
@@ -212,8 +213,10 @@ def number_of(judged: Judged, name: str) -> float | None:
     return None if judged.gait is None or judged.problem else getattr(judged.gait, name)
 
 
-def variants(gait: str) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+def variants(gait: str, effort: Effort) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
     """Returns what is changed in the perturbed runs of a gait, and in its finer ones by what is finer about them.
+
+    A quick study halves the step only.
 
     Raises:
         ConfigError: The gait is unknown or no 3D worm's.
@@ -221,12 +224,14 @@ def variants(gait: str) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]
     config = load_config(gait)
     if not isinstance(config.body, WormBody) or config.arena is None:
         raise ConfigError(f"{gait} is a planar worm: this study needs a 3D worm")
-    drawn = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, PERTURBED)
+    drawn = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, PERTURBED[effort])
     perturbed = [
         {"arena.friction": round(config.arena.friction * (1.0 + change), 6), "seed": seed}
         for seed, change in enumerate(drawn.tolist(), start=1)
     ]
     half = finer_steps(config)[0]
+    if effort == "quick":
+        return perturbed, {"half_step": half}
     # A quarter in two halvings: of 10 ms with control steps of 1 ms that is 2 ms.
     quarter = finer_steps(load_config(config.model_dump(), half))[0]
     names = ("element_more", "elements_more")
@@ -236,14 +241,14 @@ def variants(gait: str) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]
     return perturbed, {"half_step": half, "quarter_step": quarter, **elements}
 
 
-def headlines(store: Store, gaits: Sequence[str]) -> Iterator[Headline]:
+def headlines(store: Store, gaits: Sequence[str], effort: Effort) -> Iterator[Headline]:
     """Runs every gait with its perturbed and finer runs, and yields its headline as soon as it is there.
 
     Raises:
         ConfigError: A gait is unknown or no 3D worm's.
         AnnelidError: A run cannot be built or written.
     """
-    plans = {gait: variants(gait) for gait in gaits}
+    plans = {gait: variants(gait, effort) for gait in gaits}
     for gait, (perturbed, finer) in plans.items():
         cases = [Case(gait, changes) for changes in ({}, *perturbed, *finer.values())]
         store.compute(cases, gait)
@@ -277,5 +282,11 @@ def headline_table(found: Sequence[Headline]) -> TerminalTable:
         changed = ["" if part is None else f"{100 * part:+.1f} %" for part in one.changes(shown).values()]
         rows.append([one.gait, "" if mean is None else f"{mean:.4f}", ends, str(one.n_walking), *changed])
     finer = [name.replace("_", " ") for name in found[0].finer]
-    header = ["gait", COLUMNS["speed_body_lengths_per_s"], "95 % interval", f"walking of {PERTURBED}", *finer]
+    header = [
+        "gait",
+        COLUMNS["speed_body_lengths_per_s"],
+        "95 % interval",
+        f"walking of {len(found[0].perturbed)}",
+        *finer,
+    ]
     return terminal_table(Table(header, rows), "Gaits with error bars")

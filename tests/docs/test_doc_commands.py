@@ -70,6 +70,7 @@ LONG = {
     ("annelid", "limit-cycle"): ("ten seconds of one core", ()),
     ("annelid", "experiment", "weak-middle"): ("minutes", ("--quick",)),
     ("annelid", "experiment", "speed"): ("an hour", ("--quick",)),
+    ("annelid", "experiment", "gaits"): ("hours", ("--quick",)),
     ("annelid", "experiment", "slip"): ("minutes", ("--quick",)),
     ("annelid", "experiment", "slip-detector"): ("minutes", ("--quick",)),
     ("annelid", "experiment", "turning"): ("many minutes", ("--quick",)),

@@ -137,6 +137,7 @@ COMMANDS = {
     "bench": ["bench", "--quick", "--cases", "levels"],
     "uncertainty": ["run", "--uncertainty", "4", "--duration", "100", "--jobs", "2", "--out", "out"],
     "speed": ["experiment", "speed", "--jobs", "2"],
+    "gaits": ["experiment", "gaits", "--jobs", "2"],
     "weak-middle": ["experiment", "weak-middle", "--jobs", "2"],
     "slip": ["experiment", "slip", "--jobs", "2"],
     "slip-detector": ["experiment", "slip-detector", "--jobs", "2"],

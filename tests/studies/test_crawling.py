@@ -13,12 +13,18 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.tune import Judged
 from annelid_studies.crawling import (
+    FRICTION_SPREAD,
+    PERTURBED,
     VALUES,
+    Headline,
     Reading,
     changes_for,
     crawling_table,
+    headline_table,
     runs,
+    variants,
     write_figure,
+    write_headlines,
     write_readings,
 )
 
@@ -98,3 +104,57 @@ def test_a_reading_s_number_is_its_gait_s() -> None:
     assert walks.number("cost_of_transport") == 1.5
     assert walks.number("slip_ratio") is None
     assert rests.number("cost_of_transport") is None
+
+
+def test_perturbed_runs_differ_in_friction_and_seed_only_and_finer_ones_in_resolution_only() -> None:
+    own = load_config(MUSCLES)
+    assert isinstance(own.body, WormBody)
+    assert own.arena is not None
+    perturbed, finer = variants(MUSCLES, "full")
+    assert all(set(changes) == {"arena.friction", "seed"} for changes in perturbed)
+    changed = [changes["arena.friction"] / own.arena.friction - 1.0 for changes in perturbed]
+    assert len(set(changed)) == len({changes["seed"] for changes in perturbed}) == PERTURBED["full"]
+    assert min(changed) < 0.0 < max(changed)
+    assert all(abs(change) <= FRICTION_SPREAD + 1e-6 for change in changed)
+    configs = {what: load_config(MUSCLES, changes) for what, changes in finer.items()}
+    assert [configs[what].clock.physics_timestep_s for what in ("half_step", "quarter_step")] == [0.005, 0.002]
+    counts = []
+    for what in ("element_more", "elements_more"):
+        body = configs[what].body
+        assert isinstance(body, WormBody)
+        counts.append(body.mesh.elements_per_side - own.body.mesh.elements_per_side)
+    assert counts == [1, 2]
+    assert [len(of) for of in variants(MUSCLES, "quick")] == [PERTURBED["quick"], 1]
+
+
+def headline() -> Headline:
+    """Of a gait whose perturbed runs make 1, 2 and 3 m/s, but for one that stalls, and that is faster when finer."""
+    walks = [Judged(Gait(cycles=3, speed_m_per_s=speed), "") for speed in (1.0, 2.0, 3.0)]
+    stalls = Judged(None, "silent: stalled")
+    finer = {"half_step": Judged(Gait(cycles=3, speed_m_per_s=2.2), ""), "quarter_step": stalls}
+    return Headline(MUSCLES, Judged(Gait(cycles=3, speed_m_per_s=2.0), ""), [*walks, stalls], finer)
+
+
+def test_an_interval_is_student_s_over_the_runs_that_walk() -> None:
+    found = headline()
+    assert found.n_walking == 3
+    # 4.3027 is Student's t of 95 % for two degrees of freedom; the standard error is 1 / sqrt 3.
+    assert found.interval("speed_m_per_s") == pytest.approx(
+        (2.0, 2.0 - 4.3027 / 3**0.5, 2.0 + 4.3027 / 3**0.5), rel=1e-4
+    )
+    assert found.interval("slip_ratio") == (None, None, None)
+    assert found.changes("speed_m_per_s") == {"half_step": pytest.approx(0.1), "quarter_step": None}
+    assert found.problem == "run 4: silent: stalled; quarter_step: silent: stalled"
+
+
+def test_a_headline_is_a_row_with_what_is_not_known_left_empty(tmp_path: Path) -> None:
+    [row] = csv.DictReader(write_headlines([headline()], tmp_path / "gaits.csv").open())
+    assert (row["gait"], row["walking"], float(row["speed_m_per_s"])) == (MUSCLES, "3", 2.0)
+    assert float(row["speed_m_per_s_half_step"]) == pytest.approx(0.1)
+    assert (row["speed_m_per_s_quarter_step"], row["slip_ratio"]) == ("", "")
+    assert headline_table([headline()]).row_count == 1
+
+
+def test_a_planar_worm_has_no_headline() -> None:
+    with pytest.raises(ConfigError, match="needs a 3D worm"):
+        variants("riddle2022-planar", "full")

@@ -72,6 +72,7 @@ def gaits_command(
         typer.Argument(metavar="[PRESET|FILE.toml]...", help="Gaits.  [default: those of the six-segment robot]"),
     ] = None,
     output: Output = Path("gaits"),
+    quick: Annotated[bool, typer.Option("--quick", help="Two perturbed runs, and half the step only.")] = False,
     jobs: Jobs = None,
     cluster: ClusterName = None,
     quiet: Quiet = False,
@@ -86,6 +87,7 @@ def gaits_command(
     take longest; docs/speed_of_travel.md explains the results.
 
     \b
+    annelid experiment gaits --quick
     annelid experiment gaits crawler
     annelid experiment gaits crawler tune/best.toml -o mine
     """
@@ -94,7 +96,7 @@ def gaits_command(
     found: list[crawling.Headline] = []
     path = output / "gaits.csv"
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
-        for one in crawling.headlines(store, gaits or crawling.HEADLINES):
+        for one in crawling.headlines(store, gaits or crawling.HEADLINES, "quick" if quick else "full"):
             found.append(one)
             crawling.write_headlines(found, path)
     print_results((path,), crawling.headline_table(found), quiet=quiet)

@@ -189,7 +189,9 @@ def differing(one: str, other: str) -> set[str]:
 def test_the_crawlers_have_the_robot_s_body() -> None:
     """What a comparison of speeds forbids to tune: mass, mesh, springs, friction, and the rings' forces and speed."""
     own = {"name", "summary", "controller.gate_time_constant_ms", "sensor.tolerance_m"}
-    assert differing("crawler", "riddle2025-muscles") == own
+    assert differing("crawler", "riddle2025-muscles") == own - {"sensor.tolerance_m"} | {
+        "controller.activation_slope_per_mV"
+    }
     timed, untuned = (load_config(name).model_dump() for name in ("crawler-timed", "riddle2025-muscles"))
     assert (timed["body"], timed["arena"]) == (untuned["body"], untuned["arena"])
     servos = {f"body.rings.{name}" for name in ("force_limit_N", "speed_limit_m_per_s")}

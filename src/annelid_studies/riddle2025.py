@@ -244,9 +244,9 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
     """Draws speed over friction and over the bends' radius, with what the authors' figure says of the latter."""
     whole = [one for one in readings if not one.half_step]
     with canvas(3.4) as figure:
-        flat, bends = figure.subplots(1, 2, sharey=True)
+        flat, bends = figure.subplots(1, 2)
         panel_title(flat, "a) flat ground: speed (cm/s)")
-        panel_title(bends, "b) bends of 90 degrees, friction 0.3: speed (cm/s)")
+        panel_title(bends, "b) bends, friction 0.3: speed (cm/s)")
         _draw(flat, [one for one in whole if one.ground == "flat"], "friction")
         _draw(bends, [one for one in whole if one.ground == "bend"], "radius_m")
         for one in [one for one in whole if one.ground == "straight pipe" and one.gait == "3x1"]:
@@ -261,9 +261,11 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
         flat.set_xlabel("friction of the ground")
         bends.set_xlabel("radius of the centre line (m)")
         flat.set_ylim(bottom=0.0)
+        bends.set_ylim(0.0, 1.3 * CM * AXIS_M_PER_S[1])
+        bends.set_xlim(0.1, 1.4)
         for axes in (flat, bends):
             if axes.get_legend_handles_labels()[0]:
-                axes.legend(loc="lower right")
+                axes.legend(loc="best" if axes is flat else "lower right")
         return save_both(figure, stem)
 
 

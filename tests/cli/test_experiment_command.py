@@ -77,7 +77,10 @@ def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
     assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
 
 
-@pytest.mark.parametrize("command", ["weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes"])
+STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025")
+
+
+@pytest.mark.parametrize("command", STUDIES)
 def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, command: str) -> None:
     Path("taken").write_text("mine", encoding="utf-8")
     done = annelid("experiment", command, "-o", "taken", "--quiet")

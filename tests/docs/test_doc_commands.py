@@ -76,6 +76,7 @@ LONG = {
     ("annelid", "experiment", "slip-detector"): ("minutes", ("--quick",)),
     ("annelid", "experiment", "turning"): ("many minutes", ("--quick",)),
     ("annelid", "experiment", "pipes"): ("an hour", ("--quick",)),
+    ("annelid", "experiment", "riddle2025"): ("an hour", ("--quick",)),
 }
 """Commands that only the slow tests execute: why, and what shortens them there."""
 

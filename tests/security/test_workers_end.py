@@ -143,6 +143,7 @@ COMMANDS = {
     "slip-detector": ["experiment", "slip-detector", "--jobs", "2"],
     "turning": ["experiment", "turning", "--jobs", "2"],
     "pipes": ["experiment", "pipes", "--jobs", "2"],
+    "riddle2025": ["experiment", "riddle2025", "--jobs", "2"],
 }
 """Every command that has workers; `bench` takes no --jobs."""
 

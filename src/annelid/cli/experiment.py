@@ -225,6 +225,36 @@ def pipes_command(
     print_results(written, pipes_table(readings), quiet=quiet)
 
 
+@study("riddle2025")
+def riddle2025_command(
+    output: Output = Path("riddle2025"),
+    quick: Annotated[bool, typer.Option("--quick", help="One friction, and one bend.")] = False,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    quiet: Quiet = False,
+) -> None:
+    """Compare the six-segment robot with its authors' model, on their axes.
+
+    The timed patterns 3x1 and 2x2 on flat ground over friction, with servos and with the muscles of the authors' model;
+    and 3x1, straight ahead and turning away from contact, through bends of 90 degrees in a pipe of 0.20 m. Speeds are
+    defined as in the authors' scripts. Each point is at least three runs, whose frictions differ by a percent.
+
+    Writes riddle2025.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one
+    goes on. 54 runs of half a minute to three minutes each; docs/validation.md explains the results.
+
+    \b
+    annelid experiment riddle2025 --quick
+    annelid experiment riddle2025 -o riddle2025
+    """
+    from annelid_studies.riddle2025 import Reading, compare, comparison_picture, comparison_table, points
+    from annelid_studies.tables import write_fields
+
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        readings = compare(store, points(quick))
+    path = write_fields(Reading, readings, output / "riddle2025.csv")
+    print_results((path, comparison_picture(readings, path.with_suffix(""))), comparison_table(readings), quiet=quiet)
+
+
 @study("load-frame")
 def load_frame_command(
     preset: NamedPreset = RIGID_PRESET,

@@ -41,8 +41,7 @@ def main() -> None:
         plain = case(PLAIN, friction)
         pairs += [
             ("all", friction, plain, case(PRESSURE, friction)),
-            ("no landing", friction, plain, without(friction, "landing")),
-            ("no hold, no landing", friction, plain, case(EXTENSION, friction)),
+            ("no hold", friction, plain, case(EXTENSION, friction)),
             ("no exchange", friction, plain, without(friction, "exchange")),
         ]
     low = TUNED_AT[0]

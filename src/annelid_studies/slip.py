@@ -64,7 +64,7 @@ def case(feedback: str, friction: float, preset: str = PRESET) -> Case:
     if feedback != PLAIN:
         changes["controller"] = {"kind": "sns-pressure", "network": load_config(preset).controller.model_dump()}
     if feedback == EXTENSION:
-        changes["controller"] |= {"hold": 0.0, "landing": 0.0}
+        changes["controller"]["hold"] = 0.0
     return Case(preset, changes)
 
 

@@ -23,7 +23,6 @@ SENSOR = StretchSensor(tolerance_m=0.005, startup_hold_s=0.0)
 ALONE: dict[str, Any] = {
     "hold": 0.0,
     "release": 0.0,
-    "landing": 0.0,
     "exchange": 0.0,
     "light_N": 1.0,
     "full_N": 6.0,
@@ -71,18 +70,6 @@ def test_a_stretched_segment_holds_only_as_far_as_it_bears_load(load: float, sha
     assert reached[1] == pytest.approx(share * hold * 20.0, abs=0.3)
 
 
-@pytest.mark.parametrize("load", [0.0, 3.5, 20.0])
-def test_landing_holds_the_segment_before_a_loaded_one_as_its_own_load_would(load: float) -> None:
-    """Segment 2, stretched and free, by the load of segment 3 as by its own."""
-    longer = np.full(N, 0.02)
-    follower = controller(**(ALONE | {"landing": 0.6}))
-    itself = controller(**(ALONE | {"hold": 0.6}))
-    by_follower = sensory(follower, np.array([0.0, 0.0, load, 0.0]), longer, 0.04)
-    by_itself = sensory(itself, np.array([0.0, load, 0.0, 0.0]), longer, 0.04)
-    assert by_follower[1] == by_itself[1]
-    assert (by_follower[1] > 1.0) == (load > 1.0)
-
-
 @pytest.mark.parametrize("exchange", [0.5, 0.9])
 def test_a_contracting_segment_ends_the_contraction_two_segments_before(exchange: float) -> None:
     """Segment 1 contracts at the start; segment 2, at rest length, sends no relay to segment 3, two before it."""
@@ -107,7 +94,7 @@ def test_the_last_segment_lets_the_first_one_go() -> None:
 
 
 def test_without_conductances_it_is_the_paper_s_network_to_the_last_bit() -> None:
-    section = PressureSns(hold=0.0, release=0.0, landing=0.0, exchange=0.0)
+    section = PressureSns(hold=0.0, release=0.0, exchange=0.0)
     ours, papers = (
         PressureController(section, SENSOR, N, N, 0.001),
         SnsController(section.network, SENSOR, N, N, 0.001),
@@ -124,7 +111,7 @@ def test_the_network_extends_the_paper_s() -> None:
     assert list(extended.neurons)[: len(names)] == names
     assert len(extended.neurons) == len(names) + 2 * N
     assert extended.connections[: len(plain.connections)] == plain.connections
-    assert len(extended.connections) == len(plain.connections) + 4 * N
+    assert len(extended.connections) == len(plain.connections) + 3 * N
 
 
 @pytest.mark.parametrize(("n_segments", "expected"), [(3, 0), (4, 4), (6, 6)])
@@ -152,11 +139,11 @@ def test_a_stride_is_so_many_steps(start_s: float) -> None:
 
 
 def test_the_first_segment_is_not_held_by_its_load_at_the_start() -> None:
-    """Without landing its first contraction is the paper's; without the hold at the start its own load ends it."""
+    """Its first contraction is the paper's; without the hold at the start its own load ends it."""
     lengths = []
     for startup_hold_s in (0.2, 0.0):
         sensor = StretchSensor(tolerance_m=0.005, startup_hold_s=startup_hold_s)
-        ours = PressureController(PressureSns(landing=0.0), sensor, N, N, 0.001)
+        ours = PressureController(PressureSns(), sensor, N, N, 0.001)
         papers = SnsController(PressureSns().network, StretchSensor(startup_hold_s=0.2), N, N, 0.001)
         counts = [0, 0]
         for i in range(190):

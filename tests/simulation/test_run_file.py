@@ -149,6 +149,19 @@ def test_the_name_decided_what_is_published_up_to_schema_1(name: str, published:
     assert migrated(new).attrs["config"] == json.dumps(tree)
 
 
+@pytest.mark.parametrize("landing", [0.0, 0.1])
+def test_a_run_in_which_landing_acted_says_so(landing: float) -> None:
+    config = load_config({"body": {"kind": "worm"}, "controller": {"kind": "sns-pressure"}})
+    tree = config.model_dump(mode="json")
+    tree["controller"]["landing"] = landing
+    attrs = {"schema_version": 2, "config": json.dumps(tree)}
+    read = migrated(xarray.Dataset({"warnings": ((), "it was cold")}, attrs=attrs))
+    assert RunConfig.model_validate_json(read.attrs["config"]) == config
+    doubts = str(read["warnings"].values).splitlines()
+    assert doubts[0] == "it was cold"
+    assert [doubt.startswith("controller.landing was 0.1") for doubt in doubts[1:]] == [True] * (landing > 0)
+
+
 @pytest.mark.parametrize("config", ["{", "[]", '"riddle2023"', '{"name": 3}', "[" * 100_000])
 def test_what_is_wrong_with_an_old_configuration_is_left_to_its_reader(config: str) -> None:
     assert migrated(xarray.Dataset(attrs={"config": config})).attrs["config"] == config

@@ -41,7 +41,7 @@ def test_only_the_feedback_differs(preset: str) -> None:
     assert isinstance(extension.controller, PressureSns)
     assert isinstance(pressure.controller, PressureSns)
     assert plain.controller == extension.controller.network == pressure.controller.network
-    assert extension.controller == pressure.controller.model_copy(update={"hold": 0.0, "landing": 0.0})
+    assert extension.controller == pressure.controller.model_copy(update={"hold": 0.0})
     assert pressure.controller == PressureSns(network=plain.controller)
     for one in (extension, pressure):
         assert one.model_copy(update={"controller": plain.controller}) == plain

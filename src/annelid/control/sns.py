@@ -383,7 +383,7 @@ class PressureSns(ControllerKind):
     """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
 
     A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
-    the contraction two segments before; any of the four strengths may be 0. Lengths and loads are those of the
+    the contraction two segments before; any of the three strengths may be 0. Lengths and loads are those of the
     six-segment robot (0.16 m radius, 19 N).
     """
 
@@ -392,7 +392,6 @@ class PressureSns(ControllerKind):
         "controller.network.gate_time_constant_ms=80:900:log",
         "controller.hold=0:2",
         "controller.release=0:6",
-        "controller.landing=0:0.2",
         "controller.exchange=0:2",
         "sensor.tolerance_m=0.001:0.03:log",
     )
@@ -406,7 +405,6 @@ class PressureSns(ControllerKind):
     release: float = Field(
         default=1.8, ge=0, le=20, description="sensors' currents that a full extension neuron cancels"
     )
-    landing: Strength = Field(default=0.1, description="potential over R that it gives the sensory neuron before")
     exchange: Strength = Field(default=0.8, description="potential over R that a contraction gives the one two before")
     pressure_time_constant_s: float = Field(
         default=0.03, ge=1e-3, le=10, description="time constant of the pressure neurons"
@@ -451,7 +449,7 @@ class PressureController(PeristalsisController[PressureSns]):
     name = "synthetic nervous system with pressure feedback"
 
     def _network(self, n_segments: int) -> Network:
-        strengths = self._config.model_dump(include={"hold", "release", "landing", "exchange"})
+        strengths = self._config.model_dump(include={"hold", "release", "exchange"})
         tau_ms = 1e3 * self._time_constant_s("pressure_time_constant_s")
         return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=tau_ms)
 

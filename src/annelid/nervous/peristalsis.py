@@ -222,14 +222,13 @@ def pressure_network(
     *,
     hold: float = 1.0,
     release: float = 1.8,
-    landing: float = 0.1,
     exchange: float = 0.8,
     pressure_ms: float = 30.0,
 ) -> Network:
     """Builds the peristalsis network with pressure feedback against slip; the design is our own.
 
     On a body with weight a contracting segment stretches its neighbour, whose stretch sensor then switches off too
-    early: several segments contract at once, and the front drags along the ground. Four kinds of synapse onto sensory
+    early: several segments contract at once, and the front drags along the ground. Three kinds of synapse onto sensory
     neurons, which keep a segment expanded and end its contraction, even the wave out, so that no segment leaves the
     ground before the one ahead has its length (the aim of Daltorio et al. 2013). Before the first segment comes the
     last. Neurons ``pressure_s`` and ``extension_s`` of every segment come behind those of `peristalsis_network`, with
@@ -242,7 +241,6 @@ def pressure_network(
             expanded, stretched or not, and one that lands becomes an anchor.
         release: Currents of a stretch sensor that a full extension neuron takes from the sensory neuron of the next
             segment, which leaves the ground once this one is extended.
-        landing: As ``hold``, for the segment before: it stays expanded while its follower stands on the ground.
         exchange: Potential, over R, that a contraction gives the sensory neuron two segments before, so that one
             segment shortens while another one lengthens. Three segments have none: there it would be the next one.
         pressure_ms: Time constant of the pressure neurons, ms.
@@ -250,7 +248,7 @@ def pressure_network(
     Raises:
         ConfigError: As `peristalsis_network`; a strength below 0, or beyond what the excitatory reversal can give.
     """
-    require_at_least(0, hold=hold, release=release, landing=landing, exchange=exchange)
+    require_at_least(0, hold=hold, release=release, exchange=exchange)
     p = parameters or PeristalsisParameters()
     network, signals, leak = peristalsis_network(n_segments, p), p.signals, p.leak_conductance_uS
     segments = range(1, n_segments + 1)
@@ -258,11 +256,9 @@ def pressure_network(
         network.add_neuron(f"pressure_{segment}", Neuron(pressure_ms * leak, leak))
         network.add_neuron(f"extension_{segment}", signals.neuron)
     for segment in segments:
-        before, two_before = ((segment - 1 - steps) % n_segments + 1 for steps in (1, 2))
+        two_before = (segment - 3) % n_segments + 1
         if hold > 0:
             network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", transmission(hold, signals))
-        if landing > 0:
-            network.add_synapse(f"pressure_{segment}", f"sensory_{before}", transmission(landing, signals))
         if exchange > 0 and n_segments > 3:
             network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", transmission(exchange, signals))
         if release > 0:

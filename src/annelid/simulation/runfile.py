@@ -30,7 +30,7 @@ MESSAGE_BYTES = 512
 WARNINGS = "warnings"
 WARNING_BYTES = 8192
 SCHEMA = "schema_version"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 """Of the file's names and their meanings; a change that an older reader would take for something else raises it, and
 `migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
@@ -127,13 +127,16 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
 
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
-    Up to schema 1 the name of a configuration decided which published numbers its runs were compared with.
+    Up to schema 1 the name of a configuration decided which published numbers its runs were compared with. Up to schema
+    2 the controller ``sns-pressure`` had a field ``landing``; a run in which it acted says so among its warnings.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
         data = data.assign({name: value for name, value in added.items() if name not in data})
     if data.attrs.get(SCHEMA, 0) < 2:
         data = data.assign_attrs(config=_with_published(data.attrs["config"]))
+    if data.attrs.get(SCHEMA, 0) < 3:
+        data = _without_landing(data)
     return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
 
 
@@ -145,6 +148,18 @@ def _with_published(config: str) -> str:
     except (UnreadableText, KeyError, TypeError):
         pass  # What is wrong with it, its reader says.
     return config
+
+
+def _without_landing(data: xarray.Dataset) -> xarray.Dataset:
+    try:
+        tree = parse_json(data.attrs["config"], "the configuration")
+        strength = tree["controller"].pop("landing")
+    except (UnreadableText, KeyError, TypeError, AttributeError):
+        return data  # It had none; or what is wrong with it, its reader says.
+    if strength:
+        gone = f"controller.landing was {strength}, a field that is gone: its command does not repeat the run"
+        data = data.assign({WARNINGS: ((), "\n".join(filter(None, (str(data[WARNINGS].values), gone))))})
+    return data.assign_attrs(config=json.dumps(tree))
 
 
 @contextmanager

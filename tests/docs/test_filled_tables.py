@@ -64,7 +64,6 @@ NO_WORM = {
 """Result files that are not of presets, and why."""
 
 STALE = (
-    "energy_balance.csv",
     "pipes.csv",
     "slip.csv",
     "slip_crawler.csv",

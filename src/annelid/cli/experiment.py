@@ -240,7 +240,7 @@ def riddle2025_command(
     defined as in the authors' scripts. Each point is at least three runs, whose frictions differ by a percent.
 
     Writes riddle2025.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one
-    goes on. 54 runs of half a minute to three minutes each; docs/validation.md explains the results.
+    goes on. 52 runs of a quarter of a minute to two minutes each; docs/validation.md explains the results.
 
     \b
     annelid experiment riddle2025 --quick

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from annelid.config import load_config
+from annelid.config import ControllerKind, load_config
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 
@@ -39,6 +39,12 @@ def _interruptions_are_heeded() -> Iterator[None]:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@pytest.fixture
+def forgotten_controllers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kinds of controllers that a test defines are known to it alone."""
+    monkeypatch.setattr(ControllerKind.registry, "_known", dict(ControllerKind.registry.all()))
 
 
 class InThisProcess(Executor):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import ControllerKind, check_config, load_config
@@ -140,6 +140,7 @@ def test_delay_shows_what_was(late: int) -> None:
         assert all(np.array_equal(getattr(seen, name), getattr(was, name)) for name in SENSORS)
 
 
+@settings(max_examples=20)
 @given(st.floats(0.1, 0.9), st.integers(0, 20))
 def test_a_lost_sensor_keeps_its_last_reading(share: float, seed: int) -> None:
     true, read = sensed(Trial(loss=share, loss_s=0.02), 400, seed)
@@ -250,14 +251,13 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, forgotten_controllers: None) -> str:
     """Name of a module with controllers in the working directory."""
     name = f"own_{tmp_path.name.replace('-', '_')}"
     (tmp_path / f"{name}.py").write_text(OWN.replace("test-own", f"test-{name}"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(VARIABLE, "")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(ControllerKind.registry, "_known", dict(ControllerKind.registry.all()))
     return name
 
 

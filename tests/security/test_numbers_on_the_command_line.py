@@ -35,6 +35,7 @@ WITH: dict[str, tuple[str, ...]] = {
     "tune": ("nothere.toml",),
     "paper": ("--only", "nothing"),
     "robustness": ("--controller", "nothing"),
+    "challenge": ("nothing",),
     "experiment": ("--cluster", "nothing"),
     "experiment load-frame": ("riddle2022-planar",),
 }

@@ -132,21 +132,21 @@ class SeedReader:
         return np.full(self._n_muscles, self._level)
 
 
-class SeedReading(ControllerKind):
-    """A kind that looks at the whole configuration and at the body that it is built for."""
-
-    kind: Literal["seed-reading"] = "seed-reading"
-
-    def build(self, config: RunConfig, plant: Plant) -> Controller:
-        model = getattr(plant, "model", None)
-        ground = 0.0 if model is None else float(model.geom_friction[0, 0])
-        arena = 0.0 if config.arena is None else config.arena.friction
-        return SeedReader(0.1 * config.seed + arena + 100 * config.sensor.noise_m + ground, plant.n_muscles)
-
-
-@pytest.mark.usefixtures("short")
+@pytest.mark.usefixtures("short", "forgotten_controllers")
 def test_an_entrant_that_reads_the_seed_reads_nothing(tmp_path: Path) -> None:
     """It contracts alike in every draw, though its runs have other seeds, friction and noise."""
+
+    class SeedReading(ControllerKind):
+        """A kind that looks at the whole configuration and at the body that it is built for."""
+
+        kind: Literal["seed-reading"] = "seed-reading"
+
+        def build(self, config: RunConfig, plant: Plant) -> Controller:
+            model = getattr(plant, "model", None)
+            ground = 0.0 if model is None else float(model.geom_friction[0, 0])
+            arena = 0.0 if config.arena is None else config.arena.friction
+            return SeedReader(0.1 * config.seed + arena + 100 * config.sensor.noise_m + ground, plant.n_muscles)
+
     mine, store = Entrant(controller={"kind": "seed-reading"}), Store(tmp_path)
     wanted = trials({"mine": mine}, ["noise"], [1000, 1001], duration_s=0.06)
     assert not any(one.refused for one in challenge(store, wanted))

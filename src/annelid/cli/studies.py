@@ -311,7 +311,8 @@ def challenge_command(
         report.write_tasks(ranked, taus, output / "tasks.csv"),
         report.ranking_figure(ranked, output / "challenge"),
     ]
-    print_results(written, report.ranking_table(ranked), report.speed_table(ranked, taus), quiet=quiet)
+    tables = report.ranking_table(ranked), report.cost_table(ranked), report.speed_table(ranked, taus)
+    print_results(written, *tables, quiet=quiet)
 
 
 def sweep_command(

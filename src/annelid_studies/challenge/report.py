@@ -41,6 +41,15 @@ def ranking_table(found: Sequence[Standing]) -> TerminalTable:
         "travels in order": lambda one: _with_interval(one.robust, one.robust_low, one.robust_high),
         "in time": lambda one: _with_interval(one.in_time, one.in_time_low, one.in_time_high),
         "travels": lambda one: _with_interval(one.travels, one.travels_low, one.travels_high),
+    }
+    overall = [one for one in found if one.task == ALL]
+    return terminal_table(tabulated(overall, columns), "All tasks", caption="with 95 % intervals over draws")
+
+
+def cost_table(found: Sequence[Standing]) -> TerminalTable:
+    """Lays out what speed costs over all tasks, and how many runs were refused."""
+    columns: Mapping[str, Callable[[Standing], str]] = {
+        "entrant": lambda one: one.entrant,
         "refused": lambda one: f"{one.refused:.2f}",
         "recovery (s)": lambda one: _with_interval(one.recovery_s, np.nan, np.nan),
         "slip (J/m)": lambda one: _with_interval(one.slip_J_per_m, np.nan, np.nan, 1),
@@ -48,7 +57,7 @@ def ranking_table(found: Sequence[Standing]) -> TerminalTable:
         "motors (J/m)": lambda one: _with_interval(one.electric_J_per_m, np.nan, np.nan, 0),
     }
     overall = [one for one in found if one.task == ALL]
-    return terminal_table(tabulated(overall, columns), "All tasks", caption="with 95 % intervals over draws")
+    return terminal_table(tabulated(overall, columns), "Costs")
 
 
 def speed_table(found: Sequence[Standing], taus: Sequence[Mapping[str, float]] = ()) -> TerminalTable:

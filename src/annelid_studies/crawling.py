@@ -7,6 +7,7 @@ either way, with its 95 % interval, and beside it the change of each number at f
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -20,7 +21,7 @@ from annelid.errors import ConfigError
 from annelid.experiment import Case, Judged, Store, finer_steps, judge, more_elements
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import grouped, terminal_table
+from annelid_studies.tables import grouped, mean_and_interval, terminal_table
 from annelid_studies.worms import Effort
 
 GAITS = ("riddle2025-muscles", "crawler")
@@ -31,7 +32,6 @@ PERTURBED: Mapping[Effort, int] = {"full": 8, "quick": 2}
 """How many runs with a friction of their own a headline has."""
 FRICTION_SPREAD = 0.01
 """Largest relative change of the friction in a perturbed run."""
-CONFIDENCE = 0.95
 
 Quantity = Literal["friction", "segments"]
 VALUES: Mapping[Quantity, Mapping[Effort, tuple[float, ...]]] = {
@@ -189,17 +189,10 @@ class Headline(NamedTuple):
         return "; ".join(f"{name}: {one.problem}" for name, one in named.items() if one.problem)
 
     def interval(self, name: str) -> tuple[float | None, float | None, float | None]:
-        """Returns mean, lower and upper end of a number over the perturbed runs that walk, by Student's t."""
-        from scipy.stats import sem, t
-
+        """Returns mean, lower and upper end of a number over the perturbed runs that walk; None where there is none."""
         known = [one for judged in self.perturbed if (one := number_of(judged, name)) is not None]
-        if not known:
-            return None, None, None
-        mean = float(np.mean(known))
-        if len(known) == 1:
-            return mean, None, None
-        half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(known) - 1) * sem(known))
-        return mean, mean - half, mean + half
+        mean, low, high = (None if isnan(end) else end for end in mean_and_interval(known))
+        return mean, low, high
 
     def changes(self, name: str) -> dict[str, float | None]:
         """Returns by how much of itself a number changes in each finer run; None where one of both does not walk."""

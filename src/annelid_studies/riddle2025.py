@@ -16,14 +16,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from rich.table import Table as TerminalTable
-from scipy.stats import t as student
 
 from annelid.analysis import Track, passage_of, track_of
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.tables import grouped, tabulated, terminal_table
+from annelid_studies.tables import grouped, mean_and_interval, tabulated, terminal_table
 
 CM = 100.0
 Ground = Literal["flat", "straight pipe", "bend"]
@@ -81,7 +80,6 @@ BEND_S, BEND_S_PER_M = 36.0, 25.0
 last 100 s."""
 SHARES = (1.0, 0.99, 1.01)
 """Factors of a point's friction in its runs."""
-CONFIDENCE = 0.95
 
 
 class Point(NamedTuple):
@@ -193,15 +191,6 @@ def in_figure(point: Point) -> str:
     if point.radius_m < SMALLEST_RUN_M:
         return "not run"
     return "drawn" if point.radius_m >= SMALLEST_DRAWN_M[point.gait] else "taken out"
-
-
-def mean_and_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Returns the mean of numbers and the ends of its 95 % interval by Student's t; NaN for ends of a single one."""
-    mean, n = float(np.mean(values)), len(values)
-    if n < 2:
-        return mean, nan, nan
-    half = float(student.ppf(0.5 * (1 + CONFIDENCE), n - 1) * np.std(values, ddof=1) / np.sqrt(n))
-    return mean, mean - half, mean + half
 
 
 def compare(store: Store, wanted: Sequence[Point]) -> list[Reading]:

@@ -16,7 +16,7 @@ MINE = "[mine]\ncontroller = {kind = 'sine'}\ntuned_on = [0, 1001]\n"
         (("none:Controller",), "none cannot be imported"),
         (("--task", "slop"), "unknown task 'slop': did you mean 'slope'?"),
         (("--against", "none.csv"), "none.csv is no runs.csv"),
-        (("timed", "--tune", "--first-seed", "999", "--draws", "2"), "seeds 1000 are test seeds"),
+        (("--with", "none.csv"), "none.csv is no runs.csv"),
     ],
 )
 def test_what_cannot_be_ranked_is_refused_in_a_sentence(

@@ -293,6 +293,12 @@ def test_what_is_no_controller_is_refused(own: str, name: str, words: str) -> No
         own_controller(name.format(own=own))
 
 
+def test_an_error_inside_the_users_module_is_told(own: str, tmp_path: Path) -> None:
+    (tmp_path / "broken_inside.py").write_text("import math\nmath.no_such_function()\n")
+    with pytest.raises(ConfigError, match=r"cannot be imported: module 'math' has no attribute"):
+        own_controller("broken_inside:Controller")
+
+
 def test_a_file_makes_no_controller_known(own: str) -> None:
     with pytest.raises(ConfigError, match=r"controller.*must be one of"):
         check_config({"controller": {"kind": f"{own}:clock"}, "body": {"kind": "riddle2022"}})

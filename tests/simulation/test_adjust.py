@@ -94,6 +94,20 @@ def test_other_values_changed_live_are_values_built_in(change: dict[str, Any]) -
     np.testing.assert_array_equal(posture_after(live), posture_after(twin))
 
 
+def test_a_worm_under_trial_goes_on_from_where_it_is() -> None:
+    trial = {"drift_m_per_s": 1e-3, "loss": 0.3, "delay_s": 0.05, "backlash": 0.2}
+    before = load_config("riddle2023-rods", {"trial": trial, "seed": 3})
+    after = load_config("riddle2023-rods", {"trial": trial | {"loss": 0.6}, "seed": 3, "sensor.tolerance_m": 0.03})
+    simulation = running(before)
+    twin = built_with(after, simulation)
+    live = adjusted(simulation, before, after)
+    np.testing.assert_array_equal(posture_after(live), posture_after(twin))
+    assert isinstance(live.controller, Stateful)
+    assert isinstance(twin.controller, Stateful)
+    states = live.controller.get_state(), twin.controller.get_state()
+    assert all(np.array_equal(states[0][name], states[1][name]) for name in states[0] | states[1])
+
+
 def test_noise_changed_live_reaches_the_controller() -> None:
     before = load_config("riddle2023-rods")
     after = load_config("riddle2023-rods", {"sensor.noise_m": 0.005})

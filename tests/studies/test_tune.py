@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import log
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -298,6 +299,16 @@ def test_what_does_not_walk_is_told_why_and_penalised(outcome: Outcome, gait: Ga
     assert (judged.gait is None) == bool(outcome.message)
     for objective in OBJECTIVES.values():
         assert (judged.value(objective) == objective.penalty) == bool(words)
+
+
+@pytest.mark.parametrize(("share", "says"), [(0.29, ""), (0.31, "took 31%"), (-0.4, "added 40%"), (None, "")])
+def test_a_gait_that_lives_on_the_integrator_is_none_where_that_is_asked(share: float | None, says: str) -> None:
+    energy: Any = SimpleNamespace(numerical_share=share)
+    walking = replace(an_outcome(), gait=replace(a_gait(), energy=energy))
+    assert judge(walking).problem == ""
+    found = judge(walking, 0.3)
+    assert says in found.problem
+    assert found.value(OBJECTIVES["speed"]) == (0.0 if says else 0.1)
 
 
 def test_the_best_gait_is_a_file_that_makes_the_same_run(tmp_path: Path) -> None:

@@ -247,9 +247,8 @@ def challenge_command(
     ] = None,
     draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
     first_seed: Annotated[
-        int | None,
-        typer.Option(min=0, max=2**32 - 1, help="Seed of the first draw.  [default: 1000, or 0 with --tune]"),
-    ] = None,
+        int, typer.Option(min=0, max=2**32 - 1, help="Seed of the first draw; those below 1000 are for training.")
+    ] = 1000,
     quick: Annotated[
         bool, typer.Option("--quick", help="Three tasks, three entrants, two draws, short runs: under five minutes.")
     ] = False,
@@ -260,9 +259,12 @@ def challenge_command(
             metavar="RUNS.csv", help="Compare rankings with another call's, by Kendall's tau; may be repeated."
         ),
     ] = None,
-    tune: Annotated[
-        bool, typer.Option("--tune", help="Instead, tune the entrants on training draws, as their search says.")
-    ] = False,
+    known: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--with", metavar="RUNS.csv", help="Take the runs that another call has computed; may be repeated."
+        ),
+    ] = None,
     output: Output = Path("challenge"),
     jobs: Jobs = None,
     cluster: ClusterName = None,
@@ -279,30 +281,25 @@ def challenge_command(
     annelid challenge --quick                                   in minutes
     annelid challenge                                           all entrants, all tasks
     annelid challenge mine:Controller --task slope --draws 4    your own, against the reference
-    annelid challenge timed sine --tune -o tuning               what timed and sine are set to
+    annelid challenge mine.toml --with published/runs.csv       only yours is computed
     annelid challenge --half-step -o half
     annelid challenge --against half/runs.csv                   is the ranking the same?
     """
     from annelid_studies.challenge import report, tasks
-    from annelid_studies.challenge.ranking import Standing, agreement, mean_speeds, read_speeds, standings
-    from annelid_studies.challenge.scores import Score, challenge
-    from annelid_studies.challenge.tuning import tune_all
+    from annelid_studies.challenge.ranking import Standing, agreement, mean_speeds, standings
+    from annelid_studies.challenge.scores import Score, challenge, read_scores
 
     if quick:
         entrants, task = entrants or [*tasks.QUICK_ENTRANTS], task or [*tasks.QUICK_TASKS]
         draws = min(draws, tasks.QUICK_DRAWS)
-    seed = (0 if tune else tasks.FIRST_TEST_SEED) if first_seed is None else first_seed
-    found, seeds = tasks.find_entrants(entrants or []), range(seed, seed + draws)
-    others = [read_speeds(path) for path in against or []]
-    if tune:
-        with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
-            written = tune_all(store, {name: found[name] for name in entrants or found}, seeds, output)
-        print_results(written, quiet=quiet)
-        return
+    seeds = range(first_seed, first_seed + draws)
+    others = [mean_speeds(read_scores(path)) for path in against or []]
+    earlier = [one for path in known or [] for one in read_scores(path)]
     duration_s = tasks.QUICK_DURATION_S if quick else None
-    wanted = tasks.trials(found, task or [], seeds, half_step=half_step, duration_s=duration_s)
+    found = tasks.find_entrants(entrants or [])
+    wanted = tasks.entries(found, task or [], seeds, half_step=half_step, duration_s=duration_s)
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
-        scores = challenge(store, wanted)
+        scores = challenge(store, wanted, earlier)
     ranked = standings(scores)
     taus = [agreement(mean_speeds(scores), other) for other in others]
     written = [
@@ -390,6 +387,15 @@ def tune_command(
     ] = None,
     trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Runs that the search may take.")] = 100,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of the optimiser.")] = 0,
+    numerics: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0,
+            metavar="SHARE",
+            help="Largest share of the muscles' work that the integrator may take or add; more is no gait."
+            "  [default: any]",
+        ),
+    ] = None,
     jobs: Jobs = None,
     cluster: ClusterName = None,
     quiet: Quiet = False,
@@ -418,7 +424,7 @@ def tune_command(
     base = Case(preset, changes).config
     for doubt in refuse_nonsense(base):
         complain(f"warning: {doubt}")
-    task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed)
+    task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed, numerics)
     found: list[tune.Trial] = []
     written: list[Path] = []
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:

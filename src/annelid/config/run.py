@@ -124,9 +124,7 @@ class Trial(Section):
             raise ValueError(f"trial.push_N = {self.push_N:g}: a planar worm cannot be pushed; leave it at 0")
 
     def blinded(self, config: RunConfig) -> RunConfig:
-        """Returns what a controller may know of a configuration."""
-        if not self.blind:
-            return config
+        """Returns what a blind controller may know of a configuration."""
         arena = None if config.arena is None else default_of(ArenaKind)
         sensor = config.sensor.model_copy(update={"noise_m": 0.0})
         return config.model_copy(update={"arena": arena, "sensor": sensor, "trial": None, "seed": 0})

@@ -62,11 +62,12 @@ def own_controller(name: str) -> str:
     if here not in sys.path:
         sys.path.append(here)
     try:
-        found: Any = getattr(import_module(module_name), attribute)
-    except AttributeError:
-        raise ConfigError(f"controller {shown(name)}: {module_name} has nothing of that name") from None
+        module = import_module(module_name)
     except Exception as error:
         raise ConfigError(f"controller {shown(name)}: {module_name} cannot be imported: {error}") from None
+    found: Any = getattr(module, attribute, None)
+    if found is None:
+        raise ConfigError(f"controller {shown(name)}: {module_name} has nothing of that name")
     if isinstance(found, type) and issubclass(found, ControllerKind):
         kind: str = found.model_fields["kind"].default
     elif callable(found) and (not isinstance(found, type) or (hasattr(found, "reset") and hasattr(found, "step"))):

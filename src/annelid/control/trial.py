@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from annelid.clock import SLACK_S
-from annelid.config.run import Trial
+from annelid.config.run import RunConfig, Trial
 from annelid.control.base import SavedWrapper, WrappedController
 from annelid.protocols import Array, Controller, Plant, SavedAndRecorded, Sensation, Stateful
 
@@ -27,15 +27,19 @@ class Sizes(NamedTuple):
     n_muscles: int
 
 
-def seen(trial: Trial, plant: Plant) -> Plant:
-    """Returns the body as a controller may know it when it is built."""
-    return cast(Plant, Sizes(plant.n_segments, plant.n_muscles)) if trial.blind else plant
+def told(config: RunConfig, plant: Plant) -> tuple[RunConfig, Plant]:
+    """Returns what a controller may know of its run and its body when it is built."""
+    if config.trial is None or not config.trial.blind:
+        return config, plant
+    return config.trial.blinded(config), cast(Plant, Sizes(plant.n_segments, plant.n_muscles))
 
 
-def tried(controller: Controller, trial: Trial, plant: Plant, control_timestep_s: float) -> Controller:
-    """Returns a controller under a trial; one whose state can be saved still has one that can."""
+def tried(controller: Controller, config: RunConfig, plant: Plant) -> Controller:
+    """Returns a controller under the trial of a run, if any; what can be saved still can."""
+    if config.trial is None:
+        return controller
     kind = SavedTrialController if isinstance(controller, Stateful) else TrialController
-    return kind(controller, Faults(trial, plant, control_timestep_s))
+    return kind(controller, Faults(config.trial, plant, config.clock.control_timestep_s))
 
 
 class Faults(SavedAndRecorded):
@@ -49,15 +53,19 @@ class Faults(SavedAndRecorded):
         per_segment = plant.n_muscles // plant.n_segments
         first = (trial.weak_segment - 1) * per_segment
         self._weak = slice(first, first + per_segment)
-        first_sensed = plant.reset(0)
-        self._n_stretch = first_sensed.stretch_m.size
-        self._n_values = sum(getattr(first_sensed, name).size for name in SENSORS)
+        # How much it senses, its first sensation says; a body that is under way goes on from where it is.
+        saved = plant if isinstance(plant, Stateful) else None
+        state = saved.get_state() if saved is not None else {}
+        sensed = plant.reset(0)
+        if saved is not None:
+            saved.set_state(state)
+        self._n_stretch = sensed.stretch_m.size
+        self._n_values = sum(getattr(sensed, name).size for name in SENSORS)
         self.reset(0)
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state, in which nothing was sensed; ``seed`` fixes all that is random."""
-        self._seed = seed
-        self._now = {"moved": np.zeros(self._n_muscles)}
+        self._now = {"seed": np.array(seed, dtype=np.uint64), "moved": np.zeros(self._n_muscles)}
         if self.trial.drift_m_per_s:
             rates = self._random(DRIFT).uniform(-1.0, 1.0, self._n_stretch)
             self._now["drift"] = self.trial.drift_m_per_s * rates
@@ -92,14 +100,14 @@ class Faults(SavedAndRecorded):
         if trial.backlash:
             half = 0.5 * trial.backlash
             command = np.clip(self._now["moved"], command - half, command + half)
-            self._now["moved"] = command
+            self._now["moved"][:] = command
         if trial.weak_strength < 1.0 and time_s >= trial.weak_from_s:
             command = command.copy()
             command[self._weak] *= trial.weak_strength
         return command
 
     def _random(self, stream: int, place: int = 0) -> np.random.Generator:
-        return np.random.default_rng([self._seed, stream, place])
+        return np.random.default_rng([int(self._now["seed"]), stream, place])
 
     def _kept(self, values: Array, time_s: float) -> Array:
         """The values, in which sensors that are lost now keep their last ones; none is lost in the first slot."""
@@ -109,7 +117,7 @@ class Faults(SavedAndRecorded):
         if slot:
             lost = self._random(LOSS, slot).uniform(size=values.size) < self.trial.loss
             values = np.where(lost, self._now["kept"], values)
-        self._now["kept"] = values
+        self._now["kept"][:] = values
         return values
 
     def _delayed(self, values: Array, time_s: float) -> Array:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store, case_key
-    from annelid.experiment.tune import Judged, judge
+    from annelid.experiment.tune import Judged, judge, numerical_problem
     from annelid.experiment.uncertainty import finer_steps, more_elements
     from annelid.experiment.workers import Workers
 
@@ -42,6 +42,7 @@ __all__ = [
     "finer_steps",
     "judge",
     "more_elements",
+    "numerical_problem",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

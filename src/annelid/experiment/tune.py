@@ -101,12 +101,33 @@ def objectives_of(names: list[str]) -> list[Objective]:
     return [OBJECTIVES[name] for name in names]
 
 
-def judge(outcome: Outcome) -> Judged:
+def judge(outcome: Outcome, numerics: float | None = None) -> Judged:
     """Judges a run: it must have ended whole, in order, over at least two cycles, and advance.
 
     In order are neighbours that take turns with steady periods and lags; onsets need not be evenly spaced.
+
+    Args:
+        outcome: Of the run.
+        numerics: Largest share of the muscles' work that the integrator may take or add; None for any.
     """
-    return Judged(None if outcome.message else outcome.gait, _problem(outcome))
+    problem = _problem(outcome)
+    if not problem and numerics is not None:
+        problem = numerical_problem(outcome, numerics)
+    return Judged(None if outcome.message else outcome.gait, problem)
+
+
+def numerical_problem(outcome: Outcome, largest_share: float) -> str:
+    """Says if the integrator took or added more of the muscles' work than it may; nothing if it did not.
+
+    Args:
+        outcome: Of the run.
+        largest_share: How much of that work it may take or add; below 1.
+    """
+    energy = outcome.gait.energy
+    share = None if energy is None else energy.numerical_share
+    if share is None or abs(share) <= largest_share:
+        return ""
+    return f"the integrator {'took' if share > 0 else 'added'} {abs(share):.0%} of the muscles' work"
 
 
 def _problem(outcome: Outcome) -> str:
@@ -174,6 +195,8 @@ class Task:
     n_trials: int
     seed: int = 0
     """Of the optimiser."""
+    numerics: float | None = None
+    """Largest share of the muscles' work that the integrator may take or add in a gait; None for any."""
 
     @property
     def start(self) -> Case:
@@ -221,7 +244,7 @@ def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     optimiser = optimiser_of(task.variables, len(task.objectives), own if inside else None, task.seed)
     generation = next(optimiser)
     outcomes = store.compute([start], progress=in_stage(report, "the gait it starts from"))
-    found.append(_trial(START, {}, start, Done(outcomes[case_key(start)])))
+    found.append(_trial(START, {}, start, Done(outcomes[case_key(start)]), task.numerics))
     yield list(found)
     while (done := len(found) - 1) < task.n_trials:
         values = generation[: task.n_trials - done]
@@ -230,16 +253,17 @@ def search(task: Task, store: Store) -> Iterator[list[Trial]]:
         words = [f"{one.name} {best.judged.value(one):.3g}" for one, best in leaders.items() if best is not None]
         stage = f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
         results = store.finish(cases, stage, progress=report)
-        trials = [_trial(done + i, *of_it) for i, of_it in enumerate(zip(values, cases, results, strict=True))]
+        of_trials = enumerate(zip(values, cases, results, strict=True))
+        trials = [_trial(done + i, *of_it, task.numerics) for i, of_it in of_trials]
         found += trials
         yield trials
         if len(trials) == len(generation):
             generation = optimiser.send([_scores(trial, task.objectives) for trial in trials])
 
 
-def _trial(number: int, values: Mapping[str, Any], case: Case, done: Done) -> Trial:
+def _trial(number: int, values: Mapping[str, Any], case: Case, done: Done, numerics: float | None) -> Trial:
     if done.outcome is not None:
-        return Trial(number, values, case, judge(done.outcome), done.outcome.path)
+        return Trial(number, values, case, judge(done.outcome, numerics), done.outcome.path)
     failed = not isinstance(done.error, ConfigError)
     problem = f"{'failed' if failed else 'cannot be built'}: {done.error}"
     return Trial(number, values, case, Judged(None, problem), Path(), failed)

@@ -25,13 +25,19 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
         ConfigError: The new body or controller cannot be built, or has other states than the running one.
     """
     plant, controller = running.plant, running.controller
-    if any(getattr(before, part) != getattr(after, part) for part in ("body", "arena", "clock")):
+
+    def differ(*parts: str) -> bool:
+        return any(getattr(before, part) != getattr(after, part) for part in parts)
+
+    if differ("body", "arena", "clock", "trial"):
         if isinstance(plant, WormPlant) and _differ_in_friction_only(before, after):
             assert after.arena is not None
             set_friction(plant.model, after.arena.friction)
         else:
             plant = _taking_over(build_plant(after), plant, "body")
-    if any(getattr(before, part) != getattr(after, part) for part in ("controller", "turning", "sensor", "clock")):
+    if any(
+        getattr(before, part) != getattr(after, part) for part in ("controller", "turning", "sensor", "clock", "trial")
+    ):
         controller = _taking_over(build_controller(after, plant), controller, "controller")
     simulation = Simulation(after, plant, controller, running.sensation, running.noise, running.step)
     simulation.activation = running.activation
@@ -42,7 +48,7 @@ def _differ_in_friction_only(before: RunConfig, after: RunConfig) -> bool:
     if before.arena is None or after.arena is None or before.arena.has_setae or after.arena.has_setae:
         return False
     alike = before.arena.model_copy(update={"friction": after.arena.friction})
-    return (before.body, alike, before.clock) == (after.body, after.arena, after.clock)
+    return (before.body, alike, before.clock, before.trial) == (after.body, after.arena, after.clock, after.trial)
 
 
 def _taking_over(new: Part, old: Part, what: str) -> Part:

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike
 
 from annelid.clock import StepRatio
 from annelid.config import RunConfig
+from annelid.control.base import CallableController
+from annelid.control.trial import told, tried
 from annelid.errors import RunFileError, SimulationStopped
 from annelid.protocols import (
     Array,
@@ -60,30 +62,14 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
-    trial = config.trial
-    if trial is None:
-        return _own_controller(config, plant)
-    from annelid.control.trial import seen
+    known, body = told(config, plant)
+    controller = known.controller.build(known, body)
+    if known.turning is not None:
+        from annelid.control.turning import TurningController
 
-    return _tried(_own_controller(trial.blinded(config), seen(trial, plant)), config, plant)
-
-
-def _own_controller(config: RunConfig, plant: Plant) -> Controller:
-    pattern = config.controller.build(config, plant)
-    if config.turning is None:
-        return pattern
-    from annelid.control.turning import TurningController
-
-    step_s = config.clock.control_timestep_s
-    return TurningController(pattern, config.turning, plant.n_segments, plant.n_muscles, step_s)
-
-
-def _tried(controller: Controller, config: RunConfig, plant: Plant) -> Controller:
-    if config.trial is None:
-        return controller
-    from annelid.control.trial import tried
-
-    return tried(controller, config.trial, plant, config.clock.control_timestep_s)
+        step_s = known.clock.control_timestep_s
+        controller = TurningController(controller, known.turning, plant.n_segments, plant.n_muscles, step_s)
+    return tried(controller, config, plant)
 
 
 def as_controller(
@@ -93,11 +79,9 @@ def as_controller(
     if controller is None:
         return build_controller(config, plant)
     if hasattr(controller, "step"):
-        return _tried(cast(Controller, controller), config, plant)
-    from annelid.control.base import CallableController
-
-    own = CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)
-    return _tried(own, config, plant)
+        return tried(cast(Controller, controller), config, plant)
+    function = cast(Callable[[Sensation], ArrayLike], controller)
+    return tried(CallableController(function, plant.n_muscles), config, plant)
 
 
 class Simulation:

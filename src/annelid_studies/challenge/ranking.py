@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import RunFileError
 from annelid_studies.challenge.scores import Score
 from annelid_studies.challenge.tasks import REFERENCE
 from annelid_studies.tables import grouped
@@ -200,7 +197,7 @@ def agreement(one: Mapping[tuple[str, str], float], other: Mapping[tuple[str, st
     """Compares two rankings by task: Kendall's tau of the mean speeds of the entrants that are in both.
 
     Args:
-        one: Mean speeds by entrant and task, from `mean_speeds` or `read_speeds`.
+        one: Mean speeds by entrant and task, from `mean_speeds`.
         other: Likewise.
 
     Returns:
@@ -220,19 +217,3 @@ def mean_speeds(scores: Sequence[Score]) -> dict[tuple[str, str], float]:
     """Returns mean speeds by entrant and task, m/s."""
     by_pair = grouped(scores, lambda one: (one.entrant, one.task))
     return {pair: float(np.mean([one.speed_m_per_s for one in own])) for pair, own in by_pair.items()}
-
-
-def read_speeds(path: Path) -> dict[tuple[str, str], float]:
-    """Reads mean speeds by entrant and task, m/s, from the runs that an earlier call wrote as CSV.
-
-    Raises:
-        RunFileError: It is not such a file.
-    """
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            by_pair = grouped(csv.DictReader(file), lambda row: (row["entrant"], row["task"]))
-            return {
-                pair: float(np.mean([float(row["speed_m_per_s"]) for row in rows])) for pair, rows in by_pair.items()
-            }
-    except (OSError, ValueError, KeyError) as error:
-        raise RunFileError(f"{path} is no runs.csv of annelid challenge: {error}") from None

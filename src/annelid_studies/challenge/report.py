@@ -1,4 +1,4 @@
-"""What is made of the ranking: CSV files, tables for the terminal, the figure, and the result of tuning."""
+"""What is made of the ranking: CSV files, tables for the terminal and the figure."""
 
 from __future__ import annotations
 

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, nan, radians, sin
+from pathlib import Path
 
 import numpy as np
+from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from annelid.analysis import lengthening_score, passage_of
 from annelid.config import field_value
-from annelid.experiment import Outcome, Store, case_key
+from annelid.errors import RunFileError
+from annelid.experiment import Store, case_key, numerical_problem
 from annelid.simulation import Run
-from annelid_studies.challenge.tasks import Task, Trial, all_tasks
+from annelid_studies.challenge.tasks import Entry, Task, all_tasks
 
 STALL_FORCE_N, FREE_SPEED_M_PER_S = 13.0, 0.064
 """Of the motor: cable force at which the robot's servos stall, and cable speed without load (docs/presets.md, wang)."""
 NUMERICAL_SHARE = 0.3
 """Share of the muscles' work that the integrator may take or add; beyond that a run is refused."""
 RECOVERY_GRID_S = 0.25
+_EMPTY: dict[str, str] = dict.fromkeys(("slip_J", "work_J", "electric_J", "period_s", "recovery_s"), "nan")
+"""What an empty cell of these columns of ``runs.csv`` stands for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +37,11 @@ class Score:
     seed: int  # Of the draw
     drawn: str  # What was drawn
     segments: int  # Of the worm
+    setup: str  # Digest of what the task and the entrant set
     key: str  # Digest of the run's configuration, of the code that computes it, and of the engine
     refused: str  # Why it does not count; empty if it does
-    speed_m_per_s: float  # Mean speed towards the goal after settling; 0 where refused
-    distance_m: float  # That way; 0 where refused
+    speed_m_per_s: FiniteFloat  # Mean speed towards the goal after settling; 0 where refused
+    distance_m: FiniteFloat  # That way; 0 where refused
     slip_J: float  # Work lost to friction in that time
     work_J: float  # Positive work of the muscles in that time
     electric_J: float  # Energy that the motors of `electric_energy_J` take in that time
@@ -43,29 +50,59 @@ class Score:
     recovery_s: float  # Time from the event until they do so to the end; NaN without an event or without a recovery
 
 
-def challenge(store: Store, wanted: Sequence[Trial], stage: str = "challenge") -> list[Score]:
-    """Runs trials, as far as the store does not have them, and scores them in their order."""
-    done = store.finish([trial.case for trial in wanted], stage)
-    return [_score(trial, one.reason or _numerics(one.outcome), store) for trial, one in zip(wanted, done, strict=True)]
+def challenge(store: Store, wanted: Sequence[Entry], known: Sequence[Score] = ()) -> list[Score]:
+    """Runs entries, as far as neither the store nor earlier scores have them, and scores them in their order."""
+    scores = {(one.entrant, one.task, one.setup): one for one in known}
+    keys = [(entry.entrant, entry.task, entry.setup) for entry in wanted]
+    new = {key: entry for key, entry in zip(keys, wanted, strict=True) if key not in scores}
+    done = store.finish([entry.case for entry in new.values()], "challenge")
+    for (key, entry), one in zip(new.items(), done, strict=True):
+        numerics = "" if one.outcome is None else numerical_problem(one.outcome, NUMERICAL_SHARE)
+        scores[key] = _score(entry, one.reason or numerics, store)
+    return [scores[key] for key in keys]
 
 
-def _numerics(outcome: Outcome | None) -> str:
-    """Says what is wrong with the energy balance of a run; nothing if it can be believed."""
-    energy = None if outcome is None else outcome.gait.energy
-    share = None if energy is None else energy.numerical_share
-    if share is None or abs(share) <= NUMERICAL_SHARE:
-        return ""
-    return f"the integrator {'took' if share > 0 else 'added'} {abs(share):.0%} of the muscles' work"
+def read_scores(path: Path) -> list[Score]:
+    """Reads the scores that an earlier call wrote as CSV.
+
+    Raises:
+        RunFileError: It is not such a file, or it is of another version of the tasks.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = [
+                {name: cell or _EMPTY.get(name, cell) for name, cell in row.items()} for row in csv.DictReader(file)
+            ]
+        scores = TypeAdapter(list[Score]).validate_python(rows)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = f"row {first['loc'][0]}, {first['loc'][-1]}"
+        raise RunFileError(f"{path} is no runs.csv of annelid challenge: {where}: {first['msg']}") from None
+    except (OSError, ValueError, csv.Error) as error:
+        raise RunFileError(f"{path} is no runs.csv of annelid challenge: {error}") from None
+    versions = {one.version for one in scores} - {all_tasks().version}
+    if versions:
+        raise RunFileError(f"{path} is of version {min(versions)} of the tasks; here it is {all_tasks().version}")
+    return scores
 
 
-def _score(trial: Trial, refused: str, store: Store) -> Score:
-    found, key = all_tasks(), case_key(trial.case) if trial.case in store else ""
-    task, settling_s = found.tasks[trial.task], found.settling_s
-    drawn = " ".join(f"{field}={value:g}" for field, value in trial.drawn.items())
-    named = (trial.entrant, trial.task, found.version, trial.seed, drawn, trial.segments, key, refused)
+def _score(entry: Entry, refused: str, store: Store) -> Score:
+    found, key = all_tasks(), case_key(entry.case) if entry.case in store else ""
+    task, settling_s = found.tasks[entry.task], found.settling_s
+    named = (
+        entry.entrant,
+        entry.task,
+        found.version,
+        entry.seed,
+        entry.drawn,
+        entry.segments,
+        entry.setup,
+        key,
+        refused,
+    )
     if refused:
         return Score(*named, 0.0, 0.0, nan, nan, nan, False, nan, nan)
-    run = store.run(trial.case)
+    run = store.run(entry.case)
     time, way = progress(run, task)
     first = int(np.searchsorted(time, settling_s - 1e-9))
     distance = float(way[-1] - way[first])

@@ -6,6 +6,8 @@ version, the task's name and a seed. Seeds below `FIRST_TEST_SEED` are for train
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -26,8 +28,6 @@ from annelid.textfiles import read_toml
 REFERENCE = "timed"
 """The entrant that the others are compared with: a wave by the clock, tuned once."""
 FIRST_TEST_SEED = 1000
-TUNED_AT = ("flat-low", "flat-middle", "flat-high")
-"""Tasks on whose training draws entrants are tuned."""
 QUICK_TASKS, QUICK_ENTRANTS = ("flat-middle", "slope", "noise"), (REFERENCE, "sine", "sns")
 QUICK_DRAWS, QUICK_DURATION_S = 2, 8.0
 DIGITS = 4
@@ -86,7 +86,6 @@ class Entrant(Section):
     controller: Mapping[str, Any]
     per_segment: Mapping[str, float] = {}
     tuned_on: tuple[int, ...] | Mapping[str, tuple[int, ...]] = ()
-    search: Mapping[str, tuple[float, ...]] = {}
 
     @model_validator(mode="after")
     def _tuned_on_training_seeds(self) -> Self:
@@ -102,15 +101,21 @@ class Entrant(Section):
 
 
 @dataclass(frozen=True)
-class Trial:
+class Entry:
     """One entrant at one task with one draw."""
 
     entrant: str  # Its name
     task: str  # Name of the task
     seed: int  # Of the draw
-    drawn: Mapping[str, float]  # Fields that were drawn
+    drawn: str  # What was drawn, as text
     segments: int  # Of the worm
     case: Case  # Its run
+
+    @property
+    def setup(self) -> str:
+        """Digest of what the task and the entrant set, whatever code runs it."""
+        text = json.dumps([self.case.preset, dict(self.case.changes)], sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 @cache
@@ -172,14 +177,14 @@ def find_entrants(names: Sequence[str]) -> dict[str, Entrant]:
     return found
 
 
-def trials(
+def entries(
     entrants: Mapping[str, Entrant],
     names: Sequence[str],
     seeds: Sequence[int],
     *,
     half_step: bool = False,
     duration_s: float | None = None,
-) -> list[Trial]:
+) -> list[Entry]:
     """Lays out the runs of entrants at tasks.
 
     Args:
@@ -206,8 +211,8 @@ def trials(
         segments = int(shared.get("body.mesh.n_segments", 3))
         for seed in seeds:
             drawn = found.drawn(name, seed)
-            changes = {**shared, **drawn, "seed": seed}
+            changes, told = {**shared, **drawn, "seed": seed}, " ".join(f"{name}={x:g}" for name, x in drawn.items())
             for entrant, its in entrants.items():
                 case = Case(found.preset, {**changes, "controller": its.fields(segments)})
-                made.append(Trial(entrant, name, seed, drawn, segments, case))
+                made.append(Entry(entrant, name, seed, told, segments, case))
     return made

@@ -86,22 +86,26 @@ class Standing:
 def interval(values: Array, statistic: Callable[[Array], Array]) -> tuple[float, float, float]:
     """Returns a statistic, and its 95 % bootstrap interval over draws (percentiles); NaN for a single draw.
 
+    Draws of one task have nothing to do with those of another, so each task's are drawn anew by themselves.
+
     Args:
         values: Numbers of every draw, ``(n_draws, n_tasks, n_columns)``.
         statistic: From means over draws, ``(.., n_tasks, n_columns)``, to numbers, ``(..)``.
     """
     from scipy.stats import bootstrap
 
-    def of_draws(index: NDArray[np.int64], axis: int = -1) -> Array:
-        return statistic(values[index].mean(axis=index.ndim - 1))
+    def of_draws(*of_tasks: NDArray[np.int64], axis: int = -1) -> Array:
+        means = [values[index, task].mean(axis=-2) for task, index in enumerate(of_tasks)]
+        return statistic(np.stack(means, axis=-2))
 
-    draws = np.arange(len(values))
-    if len(draws) < 2:
-        return float(of_draws(draws)), nan, nan
+    n_draws, n_tasks = values.shape[:2]
+    draws = (np.arange(n_draws),) * n_tasks
+    if n_draws < 2:
+        return float(of_draws(*draws)), nan, nan
     # It computes a standard error as well, which an infinite number does not have.
     with np.errstate(invalid="ignore"):
-        found = bootstrap((draws,), of_draws, n_resamples=RESAMPLES, method="percentile", rng=0).confidence_interval
-    return float(of_draws(draws)), float(found.low), float(found.high)
+        found = bootstrap(draws, of_draws, n_resamples=RESAMPLES, method="percentile", rng=0).confidence_interval
+    return float(of_draws(*draws)), float(found.low), float(found.high)
 
 
 def _mean(column: str) -> Callable[[Array], Array]:

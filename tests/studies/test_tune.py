@@ -301,9 +301,14 @@ def test_what_does_not_walk_is_told_why_and_penalised(outcome: Outcome, gait: Ga
         assert (judged.value(objective) == objective.penalty) == bool(words)
 
 
-@pytest.mark.parametrize(("share", "says"), [(0.29, ""), (0.31, "took 31%"), (-0.4, "added 40%"), (None, "")])
-def test_a_gait_that_lives_on_the_integrator_is_none_where_that_is_asked(share: float | None, says: str) -> None:
-    energy: Any = SimpleNamespace(numerical_share=share)
+@pytest.mark.parametrize(
+    ("share", "work_J", "says"),
+    [(0.29, 5.0, ""), (0.31, 5.0, "took 31%"), (-0.4, 5.0, "added 40%"), (None, 0.0, ""), (1e6, 1e-6, "")],
+)
+def test_a_gait_that_lives_on_the_integrator_is_none_where_that_is_asked(
+    share: float | None, work_J: float, says: str
+) -> None:
+    energy: Any = SimpleNamespace(numerical_share=share, muscle_work_J=work_J)
     walking = replace(an_outcome(), gait=replace(a_gait(), energy=energy))
     assert judge(walking).problem == ""
     found = judge(walking, 0.3)

@@ -132,7 +132,6 @@ def study(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
 app = typer.Typer(
     cls=_Sentences,
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},

@@ -28,6 +28,8 @@ from annelid.experiment.space import Choice, Variable, variables_of
 from annelid.experiment.store import Done, Store, case_key
 from annelid.output import write_csv
 
+LEAST_WORK_J = 0.01
+"""Muscles that do less work leave the worm where it lies, and a share of their work says nothing."""
 START = -1
 """Number of the gait that the search starts from, which is no trial."""
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
@@ -124,7 +126,7 @@ def numerical_problem(outcome: Outcome, largest_share: float) -> str:
         largest_share: How much of that work it may take or add; below 1.
     """
     energy = outcome.gait.energy
-    share = None if energy is None else energy.numerical_share
+    share = None if energy is None or energy.muscle_work_J < LEAST_WORK_J else energy.numerical_share
     if share is None or abs(share) <= largest_share:
         return ""
     return f"the integrator {'took' if share > 0 else 'added'} {abs(share):.0%} of the muscles' work"

@@ -275,7 +275,8 @@ def challenge_command(
     Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
     always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 % intervals by
     entrant and task; tasks.csv, one row per task; challenge.png and .svg. Runs are kept: a second call takes seconds,
-    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/challenge.md has tasks, rules and results.
+    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/challenge.md has
+    tasks, rules and results.
 
     \b
     annelid challenge --quick                                   in minutes
@@ -331,8 +332,8 @@ def sweep_command(
     ranges, in every combination or as random, Latin hypercube or Sobol samples.
 
     Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, one row per run; sweep.png
-    and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A run
-    that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
+    and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A
+    run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
     the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the study
     describes is used where --cluster names the file.
 

@@ -333,9 +333,9 @@ def sweep_command(
 
     Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, one row per run; sweep.png
     and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A
-    run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
-    the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the study
-    describes is used where --cluster names the file.
+    run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on.
+    Needs the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the
+    study describes is used where --cluster names the file.
 
     \b
     annelid sweep --example > study.toml

@@ -273,9 +273,10 @@ def challenge_command(
     """Rank controllers in the benchmark of soft peristaltic locomotion.
 
     Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
-    always runs too, as the reference. Writes runs.csv, a row a run; scores.csv, means with 95 % intervals by entrant
-    and task; tasks.csv, a row a task; challenge.png and .svg. Runs are kept, so that a second call takes seconds and an
-    interrupted one goes on. The whole takes a few hours on two cores; docs/challenge.md has tasks, rules and results.
+    always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 % intervals by
+    entrant and task; tasks.csv, one row per task; challenge.png and .svg. Runs are kept: a second call takes seconds,
+    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/challenge.md has
+    tasks, rules and results.
 
     \b
     annelid challenge --quick                                   in minutes
@@ -330,11 +331,11 @@ def sweep_command(
     A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
     ranges, in every combination or as random, Latin hypercube or Sobol samples.
 
-    Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, a row a run; sweep.png and
-    .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A run
-    that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on. Needs
-    the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the study
-    describes is used where --cluster names the file.
+    Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, one row per run; sweep.png
+    and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A
+    run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on.
+    Needs the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the
+    study describes is used where --cluster names the file.
 
     \b
     annelid sweep --example > study.toml

@@ -1,0 +1,130 @@
+"""Pages, README and command help are in the field's standard terms, in sentences that are read once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from doc_commands import PAGES
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+from typer.main import get_command
+
+from annelid.cli import app
+
+WORDS = {
+    r"pins? that (hold|give)s?": "rigid crossings, soft crossings",
+    r"slip per way": "slip ratio",
+    r"told for": "computed over",
+    r"number that (cannot|can) be told": "that can be computed",
+    r"(whole|full) cycles": "complete cycles",
+    r"(drawn|worms) about (it|this one)": "Monte Carlo samples",
+    r"how a worm gets along": "locomotion metrics",
+    r"rooms? of the house": "package layout",
+    r"(bring|brings|brought) (it |them |\w+ )?home": "fetch results",
+    r"(sum of the )?ways? (towards the front|forwards)": "forward travel, forward displacement",
+    r"muscles a segment": "muscles per segment",
+    r"a (row|page|line|number) a \w+": "one row per run",
+    r"for (good|ever)": "permanently, without end",
+}
+"""What stood for a standard term once, as patterns, and the term."""
+
+LONGEST = 45
+"""Words of a sentence."""
+
+LONG_SENTENCES = (
+    "docs/paper.md",
+    "docs/security.md",
+    "docs/slip.md",
+    "docs/validation.md",
+)
+"""Pages that still have longer sentences: the list may only become shorter."""
+
+ENDS = re.compile(r"[.!?][)*\"']*\s+")
+
+
+def prose(page: str) -> Iterator[tuple[str, str]]:
+    """Walks the texts of a page, each with the kind of block it is in: code is one word, links are their texts."""
+    blocks: list[str] = []
+    for token in tokens(page):
+        if token.nesting == 1:
+            blocks.append(token.type.removesuffix("_open"))
+        elif token.nesting == -1:
+            blocks.pop()
+        elif token.type == "inline":
+            kinds = {"table", "heading", "blockquote"}.intersection(blocks)
+            yield next(iter(kinds), "paragraph"), "".join(map(text_of, token.children or ()))
+
+
+def tokens(page: str) -> list[Token]:
+    """Returns the blocks of a page, without the header of a notebook."""
+    text = re.sub(r"\A---\n.*?\n---\n", "", PAGES[page], flags=re.DOTALL)
+    return MarkdownIt("commonmark").enable("table").parse(text)
+
+
+def text_of(token: Token) -> str:
+    """Returns the words of a part of a text."""
+    if token.type == "code_inline":
+        return "CODE"
+    return " " if token.type in ("softbreak", "hardbreak") else token.content
+
+
+def long_sentences(page: str) -> list[str]:
+    """Returns the sentences of a page, outside of its tables and code, that have too many words."""
+    sentences = (each for kind, text in prose(page) if kind != "table" for each in ENDS.split(text))
+    return [each for each in sentences if len(each.split()) > LONGEST]
+
+
+def found_in(text: str) -> list[str]:
+    """Returns what is found in a text of the words that it must not have, each with the word to use."""
+    line = " ".join(text.split())
+    return [
+        f"{found[0]!r}: {better}"
+        for pattern, better in WORDS.items()
+        for found in re.finditer(rf"\b{pattern}\b", line, re.IGNORECASE)
+    ]
+
+
+def helps(command: Any, name: str) -> Iterator[tuple[str, str]]:
+    """Walks the help texts of a command, its options and the commands below it, each with the name of its command."""
+    yield name, command.help or ""
+    for parameter in command.params:
+        yield name, getattr(parameter, "help", None) or ""
+    for below, each in getattr(command, "commands", {}).items():
+        yield from helps(each, f"{name} {below}")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_has_standard_terms(page: str) -> None:
+    assert [found for _, text in prose(page) for found in found_in(text)] == []
+
+
+def test_command_help_has_standard_terms() -> None:
+    assert [(name, found) for name, text in helps(get_command(app), "annelid") for found in found_in(text)] == []
+
+
+@pytest.mark.parametrize("page", sorted(PAGES.keys() - set(LONG_SENTENCES)))
+def test_a_sentence_is_not_too_long(page: str) -> None:
+    assert long_sentences(page) == []
+
+
+def test_pages_with_long_sentences_become_fewer() -> None:
+    assert [page for page in LONG_SENTENCES if not long_sentences(page)] == [], "take these off the list"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_begins_with_what_it_is_for(page: str) -> None:
+    blocks = [token for token in tokens(page) if token.level == 0 and token.nesting >= 0 and token.type != "html_block"]
+    assert [blocks[0].tag, blocks[1].type] == ["h1", "paragraph_open"]
+
+
+def test_words_sentences_and_beginnings_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = f"# A\n\n    annelid run\n\nThe slip\nper way `told for` is {'long ' * LONGEST}. It is short.\n"
+    monkeypatch.setitem(PAGES, "a.md", page)
+    with pytest.raises(AssertionError, match="slip ratio"):
+        test_a_page_has_standard_terms("a.md")
+    assert [sentence[:8] for sentence in long_sentences("a.md")] == ["The slip"]
+    with pytest.raises(AssertionError):
+        test_a_page_begins_with_what_it_is_for("a.md")

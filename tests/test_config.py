@@ -203,7 +203,8 @@ def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
         ("record.frames_interval_s=0.0405", "record.frames_interval_s = 0.0405 must be an integer multiple"),
         ("duration_s=1.0005", "duration_s = 1.0005 must be an integer multiple"),
         ("record.signals_interval_s=0.0015", "record.signals_interval_s = 0.0015 must be an integer multiple"),
-        ("body.formulation.kind=chian", "'chian': must be one of 'rods', 'chain'"),
+        ("body.formulation.kind=chian", "'chian': must be one of 'rods', 'chain'; did you mean 'chain'?"),
+        ("controller.kind=sns-robst", "did you mean 'sns-robust'"),
         ("body.formulation.joint=glue", "must be one of 'ball' or 'hinges'"),
         ("body.mesh.segments=4", "unknown field 'body.mesh.segments': did you mean 'n_segments'"),
         ("friction=1", "did you mean 'arena.friction'"),
@@ -245,8 +246,9 @@ def test_planar_heights_must_fit_the_rhombus(heights: str) -> None:
 
 
 def test_an_unknown_preset_suggests_the_nearest() -> None:
-    with pytest.raises(ConfigError, match="did you mean 'riddle2023'"):
-        load_config("ridle2023")
+    for typed in ("ridle2023", "riddle2032"):
+        with pytest.raises(ConfigError, match="did you mean 'riddle2023'"):
+            load_config(typed)
 
 
 @pytest.mark.parametrize("text", ["friction", "=3", "arena..friction=1"])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import SequenceMatcher, get_close_matches
 from math import isfinite
 from numbers import Real
 from typing import Any
@@ -132,12 +133,26 @@ def suggest(name: str, valid: Iterable[str]) -> str:
         For example ``"did you mean 'riddle2023'? Valid: riddle2022-planar, riddle2023"``.
     """
     names = sorted(valid)
-    name = name[:MOST_SHOWN]
-    nearest = get_close_matches(name, names, n=1, cutoff=0.5) or get_close_matches(
-        name.rsplit(".", 1)[-1], names, n=1, cutoff=0.5
-    )
-    hint = f"did you mean {shortened(nearest[0])!r}? " if nearest else ""
+    near = nearest(name, names)
+    hint = f"did you mean {shortened(near)!r}? " if near is not None else ""
     return f"{hint}Valid: {listed(names)}"
+
+
+def nearest(name: str, valid: Sequence[str]) -> str | None:
+    """Returns the valid name that is most like one, or like the last part of its path; None if none is like it.
+
+    Of names that are equally like it, the one whose letters are the same comes first: two were swapped.
+
+    Args:
+        name: What the user wrote.
+        valid: The names that exist.
+    """
+    for part in (name[:MOST_SHOWN], name[:MOST_SHOWN].rsplit(".", 1)[-1]):
+        if near := get_close_matches(part, valid, cutoff=0.5):
+            letters = Counter(part)
+            likeness = {one: SequenceMatcher(a=one, b=part).ratio() for one in near}
+            return max(near, key=lambda one: (round(likeness[one], 6), -(letters - Counter(one)).total()))
+    return None
 
 
 def listed(names: Iterable[str]) -> str:

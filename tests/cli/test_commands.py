@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -166,6 +167,14 @@ def test_every_command_teaches_by_example(annelid: Command, command: str) -> Non
     done = annelid(command, "--help")
     assert done.exit_code == 0
     assert f"\n  annelid {command}" in done.out
+
+
+@pytest.mark.parametrize(("typed", "offers"), [("annelid ru", "run"), ("annelid run --fid", "--fidelity")])
+def test_the_shell_completes_commands_and_options(typed: str, offers: str) -> None:
+    asked = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_ANNELID_COMPLETE": "complete_bash"}
+    name = Path(sys.executable).with_name("annelid")
+    done = subprocess.run([name], env={**os.environ, **asked}, capture_output=True, text=True, check=False)
+    assert offers in done.stdout.split()
 
 
 def test_help_and_version_come_from_the_module_as_well() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any, TypeVar, get_origin
@@ -12,7 +13,7 @@ from pydantic_core import ErrorDetails
 from annelid.config.kinds import Kind, kinds_of
 from annelid.config.run import RunConfig
 from annelid.config.sections import Section
-from annelid.errors import MOST_SHOWN, ConfigError, listed, shown
+from annelid.errors import MOST_SHOWN, ConfigError, listed, nearest, shown
 
 Checked = TypeVar("Checked", bound=Section)
 
@@ -170,6 +171,8 @@ _WORDS = {
 }
 
 
+VALID_VALUE = re.compile("'([^']*)'")
+"""A value in the sentence that lists those that are valid."""
 MOST_SENTENCE = 450
 """Characters of what is wrong with a configuration; the first thing is told in any case."""
 
@@ -201,6 +204,9 @@ def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         path = f"{path}.kind" if path else "kind"
         given = given.get("kind") if isinstance(given, Mapping) else given
+    if kind in ("literal_error", "union_tag_invalid") and isinstance(given, str):
+        near = nearest(given, VALID_VALUE.findall(words))
+        words += f"; did you mean {near!r}?" if near is not None else ""
     return f"{path or 'the configuration'} = {shown(given)}: {words}"
 
 

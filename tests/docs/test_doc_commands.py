@@ -90,6 +90,8 @@ ELSEWHERE = {
     ("python", "docs/site/"): "tests/docs calls these",
     ("python", "-c"): "arithmetic",
     ("annelid", "sweep"): "minutes, and workers; the command has tests of its own",
+    ("annelid", "--install-completion"): "it changes the settings of the shell",
+    ("annelid", "--show-completion"): "tests/cli/test_commands.py asks for completions",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
     ("annelid", "render", "course", "--time"): "its run is that of the page's example, which takes minutes",
@@ -159,6 +161,9 @@ def check_annelid(command: Command) -> None:
     words = chosen(command)
     if words[-1] == "--help":
         assert words[1] in ("--help", *ANNELID.commands)
+        return
+    if words[1:] in (["--install-completion"], ["--show-completion"]):
+        assert words[1] in {option for parameter in ANNELID.params for option in parameter.opts}
         return
     if names_only(command) or words[-1] == "--arena":
         # In a sentence on a command or on one of its options.

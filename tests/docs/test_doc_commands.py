@@ -162,7 +162,7 @@ def check_annelid(command: Command) -> None:
     if words[-1] == "--help":
         assert words[1] in ("--help", *ANNELID.commands)
         return
-    if words[1:] in (["--install-completion"], ["--show-completion"]):
+    if words[1:] in (("--install-completion",), ("--show-completion",)):
         assert words[1] in {option for parameter in ANNELID.params for option in parameter.opts}
         return
     if names_only(command) or words[-1] == "--arena":

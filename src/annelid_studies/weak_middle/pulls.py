@@ -35,7 +35,7 @@ RESOLUTION: dict[str, Any] = {
 }
 STANDSTILL: dict[str, Any] = {
     "body.formulation.friction_impedance_ratio": 1e5,
-    "body.formulation.solver_tolerance": 1e-8,
+    "body.formulation.solver_tolerance": 1e-12,
 }
 """With the preset's values, which are good for walking, a held worm creeps over the ground."""
 DURATION_S = 6.0

@@ -48,14 +48,13 @@ class Quantity(NamedTuple):
 def stiffness_changes(young_GPa: float) -> dict[str, Any]:
     """Fields for a Young's modulus, GPa.
 
-    Shear modulus and damping keep their ratios to it, so that soft rods come to rest as soon as stiff ones.
+    The shear modulus keeps its ratio to it and the damping its time: soft rods come to rest as soon as stiff ones.
     """
     strands = base_body().strands
     share = young_GPa * 1e9 / strands.young_modulus_Pa
     return {
         "body.strands.young_modulus_Pa": young_GPa * 1e9,
         "body.strands.shear_modulus_Pa": round(share * strands.shear_modulus_Pa),
-        "body.strands.joint_damping_Nms_per_rad": round(share * strands.joint_damping_Nms_per_rad, 6),
     }
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
     from annelid.simulation.batch import BatchResult, simulate_batch
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "BatchResult",

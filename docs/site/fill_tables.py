@@ -173,9 +173,9 @@ def evaluated(expression: str, names: Mapping[str, Any]) -> Any:
 
 
 def main(check: bool, root: Path = ROOT) -> int:
-    """Fills or checks README and all pages, and names what is waited for."""
+    """Fills or checks README, the article and all pages, and names what is waited for."""
     differing, docs = False, root / "docs"
-    for path in (root / "README.md", *sorted(docs.rglob("*.md"))):
+    for path in (root / "README.md", *sorted(root.glob("paper/*.md")), *sorted(docs.rglob("*.md"))):
         page, name = path.read_text(encoding="utf-8"), path.relative_to(root)
         try:
             new = filled(page, docs)

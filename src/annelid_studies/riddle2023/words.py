@@ -35,6 +35,12 @@ def in_unit(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
     return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
 
 
+def signed(value: float, unit: str, digits: int = 1) -> str:
+    """Formats a difference with its sign and its unit; a dash for NaN."""
+    text = in_unit(value, digits=digits)
+    return text if text == NOTHING else f"{'+' * (float(f'{value:.{digits}f}') > 0)}{text}{unit}"
+
+
 def in_cm(value_m: float | None, digits: int = 2) -> str:
     """Formats a length in cm, without the unit."""
     return in_unit(value_m, CM, digits)

@@ -239,20 +239,18 @@ def _helix(outcome: Outcome) -> str:
 def _beside_the_paper(main: Outcome) -> Table:
     """Our numbers beside the paper's: quantities with a unit deviate by a ratio, percentages by a difference."""
     rows = [["order of the segments", "1-2-3", order_of(main), "none" if main.rhythm.is_one_wave else "another order"]]
-    pairs = zip(PAPER_ELONGATION_M, walked_elongation(main, first_helix=True), strict=True)
-    elongations = [(f"elongation of segment {n} (cm)", *pair, CM) for n, pair in enumerate(pairs, start=1)]
-    for quantity, paper, ours, scale in (("period (s)", PAPER_PERIOD_S, main.rhythm.period_s, 1.0), *elongations):
-        deviation = PERCENT * (words.number(ours) / paper - 1.0)
-        digits = 2 if scale == CM else 1
-        told = words.in_unit(paper, scale, digits), words.in_unit(ours, scale, 2)
-        rows.append([quantity, *told, words.signed(deviation, " %")])
-    for segment, paper, ours in (
-        (2, PAPER_MIDDLE_DEFICIT, main.summary.middle_deficit),
-        (3, PAPER_END_DIFFERENCE, main.summary.end_difference),
+    elongations = zip(("1", "2", "3"), PAPER_ELONGATION_M, walked_elongation(main, first_helix=True), strict=True)
+    below = "elongation of segment {} below segment 1 (%)"
+    for quantity, paper, ours, scale, digits, unit in (
+        ("period (s)", PAPER_PERIOD_S, main.rhythm.period_s, 1.0, 1, " %"),
+        *((f"elongation of segment {n} (cm)", *lengths, CM, 2, " %") for n, *lengths in elongations),
+        (below.format(2), PAPER_MIDDLE_DEFICIT, main.summary.middle_deficit, PERCENT, 1, " points"),
+        (below.format(3), PAPER_END_DIFFERENCE, main.summary.end_difference, PERCENT, 1, " points"),
     ):
-        told = words.in_percent(paper, 1), words.in_percent(ours, 1)
-        points = PERCENT * (words.number(ours) - paper)
-        rows.append([f"elongation of segment {segment} below segment 1 (%)", *told, words.signed(points, " points")])
+        difference = (words.number(ours) - paper) / (paper if unit == " %" else 1.0)
+        deviation = words.in_unit(difference, PERCENT, 1, sign="+")
+        told = [words.in_unit(value, scale, digits) for value in (paper, ours)]
+        rows.append([quantity, *told, deviation if deviation == words.NOTHING else deviation + unit])
     return Table(["quantity", "paper", "ours", "deviation"], rows)
 
 
@@ -260,7 +258,7 @@ _SUMMARY = (
     "An elongation is read from the spring on the first helix of a segment, from its shortest to its longest. The "
     "paper does not say which reading it used; this one comes nearest. By all six springs, and by their mean, the "
     "segments elongate by {every} cm, and segment 2 by {deficits} % less than segment 1. The claims are judged by all "
-    "of these readings.",
+    "of these readings. Deviations are computed before numbers are rounded.",
     "Three worms stand side by side in this report. The first is the paper's chain (preset {chain}, in the "
     "examinations at steps of 2 ms), whose crossings are soft. The second has rods and soft crossings of the same "
     "stiffness ({fast}) and takes seconds to compute. The third has rods and rigid crossings ({rods}, with the paper's "

@@ -66,7 +66,9 @@ def claims_page(report: Report) -> str:
     found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]
     answers = ["## What the examinations found", "\n".join(found)] if found else []
     numbers = [*_main_numbers(report), *_details_of_numbers(report)]
-    return "\n\n".join(["# The paper's claims", intro, _provenance(report), *numbers, *_claims(report), *answers]) + "\n"
+    return (
+        "\n\n".join(["# The paper's claims", intro, _provenance(report), *numbers, *_claims(report), *answers]) + "\n"
+    )
 
 
 def _contents(blocks: Iterable[str]) -> str:

@@ -27,6 +27,7 @@ PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
 STRONGEST_POKE = 3.0  # in weights of the worm; more would tear the thinnest
 PLOT_HEIGHT = 190  # of the plots, pixels
 MOST_SEGMENTS = 4  # with more than these the expansion neurons are left out of the first plot
+MOST_NEURONS = 24  # with more than these the diagram is folded at first
 SECONDS = 5.0  # how far back the plots go, in simulated time
 MOST_SAMPLES = 250  # of one curve of a plot
 
@@ -108,7 +109,7 @@ class Panel:
         network = network_of(show.config, neurons) if (neurons := neurons_of(player.reel.names)) else None
         self._n_neurons, self._colors = len(neurons), None
         if network is not None:
-            with gui.add_folder("Network, coloured by potential"):
+            with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
                 gui.add_html(network_html(network))
                 self._colors = gui.add_html("")
         self._plots = plots_of(player.reel.names)

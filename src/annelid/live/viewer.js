@@ -18,6 +18,18 @@
   };
   const button = (label) => [...document.querySelectorAll("#root button")].find((one) => one.textContent === label);
 
+  // Viser's sliders, their fields and two of its buttons have no names for those who hear the page.
+  function name() {
+    for (const label of document.querySelectorAll("#root label[for]")) {
+      const row = label.parentElement.parentElement.parentElement;
+      for (const one of row.querySelectorAll("[role=slider], input")) one.setAttribute("aria-label", label.textContent);
+    }
+    for (const one of document.querySelectorAll("#root button:not([aria-label])")) {
+      if (one.textContent.trim()) continue;
+      one.setAttribute("aria-label", one.className.includes("closeButton") ? "Close the notice" : "Connection and scene");
+    }
+  }
+
   const clip = { recorder: null };
   function startClip() {
     const scene = document.querySelector("#root canvas[data-engine]");
@@ -74,6 +86,9 @@
   };
 
   document.addEventListener("DOMContentLoaded", () => {
+    let due;
+    const soon = () => (due ??= setTimeout(() => ((due = undefined), name()), 300));
+    new MutationObserver(soon).observe(document.getElementById("root"), { childList: true, subtree: true });
     const bar = element("div", "", document.body, { class: "annelid-bar", role: "toolbar", "aria-label": "Scene" });
     clip.button = element("button", "", bar, { type: "button" });
     clip.button.onclick = toggleClip;

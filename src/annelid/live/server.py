@@ -184,7 +184,7 @@ def content_policy(*connections: str) -> str:
 
 def with_extras(page: str) -> str:
     """Adds our keys, clips and looks to a page of viser, as text of annelid's own files."""
-    files = resources.files(__package__)
+    files = resources.files("annelid.live")
     style, script = (files.joinpath(name).read_text("utf-8") for name in ("viewer.css", "viewer.js"))
     return page.replace("<head>", f"<head><style>{style}</style><script>{script}</script>", 1)
 

@@ -1,6 +1,8 @@
 """Pictures a second that reach a headless Chromium from a worm that runs live, and how fast the worm runs meanwhile.
 
-    python benchmarks/live_view.py [PRESET] [SECONDS]
+    python benchmarks/live_view.py [PRESET] [SECONDS] [PIXELS]
+
+PIXELS are device pixels per pixel of the page, 2 on a screen of high resolution.
 
 A picture has reached the browser when it hands the strands to WebGL, which it does anew for each: uploads of just their
 size are counted, two a picture, since the colours are as large as the places. Chromium draws in software here, on the
@@ -15,6 +17,7 @@ import sys
 import threading
 from time import perf_counter, process_time, sleep
 
+import psutil
 from playwright.sync_api import sync_playwright
 
 from annelid.config import load_config
@@ -36,7 +39,17 @@ VIEWPORT = {"width": 1000, "height": 560}
 WARM_UP_S = 5.0
 
 
-def main(preset: str = "riddle2023-rods", seconds: float = 15.0) -> None:
+def browser_s() -> dict[str, float]:
+    """Processor time of Chromium's processes, s: the page's own, and the one that draws."""
+    spent = {"renderer": 0.0, "gpu-process": 0.0}
+    for process in psutil.Process().children(recursive=True):
+        for kind in spent:
+            if f"--type={kind}" in process.cmdline():
+                spent[kind] += sum(process.cpu_times()[:2])
+    return spent
+
+
+def main(preset: str = "riddle2023-rods", seconds: float = 15.0, pixels: float = 1.0) -> None:
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if chromium is None:
         sys.exit("there is no Chromium here")
@@ -45,7 +58,7 @@ def main(preset: str = "riddle2023-rods", seconds: float = 15.0) -> None:
         loop.start()
         try:
             browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-            page = browser.new_page(viewport=VIEWPORT)
+            page = browser.new_page(viewport=VIEWPORT, device_scale_factor=pixels)
             page.add_init_script(COUNT_UPLOADS)
             page.goto(show.address)
             page.wait_for_selector("text=Nervous system", timeout=60_000)
@@ -57,9 +70,10 @@ def main(preset: str = "riddle2023-rods", seconds: float = 15.0) -> None:
                 own = process_time()
                 return perf_counter(), show.player.moment.time_s, show.frames_drawn, uploads / 2, own
 
-            before = reading()
+            spent, before = browser_s(), reading()
             sleep(seconds)
             passed, simulated, sent, drawn, own = (after - b for after, b in zip(reading(), before, strict=True))
+            spent = {kind: all_s - spent[kind] for kind, all_s in browser_s().items()}
             browser.close()
         finally:
             show.end()
@@ -69,6 +83,8 @@ def main(preset: str = "riddle2023-rods", seconds: float = 15.0) -> None:
     print(f"pictures sent a second    {sent / passed:6.1f}")
     print(f"pictures drawn a second   {drawn / passed:6.1f}")
     print(f"cores used by the worm and its server  {own / passed:6.2f}")
+    print(f"cores used by the page            {spent['renderer'] / passed:6.2f}")
+    print(f"cores used to draw it             {spent['gpu-process'] / passed:6.2f}")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -76,3 +77,17 @@ def rods_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """The first moments of a 3D worm, segment 1 contracting."""
     config = load_config("riddle2023-rods", {"duration_s": 0.2})
     return simulate(config, tmp_path_factory.mktemp("rods") / "run", progress=False)
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The whole site, built strictly; its tutorials, which have tests of their own, are not run for it."""
+    import jupytext
+
+    import build_site
+    import notebooks
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(notebooks.CACHE_VARIABLE, str(tmp_path_factory.mktemp("tutorials")))
+        patch.setattr(notebooks, "executed", lambda text: jupytext.reads(text, fmt="md"))
+        return build_site.build(tmp_path_factory.mktemp("build"))

@@ -18,7 +18,8 @@ from annelid_studies.riddle2023.contents import Claim, Report, Table
 from annelid_studies.worms import Effort
 
 CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")
-REPORT = Report("full", ["It walks."], Table(["period, s"], [["2.629"]]), [], [CLAIM], [], {"annelid": "0"})
+NUMBERS = Table(["period, s"], [["2.629"]])
+REPORT = Report("full", ["It walks."], NUMBERS, NUMBERS, [], [CLAIM], [], {"annelid": "0"})
 
 Asked = list[tuple[Path, Effort, Sequence[str] | None, int]]
 

@@ -103,8 +103,12 @@ def report(pictures: Path) -> Report:
     return Report(
         "full",
         ["It walks: 1-2-3.", "2. And yet it moves.", SPECIAL],
-        Table(["quantity", "paper", "ours"], [["period, s", "2.635", "2.629"]]),
-        [Figure(7, "Potentials & lengths", first, f"Potentials above. {SPECIAL}")],
+        Table(["quantity", "paper", "ours", "deviation"], [["period, s", "2.635", "2.629", "−0.2 %"]]),
+        Table(["quantity", "paper", "riddle2023"], [["force, N", "2.5", "2.283"]]),
+        [
+            Figure(5, "Muscle", second, f"Force above. {SPECIAL}"),
+            Figure(7, "Potentials & lengths", first, f"Potentials above. {SPECIAL}"),
+        ],
         [claim(number) for number in range(10)],
         [examined(name, second) for name in ("pins", "springs", "friction")],
         {"annelid": "0.3.0", "runs": "312"},
@@ -142,24 +146,37 @@ def test_both_files_hold_everything(both: Reading, report: Report) -> None:
         assert found.answer.replace("`", "") in both.texts["strong"]
         assert all(both.has(word.replace("`", "")) for row in found.table.rows for word in row)
     assert all(both.has(text.replace("`", "")) for text in report.summary)
-    assert all(map(both.has, ("2.635", "annelid 0.3.0", "runs 312")))
+    assert all(map(both.has, ("2.635", "−0.2 %", "2.283", "annelid 0.3.0", "runs 312")))
 
 
 def test_parts_stand_in_their_order(both: Reading) -> None:
     headings = [heading for heading in both.texts["h2"] if heading != "Contents"]
-    parts = ["Summary", "Main numbers", "Claims", "Figures of the paper", "Examinations", "How to reproduce"]
+    parts = ["Main numbers", "Claims", "More figures of the paper", "Examinations", "How to reproduce"]
     assert headings == parts
     assert both.texts["h1"] == ["The paper, reproduced and examined"]
 
 
+def test_one_table_and_the_leading_pictures_stand_open_and_the_rest_is_folded(html: Reading) -> None:
+    folded = [text for text in html.texts["div"] if "2.283" in text or "Examination" in text]
+    opened = html.texts["main"][0]
+    for text in html.texts["details"]:
+        opened = opened.replace(text, "")
+    assert "2.635" in opened
+    assert "Potentials above." in opened
+    assert "Force above." not in opened
+    assert "Evidence" not in opened
+    assert any("2.283" in text for text in folded)
+
+
 def test_claims_are_numbered_on_and_grouped_by_topic(both: Reading, report: Report) -> None:
-    assert both.texts["h3"][:3] == ["Structure", "Results", "Future work"]
+    topics = ["How the claims are judged", "Structure", "Results", "Future work"]
+    assert both.texts["h3"][2:6] == topics
     text = both.texts["body"][0]
     places = [text.index(f"{each.claim}") for each in report.claims]
     by_topic = [*report.claims[0::4], *report.claims[2::4], *report.claims[1::4], *report.claims[3::4]]
     by_topic[:5] = sorted(by_topic[:5], key=report.claims.index)
     assert sorted(report.claims, key=lambda each: places[report.claims.index(each)]) == by_topic
-    assert both.has("10 claims. " + "; ".join(f"{verdict}: 2" for verdict in get_args(Verdict)))
+    assert both.has("10 claims: " + "; ".join(f"{verdict}: 2" for verdict in get_args(Verdict)))
 
 
 def test_each_claim_has_its_own_evidence(html: Reading, report: Report) -> None:
@@ -182,12 +199,12 @@ def test_pictures_are_embedded_and_have_captions(html: Reading, rendered: Readin
     prefix = "data:image/png;base64,"
     sources = html.attributes("img", "src")
     assert all(source.startswith(prefix) for source in sources)
-    names = ["figure7.png", *["pins of soft.png"] * 3]
+    names = ["figure7.png", *["pins of soft.png"] * 4]
     assert [base64.b64decode(source.removeprefix(prefix)) for source in sources] == [
         (pictures / "figures" / name).read_bytes() for name in names
     ]
-    assert len(html.texts["figcaption"]) == len(html.texts["figure"]) == 4
-    assert rendered.attributes("img", "src") == ["figures/figure7.png", *["figures/pins%20of%20soft.png"] * 3]
+    assert len(html.texts["figcaption"]) == len(html.texts["figure"]) == 5
+    assert rendered.attributes("img", "src") == ["figures/figure7.png", *["figures/pins%20of%20soft.png"] * 4]
 
 
 def test_the_page_needs_nothing_else(html: Reading, pictures: Path) -> None:
@@ -197,6 +214,7 @@ def test_the_page_needs_nothing_else(html: Reading, pictures: Path) -> None:
     assert all(link.startswith("#") for link in html.attributes("a", "href"))
     assert "url(" not in bare
     assert "@import" not in bare
+    assert "default-src 'none'" in html.attributes("meta", "content")[-1] + html.attributes("meta", "content")[0]
     for name in ("report.html", "report.md"):
         assert str(pictures) not in (pictures / name).read_text(encoding="utf-8")
 
@@ -211,13 +229,13 @@ def test_contents_lead_to_every_part(both: Reading) -> None:
 
 
 def test_links_of_the_page_have_their_target(html: Reading) -> None:
-    targets = [name for tag in ("h2", "h3") for name in html.attributes(tag, "id")]
+    targets = [name for tag in ("h2", "div") for name in html.attributes(tag, "id")]
     assert sorted(html.attributes("a", "href")) == sorted(f"#{name}" for name in targets)
 
 
 def test_a_part_of_the_report_has_no_empty_headings(report: Report, tmp_path: Path) -> None:
     text = write_report(replace(report, figures=(), claims=(), examinations=()), tmp_path / "new").read_text("utf-8")
-    assert Reading(text).texts["h2"] == ["Summary", "Main numbers", "How to reproduce"]
+    assert Reading(text).texts["h2"] == ["Main numbers", "How to reproduce"]
 
 
 def test_a_part_of_the_report_tells_its_own_command(report: Report, tmp_path: Path) -> None:
@@ -242,8 +260,8 @@ def test_the_page_of_claims(report: Report) -> None:
     for each in report.claims:
         assert all(map(page.has, (each.claim, each.paper, each.ours, each.command)))
         assert page.has(each.evidence.replace("`", ""))
-    assert [len(row) for row in table_rows(text)] == [3] * 3 + [5] * 16
-    assert page.has("10 claims.")
+    assert [len(row) for row in table_rows(text)] == [4] * 3 + [3] * 3 + [5] * 16
+    assert page.has("10 claims:")
     assert "![" not in text
 
 

@@ -82,7 +82,7 @@ def test_the_worm_moves_and_holds_still(live: tuple[Show, Page]) -> None:
     begun = show.player.moment.time_s
     wait_for(lambda: show.player.moment.time_s > begun + 0.5, page)
     wait_for(lambda: np.abs(pixels(page) - first).mean() > MOVED, page)
-    page.get_by_role("button", name="play / pause").click()
+    page.get_by_role("button", name="Play / pause").click()
     wait_for(lambda: not show.player.playing, page)
     page.wait_for_timeout(500)
     still = pixels(page)
@@ -105,7 +105,7 @@ def test_a_slider_changes_the_physics(live: tuple[Show, Page]) -> None:
     assert touching(show) == {1.0}
     slider(page, "friction").press("Home")
     wait_for(lambda: touching(show) == {0.01}, page)
-    page.get_by_role("button", name="as at first").click()
+    page.get_by_role("button", name="Reset sliders").click()
     wait_for(lambda: touching(show) == {1.0}, page)
     wait_for(lambda: slider(page, "friction").get_attribute("aria-valuenow") == "1", page)
 
@@ -116,12 +116,71 @@ def touching(show: Show) -> set[float]:
     return set(model.geom_friction[(model.geom_contype != 0) | (model.geom_conaffinity != 0), 0].tolist())
 
 
+def test_keys_do_what_their_list_says(live: tuple[Show, Page]) -> None:
+    show, page = live
+    page.locator("body").press("?")
+    listed = page.get_by_role("dialog")
+    listed.wait_for()
+    assert listed.get_by_text("reset the sliders").is_visible()
+    page.keyboard.press("Escape")
+    listed.wait_for(state="hidden")
+    playing = show.player.playing
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("Space")
+    wait_for(lambda: show.player.playing is not playing, page)
+    page.keyboard.press("l")
+    wait_for(lambda: show.player.playing, page)
+
+
+def test_neurons_take_the_colours_of_their_potentials(live: tuple[Show, Page]) -> None:
+    _, page = live
+    color = "getComputedStyle(document.querySelector('.annelid-n0')).fill"
+    seen: set[str] = set()
+    wait_for(lambda: seen.add(page.evaluate(color)) or len(seen) > 1, page)
+    assert page.locator(".annelid-network").get_by_text("U1", exact=True).count() == 3
+
+
+def test_a_clip_is_recorded_and_saved(live: tuple[Show, Page], tmp_path: Path) -> None:
+    _, page = live
+    page.get_by_role("button", name="Record clip").click()
+    stop = page.get_by_role("button", name="Stop and save")
+    stop.wait_for()
+    page.wait_for_timeout(1000)
+    with page.expect_download() as saved:
+        stop.click()
+    saved.value.save_as(tmp_path / "clip.webm")
+    assert (tmp_path / "clip.webm").read_bytes()[:4] == bytes.fromhex("1a45dfa3")
+
+
+def test_a_narrow_dark_screen_shows_worm_and_panel_side_by_side_and_sharp(
+    live: tuple[Show, Page], browser: Browser
+) -> None:
+    show, _ = live
+    narrow = {"width": 400, "height": 800}
+    page = browser.new_page(viewport=narrow, color_scheme="dark", device_scale_factor=2)  # type: ignore[arg-type]
+    page.goto(show.address)
+    scene, panel = page.locator("#root canvas[data-engine]"), page.locator("#root .mantine-Paper-root").first
+    scene.wait_for(timeout=60_000)
+    page.wait_for_selector("text=Nervous system", state="attached", timeout=60_000)
+    above, below = scene.bounding_box(), page.get_by_role("button", name="Restart").bounding_box()
+    assert above is not None
+    assert below is not None
+    assert above["y"] + above["height"] < below["y"] < below["y"] + below["height"] < narrow["height"]
+    assert above["height"] > 0.4 * narrow["height"]
+    assert panel.evaluate("panel => panel.clientWidth") == above["width"] == narrow["width"]
+    assert page.evaluate("document.documentElement.scrollWidth") == narrow["width"]
+    wait_for(lambda: scene.evaluate("scene => scene.width") == 2 * narrow["width"], page)
+    assert scene.evaluate("scene => getComputedStyle(scene).backgroundColor") == "rgb(22, 25, 28)"
+    page.close()
+    wait_for(lambda: len(show.clients()) == 1)
+
+
 def test_scrubbing_shows_the_past_and_now_the_present(live: tuple[Show, Page]) -> None:
     show, page = live
     slider(page, "time (s)").press("Home")
     wait_for(lambda: show.player.moment.time_s == show.player.reel.span_s[0], page)
     assert not show.player.playing
-    page.get_by_role("button", name="now").click()
+    page.get_by_role("button", name="Live").click()
     wait_for(lambda: show.player.at_end and show.player.playing, page)
 
 

@@ -313,3 +313,30 @@ def test_planar_worms_are_refused(planar_run: Run) -> None:
     for source in (planar_run, planar_run.config):
         with pytest.raises(ConfigError, match="nothing to view in 3D"):
             player_of(source)
+
+
+def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:
+    from annelid.live.network import colors_html, network_html
+    from annelid.nervous import Network, Neuron
+
+    network, name = Network("<b>x</b>"), '</style><img src=x onerror="alert(1)">_1'
+    network.add_neuron(name, Neuron(capacitance_nF=5.0, leak_conductance_uS=1.0))
+    html = network_html(network)
+    assert "<img" not in html
+    assert "<b>" not in html
+    assert html.count('class="annelid-n0"') == 1
+    assert colors_html([-40.0]) == colors_html([-20.0]) != colors_html([0.0])
+    assert "rgb(255 255 255)" in colors_html([float("nan")])
+
+
+@pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2025-adaptive"])
+def test_the_live_diagram_is_of_the_network_that_is_stepped(preset: str) -> None:
+    from annelid.live.network import network_of
+    from annelid.live.panel import neurons_of
+
+    worm = LivingWorm(load_config(preset))
+    neurons = neurons_of(worm.reel.names)
+    network = network_of(worm.config, neurons)
+    assert network is not None
+    assert list(network.neurons) == neurons
+    assert network_of(worm.config, ["another"]) is None

@@ -31,6 +31,7 @@ _SKELETON = """<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; img-src data:">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>{title}</title>
@@ -41,7 +42,10 @@ _SKELETON = """<!DOCTYPE html>
 <header>
 {head}</header>
 <nav aria-label="Contents">
-{contents}</nav>
+<details>
+<summary>Contents</summary>
+{contents}</details>
+</nav>
 <main>
 {content}</main>
 </body>
@@ -49,6 +53,8 @@ _SKELETON = """<!DOCTYPE html>
 """
 # These read what markdown-it writes of text whose own angle brackets are escaped, so a tag is always a tag.
 _PICTURE = re.compile(r"<p>(<img [^>]*>)</p>\s*<p>(.*?)</p>", re.DOTALL)
+_SECTION = re.compile(r'<h3 id="([^"]*)">(.*?)</h3>(.*?)(?=<h[1-3] |\Z)', re.DOTALL)
+_FOLDED = r'<details>\n<summary><h3>\2</h3></summary>\n<div class="folded" id="\1">\3</div>\n</details>\n'
 _NUMBERED = re.compile(r"<table>\s*<thead>\s*<tr>\s*<th[^>]*>#</th>.*?</table>\s*<ol.*?</ol>", re.DOTALL)
 _ROW = re.compile(r"<tr>(.*?)</tr>", re.DOTALL)
 _CELL = re.compile(r"<t[hd][^>]*>(.*?)</t[hd]>", re.DOTALL)
@@ -59,7 +65,8 @@ def html_page(title: str, head: str, contents: str, content: str, folder: Path) 
     """Returns an HTML page.
 
     Beyond plain Markdown, a picture and the paragraph after it become a figure with its caption, and the items of
-    the list that follows a table of numbered rows (first column ``#``) move into the table, each below its row.
+    the list that follows a table of numbered rows (first column ``#``) move into the table, each below its row. What
+    stands below a heading of the third level is folded until it is clicked, or a link leads to it.
 
     Args:
         title: Its title, plain text.
@@ -96,7 +103,8 @@ def _html(markdown: str, folder: Path) -> str:
     html: str = reader.renderer.render(tokens, reader.options, {})
     html = _PICTURE.sub(r"<figure>\n\1\n<figcaption>\2</figcaption>\n</figure>", html)
     html = _NUMBERED.sub(_with_notes, html)
-    return re.sub(r"<table.*?</table>", r'<div class="table">\g<0></div>', html, flags=re.DOTALL)
+    html = re.sub(r"<table.*?</table>", r'<div class="table" tabindex="0">\g<0></div>', html, flags=re.DOTALL)
+    return _SECTION.sub(_FOLDED, html)
 
 
 def _text(inline: Token) -> str:

@@ -12,7 +12,7 @@ from annelid.errors import RunFileError
 from annelid.live.panel import legend_html
 from annelid.live.picture import Painter
 from annelid.live.player import config_of, player_of
-from annelid.live.server import Server, content_policy
+from annelid.live.server import Server, content_policy, with_extras
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
@@ -87,16 +87,12 @@ def _with_caption(page: str, config: RunConfig, legend: str, speed: float) -> st
     """Adds the worm's name and what the colours mean, over the scene; viser's own title gives way."""
     name, summary = html.escape(config.name), html.escape(config.summary)
     pace = "" if speed == 1.0 else f", {speed:g} &times; real time"
-    style = (
-        "position:fixed;right:12px;top:10px;z-index:5;max-width:26em;padding:8px 12px;border-radius:4px;"
-        "background:rgba(255,255,255,0.85);font-family:sans-serif;color:#222;pointer-events:none"
-    )
     caption = (
-        f'<div style="{style}"><b>{name}</b>{pace}<div style="font-size:0.8em;margin:2px 0 6px">{summary}</div>'
+        f'<div class="annelid-caption"><b>{name}</b>{pace}<div style="font-size:0.8em;margin:2px 0 6px">{summary}</div>'
         f"{legend}</div>"
     )
     policy = f'<meta http-equiv="Content-Security-Policy" content="{content_policy()}" />'
-    page = page.replace("<head>", f"<head>{policy}", 1)
+    page = with_extras(page).replace("<head>", f"<head>{policy}", 1)
     page = page.replace("<title>Viser</title>", f"<title>{name} - annelid</title>", 1)
     end = page.rindex("</body>")
     return page[:end] + caption + page[end:]

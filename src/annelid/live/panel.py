@@ -12,6 +12,7 @@ import numpy as np
 from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
 from annelid.live.living import knobs_of
+from annelid.live.network import colors_html, network_html, network_of
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
@@ -22,10 +23,11 @@ if TYPE_CHECKING:
 
     from annelid.live.show import Show
 
-PLAY, NOW, AGAIN = "play / pause", "now", "restart"
+PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
 STRONGEST_POKE = 3.0  # in weights of the worm; more would tear the thinnest
 PLOT_HEIGHT = 190  # of the plots, pixels
 MOST_SEGMENTS = 4  # with more than these the expansion neurons are left out of the first plot
+MOST_NEURONS = 24  # with more than these the diagram is folded at first
 SECONDS = 5.0  # how far back the plots go, in simulated time
 MOST_SAMPLES = 250  # of one curve of a plot
 
@@ -50,10 +52,16 @@ class Plot:
     limits: tuple[float, float] | None = None  # ends of the axis, or None for those of the curves
 
 
+def neurons_of(names: Sequence[str]) -> Sequence[str]:
+    """Returns the neurons among the signals of a `Reel`, which come first."""
+    return [name for name in names if not name.startswith("activation_")]
+
+
 def plots_of(names: Sequence[str]) -> dict[str, Plot]:
     """Returns the plots that the signals of a `Reel` make, by the names to choose from; first the default."""
-    muscles = [name for name in names if name.startswith("activation_")]
-    segments, others = by_segment(name for name in names if name not in muscles)
+    neurons = neurons_of(names)
+    muscles = names[len(neurons) :]
+    segments, others = by_segment(neurons)
     plots: dict[str, Plot] = {}
     if segments:
         plots["half-centres"] = _half_centres(segments)
@@ -98,6 +106,12 @@ class Panel:
         self._poke: Any = None
         if player.worm is not None:
             self._physics(show, player.worm.config, weight_N)
+        network = network_of(show.config, neurons) if (neurons := neurons_of(player.reel.names)) else None
+        self._n_neurons, self._colors = len(neurons), None
+        if network is not None:
+            with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
+                gui.add_html(network_html(network))
+                self._colors = gui.add_html("")
         self._plots = plots_of(player.reel.names)
         self._plot_folder = gui.add_folder("Nervous system, last 5 s")
         self._chart: Any = None
@@ -123,8 +137,8 @@ class Panel:
         gui, player = self._gui, show.player
         living = player.worm is not None
         buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: show.restart}
-        live_hint = "now: the present, and on from there. restart: time zero, with the sliders as they are."
-        row = gui.add_button_group("", list(buttons), hint=live_hint if living else "restart: from the beginning.")
+        live_hint = "Live: the present, and on from there. Restart: time zero, with the sliders as they are."
+        row = gui.add_button_group("", list(buttons), hint=live_hint if living else "Restart: from the beginning.")
         row.on_click(lambda event: show.ask(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
         self._time.on_update(_asking(show, player.seek))
@@ -142,7 +156,7 @@ class Panel:
                 self._knobs[knob].on_update(_asking(show, show.turn, knob))
             hint = "Force of a poke, the worm's weight at first: click on the worm to push it away from you for 0.15 s."
             self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
-            again = gui.add_button("as at first", hint="Gives every slider above its first value.")
+            again = gui.add_button("Reset sliders", hint="Gives every slider above its first value.")
             again.on_click(lambda _: show.ask(show.reset_knobs))
 
     def show_knobs(self, config: RunConfig) -> None:
@@ -179,6 +193,8 @@ class Panel:
         times, values = reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
         if len(times):
             self._chart.data = (times, *values[:, self._columns].T)
+            if self._colors is not None:
+                self._colors.content = colors_html(values[-1, : self._n_neurons])
 
 
 def _series(curve: Curve, colors: Sequence[str]) -> Any:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.config import RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED
 from annelid.draw.scene import Skeleton
@@ -17,7 +18,7 @@ from annelid.simulation.anatomy import Anatomy
 Lines = NDArray[np.float32]  # ends of line segments, m, ``(n, 2, 3)``
 Colors = NDArray[np.uint8]  # red, green and blue at these ends, ``(n, 2, 3)``
 
-STRAND_COLORS = ((0.16, 0.38, 0.72), (0.42, 0.62, 0.86))  # of the two handednesses
+STRAND_COLORS = tuple(rgba[:3] for rgba in STRAND_RGBA)  # of the two handednesses, as in stills
 SPRING_COLORS = ((0.45, 0.20, 0.70), (0.80, 0.74, 0.60), (0.95, 0.50, 0.05))
 """Of an axial spring at most shortened, at rest, and at most stretched."""
 SPRING_RANGE = 0.3  # strain at which these colours are full

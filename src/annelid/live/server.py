@@ -15,6 +15,7 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
+from importlib import resources
 from typing import Any
 
 from annelid.errors import ConfigError, MissingDependency
@@ -23,6 +24,7 @@ try:
     import msgspec
     import viser
     from websockets.asyncio import server as web
+    from websockets.datastructures import Headers
     from websockets.http11 import Request, Response
 except ImportError:
     raise MissingDependency(
@@ -109,8 +111,14 @@ class Guard:
             if refusal is not None or page is None:
                 return connection.respond(HTTPStatus.FORBIDDEN, refusal or WRONG_HOST)
             path = _parts(request.path)[1].decode("ascii", "replace")
-            answer = page(connection, Request(f"/{path}", request.headers))
+            # Uncompressed, so that it can be added to.
+            plain = Headers((name, value) for name, value in request.headers.raw_items() if name != "Accept-Encoding")
+            answer = page(connection, Request(f"/{path}", plain))
             if answer is not None:
+                if answer.headers.get("Content-Type", "").startswith("text/html"):
+                    answer.body = with_extras(answer.body.decode()).encode()
+                    del answer.headers["Content-Length"]
+                    answer.headers["Content-Length"] = str(len(answer.body))
                 host = request.headers["Host"]
                 answer.headers["Referrer-Policy"] = "no-referrer"
                 answer.headers["Content-Security-Policy"] = content_policy("'self'", f"ws://{host}", f"wss://{host}")
@@ -172,6 +180,13 @@ def content_policy(*connections: str) -> str:
         "style-src 'unsafe-inline'; img-src blob: data:; font-src data:; "
         f"connect-src {' '.join(('blob:', 'data:', *connections))}; base-uri 'none'; form-action 'none'"
     )
+
+
+def with_extras(page: str) -> str:
+    """Adds our keys, clips and looks to a page of viser, as text of annelid's own files."""
+    files = resources.files("annelid.live")
+    style, script = (files.joinpath(name).read_text("utf-8") for name in ("viewer.css", "viewer.js"))
+    return page.replace("<head>", f"<head><style>{style}</style><script>{script}</script>", 1)
 
 
 def is_loopback(host: str) -> bool:

@@ -57,9 +57,9 @@ class Show:
             ConfigError: The body is planar, or cannot be built.
             RunFileError: The run holds no postures.
         """
-        self._config = config_of(source)
+        self.config = config_of(source)
         self.player, anatomy = player_of(source, speed)
-        painter = Painter(anatomy, self._config)
+        painter = Painter(anatomy, self.config)
         self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
         self._wishing = threading.Lock()
         self._ending = threading.Event()
@@ -70,7 +70,7 @@ class Show:
         self.frames_drawn = 0
         self._server = Server(host, port)
         self.address = self._server.address
-        self.stage = Stage(self._server, self._config, painter, self.player.moment)
+        self.stage = Stage(self._server, self.config, painter, self.player.moment)
         weight_N = round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1)
         legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
         self.panel = Panel(self._server, self, speed, weight_N, legend)
@@ -137,7 +137,7 @@ class Show:
         if worm is None or self.player.stopped:
             return
         if not self.player.at_end:
-            self._notice = "This is the past: press now and poke the worm again."
+            self._notice = "This is the past: press Live and poke the worm again."
             return
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
         place = struck(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
@@ -172,10 +172,10 @@ class Show:
         pace = (time_s - self._pace[0][1]) / passed if passed > 0 else 0.0
         parts, below = [f"{time_s:.2f} s"], self._notice
         if player.stopped:
-            below = f"Stopped: {player.stopped}. Move the sliders back and restart. {self._notice}"
+            below = f"Stopped: {player.stopped}. Move the sliders back and press Restart. {self._notice}"
         elif not player.playing:
             parts.append("paused")
         else:
             parts.append(f"{max(pace, 0.0):.2f} \N{MULTIPLICATION SIGN} real time")
             parts += [] if player.worm is None or player.at_end else ["(the past)"]
-        return status_html(self._config.name, parts, below)
+        return status_html(self.config.name, parts, below)

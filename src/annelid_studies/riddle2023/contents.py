@@ -101,8 +101,9 @@ class Report:
     """The whole report."""
 
     effort: Effort  # Quick or full
-    summary: Sequence[str]  # Paragraphs that say what was found, for those who read no further
-    main_table: Table  # Our main numbers beside the paper's
+    summary: Sequence[str]  # Paragraphs that say how to read the numbers
+    main_table: Table  # Our main numbers beside the paper's, with the deviation
+    variants: Table  # More numbers, of several worms
     figures: Sequence[Figure]  # The paper's figures from our own runs
     claims: Sequence[Claim]  # The paper's claims
     examinations: Sequence[Examined]  # The examinations in the order of the report

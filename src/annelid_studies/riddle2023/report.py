@@ -17,6 +17,8 @@ from annelid_studies.tables import grouped
 TITLE = "The paper, reproduced and examined"
 PAPER = "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control"
 MARKDOWN_NAME, HTML_NAME = "report.md", "report.html"
+LEADING = (4, 7, 9)
+"""Numbers of the figures that stand first: the model, what it does, and its elongations beside the robot's."""
 CLAIMS_COMMAND = "annelid paper -o report --claims docs/paper.md"
 """The command that regenerates the page of claims in the repository."""
 
@@ -36,13 +38,16 @@ def write_report(report: Report, folder: Path) -> Path:
         OSError: The folder cannot be made, or a picture cannot be read.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    intro = f"Every figure and claim of {emphasis(PAPER)} (Riddle et al. 2023) from our own runs."
-    head = f"# {TITLE}\n\n{intro} {_provenance(report)}"
+    intro = f"What {emphasis(PAPER)} (Riddle et al. 2023) shows and claims, beside what annelid computes."
+    head = f"# {TITLE}\n\n{intro}\n\n{_provenance(report)}"
+    leading = [figure for figure in report.figures if figure.number in LEADING]
+    others = [figure for figure in report.figures if figure.number not in LEADING]
     blocks = [
-        "## Summary",
-        *_summary(report),
-        *_main_numbers_and_claims(report),
-        *_figures(report.figures, folder),
+        *_main_numbers(report),
+        *(block for figure in leading for block in _figure(figure, folder)),
+        *_details_of_numbers(report),
+        *_claims(report),
+        *_more_figures(others, folder),
         *_examinations(report.examinations, folder),
         *_how_to_reproduce(report),
     ]
@@ -58,8 +63,12 @@ def claims_page(report: Report) -> str:
         f"Every number of ours comes from a run; this page is written by {code(CLAIMS_COMMAND)}, together with the "
         f"whole report: its figures and its examinations."
     )
-    blocks = ["# The paper's claims", intro, *_summary(report), _provenance(report), *_main_numbers_and_claims(report)]
-    return "\n\n".join(blocks) + "\n"
+    found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]
+    answers = ["## What the examinations found", "\n".join(found)] if found else []
+    numbers = [*_main_numbers(report), *_details_of_numbers(report)]
+    return (
+        "\n\n".join(["# The paper's claims", intro, _provenance(report), *numbers, *_claims(report), *answers]) + "\n"
+    )
 
 
 def _contents(blocks: Iterable[str]) -> str:
@@ -79,16 +88,18 @@ def _paragraphs(texts: Iterable[str]) -> list[str]:
     return [words(text) for text in texts if text.strip()]
 
 
-def _summary(report: Report) -> list[str]:
-    """The summary, and what each examination found."""
-    found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]
-    return [*_paragraphs(report.summary), *(["What the examinations found:", "\n".join(found)] if found else [])]
+def _main_numbers(report: Report) -> list[str]:
+    verdicts = f"Verdicts on the paper's {len(report.claims)} claims: {tally(report.claims)}." if report.claims else ""
+    return [block for block in ("## Main numbers", plain_table(report.main_table), verdicts) if block]
 
 
-def _main_numbers_and_claims(report: Report) -> list[str]:
-    blocks = ["## Main numbers", plain_table(report.main_table)]
-    if report.claims:
-        blocks += ["## Claims", f"{len(report.claims)} claims. {tally(report.claims)}.", *_paragraphs(report.rule)]
+def _details_of_numbers(report: Report) -> list[str]:
+    numbers = ["### More numbers, several worms", plain_table(report.variants)]
+    return ["### How to read the numbers", *_paragraphs(report.summary), *numbers]
+
+
+def _claims(report: Report) -> list[str]:
+    blocks = ["## Claims", "### How the claims are judged", *_paragraphs(report.rule)] if report.claims else []
     first = 1
     for topic, claims in grouped(report.claims, lambda claim: claim.topic).items():
         rows, notes = [], []
@@ -109,13 +120,16 @@ def _note(claim: Claim, indent: str) -> str:
     return f"\\\n{indent}".join([said, *commands] if said else commands)
 
 
-def _figures(figures: Sequence[Figure], folder: Path) -> list[str]:
-    blocks = ["## Figures of the paper"] if figures else []
+def _more_figures(figures: Sequence[Figure], folder: Path) -> list[str]:
+    blocks = ["## More figures of the paper"] if figures else []
     for figure in figures:
-        name = f"Figure {figure.number}"
-        caption = f"**{name}.** {words(figure.caption)}"
-        blocks += [f"### {name}: {words(figure.title)}", _picture(figure.picture, figure.title, folder), caption]
+        blocks += [f"### Figure {figure.number}: {words(figure.title)}", *_figure(figure, folder)]
     return blocks
+
+
+def _figure(figure: Figure, folder: Path) -> list[str]:
+    caption = f"**Figure {figure.number}.** {words(figure.caption)}"
+    return [_picture(figure.picture, figure.title, folder), caption]
 
 
 def _examinations(examinations: Sequence[Examined], folder: Path) -> list[str]:
@@ -146,6 +160,5 @@ def _how_to_reproduce(report: Report) -> list[str]:
         "report is kept in `runs`, every figure as PNG and SVG in `figures`. A second call computes only what is "
         "missing or has changed."
     )
-    versions = table(["What", "Value"], [[words(name), words(value)] for name, value in report.provenance.items()])
     rows = [[words(what), code(command)] for what, command in commands]
-    return ["## How to reproduce", kept, table(["To make", "Command"], rows), versions]
+    return ["## How to reproduce", kept, table(["To make", "Command"], rows)]

@@ -26,12 +26,12 @@ def number(value: float | None) -> float:
     return nan if value is None else value
 
 
-def in_unit(value: float | None, scale: float = 1.0, digits: int = 2) -> str:
-    """Formats a number after scaling it; a dash for None and NaN."""
+def in_unit(value: float | None, scale: float = 1.0, digits: int = 2, sign: str = "") -> str:
+    """Formats a number after scaling it, with a plus where ``sign`` is one; a dash for None and NaN."""
     scaled = number(value) * scale
     if not isfinite(scaled):
         return NOTHING
-    text = f"{scaled:.{digits}f}"
+    text = f"{scaled:{sign}.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
 
 

@@ -15,7 +15,8 @@ from annelid.draw import canvas, panel_title, save_both, segment_colors
 
 _CM = 100.0
 _BAR = 0.8
-_LABEL_WIDTH = 22
+_LABELS_WIDTH = 84
+"""Characters of all labels side by side."""
 
 CAPTION = (
     "Largest elongation of each segment of the physical robot (four segments, mean of the left and the right stretch "
@@ -40,7 +41,7 @@ def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) ->
         absolute.set_ylabel("elongation (cm)")
         panel_title(relative, "b) the same relative to segment 1")
         relative.set_ylabel("relative elongation (1)")
-        relative.set_xticks(range(len(groups)), [fill(label, _LABEL_WIDTH) for label in groups])
+        relative.set_xticks(range(len(groups)), [fill(label, _LABELS_WIDTH // len(groups)) for label in groups])
         handles = absolute.containers[list(groups.values()).index(most)]
         names = [f"segment {segment}" for segment in range(1, len(most) + 1)]
         room = {"columnspacing": 1.2, "handlelength": 1.2, "borderaxespad": 0.1}
@@ -55,8 +56,8 @@ def _draw_bars(axes: Axes, groups: Sequence[ArrayLike], n_segments: int) -> None
     for center, values in enumerate(map(np.asarray, groups)):
         places = center + width * (np.arange(len(values)) - (len(values) - 1) / 2)
         bars = axes.bar(places, values, 0.92 * width, color=colors[: len(values)], edgecolor="0.1", linewidth=0.6)
-        for label in axes.bar_label(bars, labels=[f"{value:.2f}" for value in values], padding=2, fontsize=8):
-            label.set_bbox({"facecolor": "w", "edgecolor": "none", "pad": 0.6})
+        for label in axes.bar_label(bars, labels=[f"{value:.2f}" for value in values], padding=2, fontsize=6.5):
+            label.set_bbox({"facecolor": "w", "edgecolor": "none", "pad": 0.2})
     axes.grid(axis="x", visible=False)
     axes.tick_params(axis="x", length=0)
     axes.margins(y=0.12)

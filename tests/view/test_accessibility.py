@@ -1,0 +1,84 @@
+"""Pages that everybody can read and use, as far as axe-core can say: site, report and live view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from live_page import ARGUMENTS, CHROMIUM, open_show
+
+from annelid.config import load_config
+from annelid.draw import html_page
+
+pytest.importorskip("axe_playwright_python", reason="the script of axe-core is missing: pip install '.[dev]'")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here to open pages with")
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+SIZES = ((1280, "light"), (400, "dark"))
+PAGES = ("index.html", "gait.html", "live_view.html", "reference/api/control.html")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}-{size[1]}")
+def page(request: pytest.FixtureRequest, browser: Browser) -> Iterator[Page]:
+    width, scheme = request.param
+    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    yield page
+    page.close()
+
+
+def serious(page: Page) -> list[str]:
+    """What axe-core finds serious or critical on a page: each rule with the first place that breaks it."""
+    page.evaluate((resources.files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run()")["violations"]
+    return [
+        f"{one['id']}: {one['nodes'][0]['html']} {one['nodes'][0]['failureSummary']}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def test_the_site(page: Page, site: Path) -> None:
+    for name in PAGES:
+        page.goto((site / name).as_uri())
+        page.wait_for_timeout(300)
+        assert serious(page) == [], name
+
+
+def test_a_report(page: Page, tmp_path: Path) -> None:
+    claims = "| # | Claim | Verdict |\n| --- | --- | --- |\n| 1 | It walks. | **holds** |\n\n1. Seen: `annelid run`"
+    content = f"## Numbers\n\n| a | b |\n| --- | --- |\n| 1 | 2 |\n\n### Claims\n\n{claims}"
+    contents = "- [Numbers](#numbers)\n  - [Claims](#claims)"
+    (tmp_path / "report.html").write_text(html_page("Report", "# Report", contents, content, tmp_path))
+    page.goto((tmp_path / "report.html").as_uri())
+    assert serious(page) == []
+    assert not page.get_by_text("It walks.").is_visible()
+    page.evaluate("location.hash = 'claims'")
+    page.get_by_text("It walks.").wait_for()
+    assert serious(page) == []
+
+
+def test_the_live_view(page: Page) -> None:
+    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
+    with open_show(load_config("riddle2023-rods")) as show:
+        page.goto(show.address)
+        page.wait_for_selector("text=Nervous system", state="attached", timeout=60_000)
+        page.locator("[role=slider][aria-label=friction]").wait_for()
+        page.wait_for_timeout(1000)
+        assert serious(page) == []
+        page.get_by_role("button", name="Keys").click()
+        assert serious(page) == []

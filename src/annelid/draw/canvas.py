@@ -42,6 +42,14 @@ STYLE: Any = {
     "figure.facecolor": "white",
 }
 
+# What differs on a dark page.
+_LIGHT = "#e8eaed"
+_DARK = {
+    **{f"{side}.facecolor": "#14161a" for side in ("figure", "axes", "savefig")},
+    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), _LIGHT),
+    "grid.color": "#33383f",
+}
+
 # Dark to light, so that the order of segments survives greyscale; hues far apart for colour-blind eyes.
 _FEW = ("#1b2a6b", "#c2410c", "#35b5a0", "#e3b428")
 RELAXED = (0.46, 0.49, 0.54)
@@ -53,28 +61,29 @@ _UNDATED = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 
 @contextmanager
-def canvas(height_in: float, width_in: float = WIDTH_IN) -> Iterator[Figure]:
+def canvas(height_in: float, width_in: float = WIDTH_IN, *, dark: bool = False) -> Iterator[Figure]:
     """Gives an empty figure without a window or global state; draw and save it in the block.
 
     Args:
         height_in: Height, inches.
         width_in: Width, inches.
+        dark: Light words on a dark page.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE | (_DARK if dark else {})):
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
 
 
-def save(figure: Figure, path: str | Path) -> Path:
+def save(figure: Figure, path: str | Path, **options: Any) -> Path:
     """Writes a figure in the format of the path's suffix; the file appears only when it is whole."""
     path = Path(path)
     with whole_file(path) as draft:
-        figure.savefig(draft, metadata=_UNDATED.get(path.suffix.lower()))
+        figure.savefig(draft, metadata=_UNDATED.get(path.suffix.lower()), **options)
     return path
 
 

@@ -40,7 +40,7 @@ def test_published_elongations_end_at_lines_that_are_named(rods_run: Run, pictur
     plots._lengths(axes, rods_run, line_looks(3))
     first_helix = 100.0 * rods_run.data["stretch_length"].values[:, :, 0]
     expected = first_helix.min(axis=0) + np.array([4.20, 2.55, 4.02])
-    levels = [line for line in axes.lines if len(line.get_xdata()) == 2 and line.get_linestyle() == "--"]
+    levels = [line for line in axes.lines if np.size(line.get_xdata()) == 2 and line.get_linestyle() == "--"]
     assert sorted(float(np.asarray(line.get_ydata())[0]) for line in levels) == pytest.approx(sorted(expected))
     named = [text.get_text().removeprefix("paper: ") for text in axes.texts if text.get_text().startswith("paper")]
     assert sorted(",".join(named).replace(" ", "").split(",")) == ["1", "2", "3"]

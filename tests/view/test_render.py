@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from annelid.body import mesh_of
+from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import VIEWS_DEG
 from annelid.draw.overlay import Overlay, bar_length, length_name
@@ -340,6 +341,7 @@ def test_cables_and_crossings_are_drawn_in_proportion_to_the_worm(radius_m: floa
 @pytest.mark.parametrize(("preset", "n_links"), [("riddle2023-rods", 0), ("riddle2023", 2), ("riddle2023-fast", 2)])
 def test_soft_crossings_have_a_bar_to_each_strand(preset: str, n_links: int) -> None:
     config = load_config(preset)
+    assert isinstance(config.body, WormBody)
     worm = DrawnWorm(config)
     worm.pose(worm.model.qpos0)
     scene = mujoco.MjvScene(worm.model, maxgeom=1000)

@@ -213,8 +213,7 @@ def render(
         typer.echo(render_strip(opened, strip, frames, camera=camera, background=background))
     if video is not None:
         with task_bar(VIDEO_TASK) as progress:
-            look = {"camera": camera, "background": background}
-            render_video(opened, video, fps=fps, speed=speed, progress=progress, **look)
+            render_video(opened, video, fps=fps, speed=speed, camera=camera, background=background, progress=progress)
         typer.echo(video)
 
 

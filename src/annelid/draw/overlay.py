@@ -180,10 +180,12 @@ def _bar(figure: Figure, left: float, right: float, height: float, ink: Any) -> 
     return bar
 
 
-def legend_handle(name: str, color: Sequence[float], look: str) -> Line2D:
+def legend_handle(name: str, rgb: Sequence[float], look: str) -> Line2D:
     """Returns what stands in a legend for an entry."""
     from matplotlib.lines import Line2D
 
+    red, green, blue = rgb[:3]
+    color = red, green, blue
     if look == "ball":
-        return Line2D([], [], color="none", marker="o", markerfacecolor=color[:3], markeredgecolor="none", label=name)
-    return Line2D([], [], color=color[:3], linewidth=3.0, label=name)
+        return Line2D([], [], color="none", marker="o", markerfacecolor=color, markeredgecolor="none", label=name)
+    return Line2D([], [], color=color, linewidth=3.0, label=name)

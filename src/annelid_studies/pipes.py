@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from rich.table import Table as TerminalTable
 
 from annelid.analysis import Passage, gait, passage_of
-from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
+from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
@@ -192,16 +192,16 @@ def _draw_pipe(rows: Sequence[Axes], pipe: str, courses: Mapping[str, Course]) -
     speed, drive, ring = rows
     panel_title(speed, f"{pipe}: speed of the middle (cm/s)")
     panel_title(drive, "drive of the descending neuron")
-    panel_title(ring, "foremost ring (cm); dashed: the bore")
-    for color, (name, one) in zip(segment_colors(3), courses.items(), strict=False):
+    panel_title(ring, "foremost ring (cm); grey: the bore")
+    for look, (name, one) in zip(line_looks(3), courses.items(), strict=False):
         lines = (CM * one.speed_m_per_s, one.drive, CM * one.first_ring_m)
         for axes, values in zip(rows, lines, strict=True):
-            axes.plot(one.front_m, values, label=name, color=color, linewidth=1.1, alpha=0.85)
+            axes.plot(one.front_m, values, label=name, **look, linewidth=1.1)
     farthest = max(courses.values(), key=lambda one: one.front_m.max())
     order = np.argsort(farthest.front_m)
     # The ring is the hexagon of six crossings that lie in the bore.
     bore_cm = CM * 6.0 * farthest.bore_m[order]
-    ring.plot(farthest.front_m[order], bore_cm, color="0.3", linestyle=(0, (4, 3)))
+    ring.plot(farthest.front_m[order], bore_cm, color="0.65", linewidth=2.2, zorder=1)
     ring.set_xlabel("foremost ring along the pipe (m)")
     drive.set_ylim(-0.05, 1.05)
 

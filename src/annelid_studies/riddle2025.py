@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from rich.table import Table as TerminalTable
 
 from annelid.analysis import Track, passage_of, track_of
-from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid.draw import canvas, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
@@ -259,7 +259,7 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
 
 def _draw(axes: Axes, readings: Sequence[Reading], over: str) -> None:
     gaits = grouped(readings, lambda one: one.gait)
-    for (gait, own), color, marker in zip(gaits.items(), segment_colors(max(len(gaits), 1)), "os^", strict=False):
+    for (gait, own), look, marker in zip(gaits.items(), line_looks(max(len(gaits), 1)), "os^", strict=False):
         place = [getattr(one, over) for one in own]
         speed, low, high = CM * np.array([(one.speed_m_per_s, one.low_m_per_s, one.high_m_per_s) for one in own]).T
-        axes.errorbar(place, speed, [speed - low, high - speed], color=color, marker=marker, capsize=2.0, label=gait)
+        axes.errorbar(place, speed, [speed - low, high - speed], **look, marker=marker, capsize=2.0, label=gait)

@@ -103,6 +103,19 @@ def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: P
     assert Path("v.mp4").stat().st_size > 1000
 
 
+def test_render_takes_a_background_and_refuses_a_strip_of_a_planar_worm(annelid: Command, finished: Path) -> None:
+    import imageio.v3
+
+    for name, corner in (("dark", [20, 22, 26]), ("white", [255, 255, 255])):
+        done = annelid("render", finished, "--time", "0.5", "-o", f"{name}.png", "--background", name)
+        assert done.exit_code == 0, done.err
+        assert imageio.v3.imread(f"{name}.png")[0, 0, :3].tolist() == corner
+    done = annelid("render", finished, "--strip", "s.pdf")
+    assert done.exit_code == 2
+    assert "planar" in done.err
+    assert not Path("s.pdf").exists()
+
+
 def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> None:
     import mujoco
     import numpy as np

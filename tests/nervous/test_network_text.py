@@ -211,7 +211,8 @@ def test_every_neuron_of_a_worm_has_a_place_of_its_own_in_the_svg():
     assert len(rims) == 16
     assert len({tuple(corners_of(rim).mean(axis=0).round()) for rim in rims}) == 16
     labels = [t.text for t in root.findall(f"{SVG}text")]
-    assert {"contraction_1", "relay_4", "stretch 3", "kick"} <= set(labels)
+    assert {"U1", "U4", "stretch 3", "kick", "segment 4", "inhibitory synapse"} <= set(labels)
+    assert any("U1: contraction" in str(label) for label in labels)
 
 
 def test_saving_and_showing_a_diagram(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,7 +18,15 @@ from annelid.config import load_config
 from annelid.draw.figures import network_diagram
 from annelid.errors import ConfigError
 from annelid.nervous import Network
-from annelid.nervous.drawing import effect_of, lay_out
+from annelid.nervous.drawing import (
+    Words,
+    abbreviations,
+    effect_of,
+    key_shapes,
+    labels_of,
+    lay_out,
+    network_shapes,
+)
 from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid_studies.riddle2023.figures import muscle_surface, planar_models, robot_lengths
@@ -217,8 +226,8 @@ def network(request: pytest.FixtureRequest) -> Network:
 
 
 def drawn_ids(network: Network, folder: Path) -> Counter[str]:
-    png = network_diagram.network_figure(network, folder / "network")
-    ids = (node.get("id", "") for node in ElementTree.parse(png.with_suffix(".svg")).iter())
+    svg = network_diagram.network_figure(network, folder / "network.svg")
+    ids = (node.get("id", "") for node in ElementTree.parse(svg).iter())
     return Counter(found for found in ids if found.startswith(("neuron-", "synapse-", "gap-", "input-", "output-")))
 
 
@@ -272,17 +281,51 @@ def test_effects_come_from_reversal_and_rest() -> None:
 
 
 def test_abbreviations_tell_names_apart() -> None:
-    assert network_diagram.abbreviations(["contraction_1", "control_1", "u_1", "contraction_2"]) == {
+    assert abbreviations(["contraction_1", "control_1", "u_1", "contraction_2"]) == {
         "contraction": "contra",
         "control": "contro",
         "u": "u",
     }
-    assert network_diagram.abbreviations(["in", "inner"]) == {"in": "in", "inner": "inn"}
+    assert abbreviations(["in", "inner"]) == {"in": "in", "inner": "inn"}
+
+
+def test_a_network_without_columns_has_its_names_in_the_neurons_and_long_ones_in_the_key() -> None:
+    network = Network()
+    for name in ("left", "half_centre_1", "half_centre_2"):
+        network.add_neuron(name, Neuron())
+    labels = labels_of(network)
+    assert labels["left"] == "left"
+    assert len(set(labels.values())) == 3
+    assert max(map(len, labels.values())) <= 9
+    written = [
+        shape.text
+        for shape in key_shapes(network, network_shapes(network, strengths=False), 1.0)
+        if isinstance(shape, Words)
+    ]
+    assert any("half_centre" in text for text in written)
+
+
+def test_a_diagram_and_the_figure_of_a_network_have_the_same_parts_and_key(network: Network, tmp_path: Path) -> None:
+    svg = network.diagram().svg
+    shown = set(re.findall(r'id="([^"]+)"', svg))
+    assert shown == set(drawn_ids(network, tmp_path))
+    assert "synapse</text>" in svg
+    assert "input current" in svg or not network.inputs
+
+
+def test_words_stay_clear_of_the_figures_edge(network: Network, tmp_path: Path) -> None:
+    pixels = imageio.v3.imread(network_diagram.network_figure(network, tmp_path / "a.png", conductances=True))[:, :, :3]
+    for edge in (pixels[:4], pixels[-4:], pixels[:, :4], pixels[:, -4:]):
+        assert (edge == 255).all()
 
 
 @pytest.mark.parametrize("conductances", [False, True])
 def test_figure_6(network: Network, tmp_path: Path, conductances: bool) -> None:
-    png = network_diagram.network_figure(network, tmp_path / "figure_6", conductances=conductances)
+    for suffix in (".svg", ".png", ".pdf"):
+        stem = tmp_path / "figure_6"
+        path = network_diagram.network_figure(network, stem.with_suffix(suffix), conductances=conductances)
+        assert path.stat().st_size > 5000
+    png = path.with_suffix(".png")
     assert_two_good_files(png)
     ids = Counter(node.get("id") for node in ElementTree.parse(png.with_suffix(".svg")).iter() if node.get("id"))
     for name in network.neurons:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from annelid.draw import plots
-from annelid.draw.canvas import activation_color, segment_colors
+from annelid.draw.canvas import activation_color, line_looks, segment_colors
 from annelid.draw.plots import figure7
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
@@ -35,19 +35,63 @@ def test_figure7_of_a_3d_worm_shows_six_sensors(rods_run: Run, picture: Path) ->
 
 def test_published_elongations_end_at_lines_that_are_named(rods_run: Run, picture: Path) -> None:
     from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
 
     axes = Figure().subplots()
-    plots._lengths(axes, rods_run, segment_colors(3))
+    plots._lengths(axes, rods_run, line_looks(3))
     first_helix = 100.0 * rods_run.data["stretch_length"].values[:, :, 0]
-    named = {text.get_text(): float(text.xy[1]) for text in axes.texts if isinstance(text, Annotation)}
     expected = first_helix.min(axis=0) + np.array([4.20, 2.55, 4.02])
-    assert [named[f"paper, {segment}"] for segment in (1, 2, 3)] == pytest.approx(expected)
-    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in axes.lines[-3:]) == pytest.approx(sorted(expected))
+    levels = [line for line in axes.lines if np.size(line.get_xdata()) == 2 and line.get_linestyle() == "--"]
+    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in levels) == pytest.approx(sorted(expected))
+    named = [text.get_text().removeprefix("paper: ") for text in axes.texts if text.get_text().startswith("paper")]
+    assert sorted(",".join(named).replace(" ", "").split(",")) == ["1", "2", "3"]
     other = replace(rods_run, config=rods_run.config.model_copy(update={"published": None}))
     axes = Figure().subplots()
-    plots._lengths(axes, other, segment_colors(3))
-    assert not axes.texts
+    plots._lengths(axes, other, line_looks(3))
+    assert [text.get_text() for text in axes.texts] == ["at rest"]
+
+
+def test_levels_that_coincide_are_both_seen_and_named_together() -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.0, 2.0))
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 0.8, 1.0))
+    axes.set_ylim(7.0, 12.0)
+    looks = line_looks(3)
+    plots._draw_levels(axes, [11.0, 9.9, 11.0], looks)
+    assert [text.get_text() for text in axes.texts] == ["paper: 2", "paper: 1, 3"]
+    canvas.draw()
+    row = np.asarray(canvas.buffer_rgba())[40, :320, :3].astype(int)
+    for look in (looks[0], looks[2]):
+        wanted = np.array([int(look["color"][i : i + 2], 16) for i in (1, 3, 5)])
+        assert np.sum(np.abs(row - wanted).max(axis=1) < 60) > 30, "a line hides the other"
+
+
+@pytest.mark.parametrize("n_segments", [1, 3, 4, 8, 60])
+def test_the_legend_names_every_segment_or_evenly_spaced_ones_of_many(n_segments: int) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(layout="constrained")
+    plots._name_segments(figure, line_looks(n_segments), "title")
+    (legend,) = figure.legends
+    named = [int(text.get_text().removeprefix("segment ")) for text in legend.get_texts()]
+    assert (named[0], named[-1]) == (1, n_segments)
+    assert named == list(range(1, n_segments + 1)) or len(named) == 16
+
+
+@pytest.mark.parametrize("n_lines", [2, 3, 4])
+def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers(n_lines: int) -> None:
+    from matplotlib.colors import to_rgb
+
+    looks = line_looks(n_lines)
+    assert len({str(look["linestyle"]) for look in looks}) == n_lines
+    linear = np.array([to_rgb(look["color"]) for look in looks]) ** 2.2
+    # What red-blind and green-blind eyes are left with (Vienot et al., 1999).
+    for kept in ([[0.1121, 0.8853, -0.0005]] * 2, [[0.2920, 0.7054, -0.0003]] * 2):
+        seen = np.clip(linear @ np.array([*kept, [0.0, 0.0, 1.0]]).T, 0.0, 1.0) ** (1 / 2.2)
+        apart = np.abs(seen[:, None] - seen).max(axis=2)[~np.eye(n_lines, dtype=bool)]
+        assert apart.min() > 0.15
 
 
 def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, picture: Path) -> None:

@@ -6,14 +6,18 @@ import sys
 from pathlib import Path
 
 import imageio.v3
+import mujoco
 import numpy as np
 import pytest
 
+from annelid.body import mesh_of
+from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import VIEWS_DEG
+from annelid.draw.overlay import Overlay, bar_length, length_name
 from annelid.draw.planar_scene import rhombi
-from annelid.draw.render import render_frame, render_video
-from annelid.draw.scene import WormScene
+from annelid.draw.render import render_frame, render_strip, render_video
+from annelid.draw.scene import DrawnWorm, WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
@@ -248,3 +252,119 @@ def test_a_failing_video_leaves_nothing_and_keeps_what_was_there(planar_run: Run
         render_video(planar_run, target, size=(160, 96), progress=fail)
     assert target.read_bytes() == b"precious"
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
+
+
+@pytest.mark.parametrize(
+    ("width", "pixels_per_m", "name"), [(960, 1000.0, "10 cm"), (960, 1100.0, "10 cm"), (1280, 100.0, "2 m")]
+)
+def test_the_scale_bar_is_as_long_as_it_says(width: int, pixels_per_m: float, name: str) -> None:
+    length_m = bar_length(width, pixels_per_m)
+    assert length_name(length_m) == name
+    overlay = Overlay((width, 500), [("strand", (0.0, 0.0, 1.0), "line")], pixels_per_m, "black", "white")
+    drawn = overlay.stamped(np.full((500, width, 3), 255, dtype=np.uint8), "")
+    dark = drawn[250:, width // 2 :].max(axis=2) < 60
+    assert dark.sum(axis=1).max() == pytest.approx(length_m * pixels_per_m, abs=2)
+
+
+def test_words_are_in_the_margin_that_the_camera_leaves() -> None:
+    entries = [(f"an entry {i}", (1.0, 0.0, 0.0), "line") for i in range(6)]
+    for size in ((960, 544), (480, 272), (1280, 800)):
+        paper = np.full((size[1], size[0], 3), 200, dtype=np.uint8)
+        drawn = Overlay(size, entries, 1000.0, "black", (200 / 255,) * 3).stamped(paper, "1.00 s")
+        rows, columns = np.nonzero((drawn != paper).any(axis=2))
+        assert columns.max() < size[0] - 1
+        inside = (rows > 0.12 * size[1]) & (rows < 0.88 * size[1])
+        assert not inside.any()
+        assert (rows < 0.12 * size[1]).any(), "the legend"
+        assert ((rows > 0.88 * size[1]) & (columns < size[0] / 2)).any(), "the time"
+
+
+@needs_gl
+def test_the_legend_has_the_colours_of_the_picture(rods_run: Run) -> None:
+    with WormScene(rods_run, 480, 300, "side", fine=True) as scene:
+        assert [name for name, _, _ in scene.legend] == [
+            "strand",
+            "axial spring",
+            "ring, relaxed",
+            "ring, contracted",
+            "crossing",
+        ]
+        pixels = scene.picture(len(scene.times_s) - 1).astype(int)
+        for _, color, _ in scene.legend:
+            wanted = np.rint(255 * np.array(color[:3]))
+            assert (np.abs(pixels[:40] - wanted).max(axis=2) <= 3).any()
+
+
+@needs_gl
+@pytest.mark.parametrize(("name", "corner"), [("white", 255), ("dark", 50)])
+def test_a_background_is_of_one_colour_below_a_worm_with_a_shadow(rods_run: Run, name: str, corner: int) -> None:
+    with WormScene(rods_run, 240, 136, "isometric", fine=False, background=name, words=False) as scene:
+        pixels = scene.picture(0).astype(int)
+    for row, column in ((0, 0), (0, 239), (135, 0), (135, 239), (68, 0)):
+        assert (np.abs(pixels[row, column] - corner) <= (0 if name == "white" else 35)).all()
+    near = pixels[135, 0]
+    grey = np.ptp(pixels, axis=2) < 12
+    assert np.mean(grey & (pixels.max(axis=2) < near.max() - 8)) > 0.01, "no shadow"
+
+
+@needs_gl
+def test_stills_and_videos_have_the_same_light_and_shadows(rods_run: Run) -> None:
+    seen = []
+    for fine in (True, False):
+        with WormScene(rods_run, 240, 136, "isometric", fine=fine, words=False) as scene:
+            seen.append(scene.picture(0).astype(float))
+    assert np.abs(seen[0].mean(axis=(0, 1)) - seen[1].mean(axis=(0, 1))).max() < 1.0
+
+
+def test_an_unknown_background_is_refused(planar_run: Run, picture: Path) -> None:
+    with pytest.raises(RunFileError, match=r"unknown background 'whit'.*white"):
+        render_frame(planar_run, 1.0, picture, background="whit")
+
+
+def test_a_planar_worm_can_be_drawn_on_a_dark_page(planar_run: Run, picture: Path) -> None:
+    render_frame(planar_run, 1.0, picture, size=(320, 160), background="dark")
+    assert imageio.v3.imread(picture)[0, 0, :3].max() < 60
+
+
+@needs_gl
+@pytest.mark.parametrize("radius_m", [0.16, 0.08])
+def test_cables_and_crossings_are_drawn_in_proportion_to_the_worm(radius_m: float) -> None:
+    config = load_config("riddle2023-rods", {"body.mesh.radius_m": radius_m})
+    worm = DrawnWorm(config)
+    ring = worm.model.tendon("ring_0").id
+    assert worm.model.tendon_width[ring] == pytest.approx(0.003 * radius_m / 0.16)
+    ball = worm.model.geom("crossing_0").id
+    assert worm.model.geom_size[ball, 0] == pytest.approx(max(0.005 * radius_m / 0.16, 0.0028))
+
+
+@needs_gl
+@pytest.mark.parametrize(("preset", "n_links"), [("riddle2023-rods", 0), ("riddle2023", 2), ("riddle2023-fast", 2)])
+def test_soft_crossings_have_a_bar_to_each_strand(preset: str, n_links: int) -> None:
+    config = load_config(preset)
+    assert isinstance(config.body, WormBody)
+    worm = DrawnWorm(config)
+    worm.pose(worm.model.qpos0)
+    scene = mujoco.MjvScene(worm.model, maxgeom=1000)
+    worm.add_links(scene)
+    assert scene.ngeom == n_links * mesh_of(config.body.mesh).n_crossings
+    assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)
+
+
+@needs_gl
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+def test_a_strip_has_its_frames_with_their_times(rods_run: Run, tmp_path: Path, suffix: str) -> None:
+    target = render_strip(rods_run, tmp_path / f"strip.{suffix}", 4)
+    assert target.stat().st_size > 20_000
+    if suffix == "png":
+        width, height = imageio.v3.imread(target).shape[1::-1]
+        assert width == pytest.approx(7.2 * 300, abs=2)
+        assert height > 0.4 * width, "two rows"
+
+
+def test_impossible_strips_are_refused(planar_run: Run, tmp_path: Path) -> None:
+    with pytest.raises(RunFileError, match="planar"):
+        render_strip(planar_run, tmp_path / "a.png")
+    with pytest.raises(RunFileError, match="1 frames: a strip has 2 to 24"):
+        render_strip(planar_run, tmp_path / "a.png", 1)
+    with pytest.raises(RunFileError, match=r"\.pdf"):
+        render_strip(planar_run, tmp_path / "a.gif")

@@ -6,8 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
-from annelid.draw.figures.sweep import _label, sweep_figure, worded
+from annelid.draw.figures.sweep import (
+    SIGNED,
+    _colors,
+    _label,
+    _line,
+    _map,
+    mean_interval,
+    quantity,
+    sweep_figure,
+    worded,
+)
 
 FIELDS = {
     "arena.friction": ([0.1, 0.3, 1.0], "1"),
@@ -56,3 +69,59 @@ def test_labels_have_the_unit_once() -> None:
     assert worded("heading_change_rad", "rad") == "heading change (rad)"
     assert worded("slip_ratio", "1") == "slip ratio"
     assert _label(grid(list(FIELDS), False)["controller.gate_time_constant_ms"]) == "gate time constant (ms)"
+
+
+def drawn(values: np.ndarray, **attrs: str) -> xr.Dataset:
+    coords = {f: (f, np.arange(n, dtype=float), {"units": "1"}) for f, n in zip("ab", values.shape, strict=True)}
+    return xr.Dataset({"speed_m_per_s": (("a", "b"), values, {"units": "m/s", **attrs})}, coords)
+
+
+def cells(values: np.ndarray) -> list[tuple[tuple[float, float], str]]:
+    figure = Figure()
+    axes = figure.subplots()
+    _map(figure, axes, drawn(values), ["a", "b"], "speed_m_per_s")
+    return [(text.get_position(), text.get_text()) for text in axes.texts]
+
+
+def test_values_stand_in_the_cells_of_a_map_where_they_fit() -> None:
+    values = np.array([[0.1234, -0.02], [np.nan, 12.345]])
+    assert cells(values) == [((0, 0), "0.123"), ((0, 1), "-0.02"), ((1, 1), "12.3")]
+    assert cells(np.zeros((40, 2))) == []
+    assert cells(np.zeros((2, 40))) == []
+
+
+def test_numbers_on_both_sides_of_zero_have_signed_colours() -> None:
+    assert _colors(np.array([-0.1, 0.4, np.nan])) == {"cmap": SIGNED, "vmin": -0.4, "vmax": 0.4}
+    assert "vmin" not in _colors(np.array([0.0, 0.4]))
+    red, _, blue, _ = colormaps[SIGNED](1.0)
+    assert blue > red, "forwards is blue"
+
+
+def test_numbers_are_named_in_words_with_their_unit() -> None:
+    named = drawn(np.zeros((1, 1)), long_name="speed towards the front")["speed_m_per_s"]
+    assert quantity(named) == "speed towards the front (m/s)"
+    assert quantity(drawn(np.zeros((1, 1)))["speed_m_per_s"]) == "speed (m/s)"
+    assert max(map(len, quantity(named, 12).splitlines())) <= 12
+
+
+def test_repeats_have_the_interval_of_students_t() -> None:
+    mean, half = mean_interval(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, np.nan], [5.0, np.nan, np.nan], [np.nan] * 3]))
+    np.testing.assert_allclose(mean, [2.0, 1.5, 5.0, np.nan])
+    # t(0.975) is 4.303 with two degrees of freedom and 12.706 with one.
+    np.testing.assert_allclose(half, [4.303 / np.sqrt(3.0), 12.706 * 0.5, np.nan, np.nan], rtol=1e-3)
+    axes = Figure().subplots()
+    _line(axes, grid(["arena.friction"], True), "arena.friction", "slip_ratio")
+    assert len(axes.containers) == 1
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["one run", "mean, 95 % interval"]
+
+
+def test_a_map_of_16_cells_has_no_number_beyond_its_cell() -> None:
+    axes = (figure := Figure(figsize=(3.7, 2.6), layout="constrained")).subplots()
+    canvas = FigureCanvasAgg(figure)
+    _map(figure, axes, drawn(np.full((4, 4), -0.0123)), ["a", "b"], "speed_m_per_s")
+    canvas.draw()
+    (left, _), (right, _) = axes.transData.transform([(0, 0), (1, 0)])
+    assert len(axes.texts) == 16
+    assert max(text.get_window_extent(canvas.get_renderer()).width for text in axes.texts) < right - left

@@ -168,41 +168,52 @@ def render(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Frame to write: .png, .jpg  [default: frame.png in the run]")
     ] = None,
+    strip: Annotated[
+        Path | None, typer.Option(help="Draw the last cycle as frames side by side: .png, .pdf, .svg")
+    ] = None,
+    frames: Annotated[int, typer.Option(min=2, max=24, help="Frames of the strip.")] = 6,
     video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv, .gif")] = None,
     fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
     camera: Annotated[
         str | None, typer.Option(help="isometric, side, top, front or course  [default: isometric]")
     ] = None,
+    background: Annotated[
+        str | None, typer.Option(help="white or dark, for papers and slides  [default: a floor with squares of 10 cm]")
+    ] = None,
     force: Force = False,
 ) -> None:
-    """Draw a frame or a video of a run.
+    """Draw a frame, a strip of frames or a video of a run.
 
-    Both come from the recorded postures: later, and on any machine.
+    All come from the recorded postures: later, and on any machine. Of a 3D worm they carry a legend, the time, and a
+    scale bar that is right at the distance of the worm's middle.
 
     \b
     annelid render runs/riddle2023-001 --time 1.5 -o frame.png
     annelid render runs/riddle2023-001 --video slow.mp4 --speed 0.25
     annelid render runs/riddle2023-001 --time 1.5 --camera side -o side.png
+    annelid render runs/riddle2023-001 --strip cycle.pdf --background white
     """
     from annelid.draw.gallery import VIDEO_TASK, task_bar
-    from annelid.draw.render import render_frame, render_video
+    from annelid.draw.render import render_frame, render_strip, render_video
     from annelid.simulation.runfile import open_run
 
-    if video is None and at is None:
-        raise typer.BadParameter("say what to draw: --time SECONDS for a frame, --video FILE for a video")
+    if video is None and at is None and strip is None:
+        raise typer.BadParameter("say what to draw: --time SECONDS for a frame, --strip FILE, --video FILE")
     if output is not None and at is None:
         raise typer.BadParameter("-o names the frame, so it needs --time SECONDS as well")
     opened = open_run(run)
-    for target in (output, video):
+    for target in (output, strip, video):
         if target is not None:
             refuse_existing(target, force)
     frame = opened.path.parent / "frame.png" if output is None else output
     if at is not None:
-        typer.echo(render_frame(opened, at, frame, camera=camera))
+        typer.echo(render_frame(opened, at, frame, camera=camera, background=background))
+    if strip is not None:
+        typer.echo(render_strip(opened, strip, frames, camera=camera, background=background))
     if video is not None:
         with task_bar(VIDEO_TASK) as progress:
-            render_video(opened, video, fps=fps, speed=speed, camera=camera, progress=progress)
+            render_video(opened, video, fps=fps, speed=speed, camera=camera, background=background, progress=progress)
         typer.echo(video)
 
 

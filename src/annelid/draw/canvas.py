@@ -42,38 +42,48 @@ STYLE: Any = {
     "figure.facecolor": "white",
 }
 
+# What differs on a dark page.
+_LIGHT = "#e8eaed"
+_DARK = {
+    **{f"{side}.facecolor": "#14161a" for side in ("figure", "axes", "savefig")},
+    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), _LIGHT),
+    "grid.color": "#33383f",
+}
+
 # Dark to light, so that the order of segments survives greyscale; hues far apart for colour-blind eyes.
 _FEW = ("#1b2a6b", "#c2410c", "#35b5a0", "#e3b428")
 RELAXED = (0.46, 0.49, 0.54)
 CONTRACTED = (0.86, 0.16, 0.10)
+DASHES: tuple[Any, ...] = ("-", (0, (4.0, 1.4)), (0, (5.0, 1.3, 1.2, 1.3)), (0, (1.2, 1.1)))
 MARKERS = ("o", "s", "^", "D", "v")
 # Without the date, the same numbers give the same file.
 _UNDATED = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 
 @contextmanager
-def canvas(height_in: float, width_in: float = WIDTH_IN) -> Iterator[Figure]:
+def canvas(height_in: float, width_in: float = WIDTH_IN, *, dark: bool = False) -> Iterator[Figure]:
     """Gives an empty figure without a window or global state; draw and save it in the block.
 
     Args:
         height_in: Height, inches.
         width_in: Width, inches.
+        dark: Light words on a dark page.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE | (_DARK if dark else {})):
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
 
 
-def save(figure: Figure, path: str | Path) -> Path:
+def save(figure: Figure, path: str | Path, **options: Any) -> Path:
     """Writes a figure in the format of the path's suffix; the file appears only when it is whole."""
     path = Path(path)
     with whole_file(path) as draft:
-        figure.savefig(draft, metadata=_UNDATED.get(path.suffix.lower()))
+        figure.savefig(draft, metadata=_UNDATED.get(path.suffix.lower()), **options)
     return path
 
 
@@ -104,6 +114,11 @@ def segment_colors(n_segments: int) -> list[Any]:
     from matplotlib import colormaps
 
     return [tuple(rgba) for rgba in colormaps["viridis"](np.linspace(0.0, 0.88, n_segments))]
+
+
+def line_looks(n_lines: int) -> list[dict[str, Any]]:
+    """Returns colour and dashes of each of several lines, so that they differ in grey and for colour-blind readers."""
+    return [{"color": c, "linestyle": d} for c, d in zip(segment_colors(n_lines), cycle(DASHES), strict=False)]
 
 
 def activation_color(activation: float) -> tuple[float, float, float]:
@@ -146,15 +161,15 @@ def draw_lines(
 
     Args:
         axes: Where to draw.
-        lines: Values of the parameter and numbers, by the name in the legend; each with its own colour and marker.
+        lines: Values of the parameter and numbers, by the name in the legend; each with colour, dashes and marker.
         markers: Whether the lines have markers.
         **style: Further properties of the lines, as matplotlib takes them.
     """
     shapes = cycle(MARKERS if markers else [""])
-    for (name, (x, y)), color, marker in zip(lines.items(), segment_colors(len(lines)), shapes, strict=False):
+    for (name, (x, y)), look, marker in zip(lines.items(), line_looks(len(lines)), shapes, strict=False):
         place, value = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        axes.plot(place, value, color=color, marker=marker, label=plain(name), **style)
-        mark_lost(axes, place[np.isnan(value)], color)
+        axes.plot(place, value, **{**look, "marker": marker, "label": plain(name), **style})
+        mark_lost(axes, place[np.isnan(value)], look["color"])
 
 
 def mark_lost(axes: Axes, places: ArrayLike, color: Any, height: float = 0.04) -> None:

@@ -12,7 +12,7 @@ import os
 import platform
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -93,8 +93,9 @@ class Canvas(AbstractContextManager):
     """An off-screen picture of a MuJoCo model, whose off-screen size and sampling are set here, from a free camera.
 
     Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
-    the back-end that `find_backend` chose. Shadows and smooth edges (``fine``) cost ten times the time where software
-    draws. ``upright`` is the rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``.
+    the back-end that `find_backend` chose. Smooth edges (``fine``) cost twice the time where software draws; ``sky`` is
+    whether one is drawn. ``upright`` is the rotation from the model's axes to those that the camera's angles are meant
+    in, ``(3, 3)``.
     """
 
     def __init__(
@@ -105,6 +106,7 @@ class Canvas(AbstractContextManager):
         backend: str,
         *,
         fine: bool = True,
+        sky: bool = True,
         upright: NDArray[np.float64] | None = None,
     ) -> None:
         import mujoco
@@ -130,7 +132,8 @@ class Canvas(AbstractContextManager):
             raise RenderingUnavailable(f"the OpenGL back-end {backend} failed: {error}") from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._buffers)
         self._scene = mujoco.MjvScene(model, maxgeom=50_000)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = fine
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = True
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = sky
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
 
@@ -144,14 +147,19 @@ class Canvas(AbstractContextManager):
                 part.free()
         self._buffers = self._context = None
 
-    def draw(self, data: mujoco.MjData, caption: str = "") -> NDArray[np.uint8]:
-        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``."""
+    def draw(self, data: mujoco.MjData, add: Callable[[mujoco.MjvScene], object] | None = None) -> NDArray[np.uint8]:
+        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``.
+
+        ``add`` may add to the scene before it is drawn.
+        """
         import mujoco
 
         model, camera, scene = self._model, self.camera, self._scene
         # Another canvas may have been opened in between.
         self._context.make_current()
         mujoco.mjv_updateScene(model, data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
+        if add is not None:
+            add(scene)
         if self._upright is not None:
             for eye in scene.camera:
                 eye.pos = camera.lookat + (eye.pos - camera.lookat) @ self._upright
@@ -160,9 +168,6 @@ class Canvas(AbstractContextManager):
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         view = mujoco.MjrRect(0, 0, width, height)
         mujoco.mjr_render(view, scene, self._buffers)
-        if caption:
-            corner = mujoco.mjtGridPos.mjGRID_BOTTOMLEFT
-            mujoco.mjr_overlay(mujoco.mjtFont.mjFONT_NORMAL, corner, view, caption, "", self._buffers)
         mujoco.mjr_readPixels(pixels, None, view, self._buffers)
         return pixels[::-1]
 

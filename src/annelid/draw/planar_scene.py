@@ -30,7 +30,7 @@ class PlanarScene(AbstractContextManager):
     against, so the pictures keep its middle in place.
     """
 
-    def __init__(self, run: Run, width: int, height: int) -> None:
+    def __init__(self, run: Run, width: int, height: int, *, dark: bool = False) -> None:
         from matplotlib.patches import Polygon
 
         data = run.data
@@ -41,7 +41,7 @@ class PlanarScene(AbstractContextManager):
         self._heights = _CM * data["ring_length"].values
         self._outline = _CM * data["outline"].values if "outline" in data else None
         self._activation = data["activation"].values
-        with canvas(height / _DPI, width / _DPI) as figure:
+        with canvas(height / _DPI, width / _DPI, dark=dark) as figure:
             figure.set_dpi(_DPI)
             self._canvas: Any = figure.canvas
             self._axes = axes = figure.add_subplot()
@@ -58,7 +58,9 @@ class PlanarScene(AbstractContextManager):
             look: dict[str, Any] = {"ha": "center", "va": "center", "color": "w", "size": 13, "weight": "bold"}
             self._rhombi: list[tuple[Polygon, Text]] = []
             for i in range(self._lengths.shape[1]):
-                patch = Polygon(np.zeros((4, 2)), closed=True, edgecolor="0.15", linewidth=1.2, animated=True)
+                patch = Polygon(
+                    np.zeros((4, 2)), closed=True, edgecolor="0.9" if dark else "0.15", linewidth=1.2, animated=True
+                )
                 axes.add_patch(patch)
                 self._rhombi.append((patch, axes.text(0, 0, str(i + 1), animated=True, **look)))
             self._canvas.draw()
@@ -78,7 +80,7 @@ class PlanarScene(AbstractContextManager):
             patch.set_xy(corners[i])
             patch.set_facecolor(activation_color(float(self._activation[frame, i])))
             label.set_position(corners[i].mean(axis=0))
-        self._title.set_text(f"{self.times_s[frame]:.2f} s   (red: contracted)")
+        self._title.set_text(f"{self.times_s[frame]:.2f} s   (red: contracted, grey: relaxed)")
         self._canvas.restore_region(self._background)
         for artist in (*chain(*zip(*self._rhombi, strict=True)), self._title):
             self._axes.draw_artist(artist)

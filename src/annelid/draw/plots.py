@@ -10,7 +10,7 @@ import numpy as np
 from annelid.analysis.paper import published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
 from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, line_entries, panel_title, plain, save, segment_colors
+from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
 from annelid.output import with_suffix
@@ -19,19 +19,23 @@ from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _CM = 100.0
+_DASH_PT = 5.0  # of a published level, in line widths
+_SAME = 0.035  # levels nearer than this share of the panel's height are named together
+_MOST_NAMED, _NAMES_A_ROW = 16, 8  # segments in the legend: of more, as many from the first to the last
+_THICK, _THIN = 1.8, 0.8
 PLOT_SUFFIXES = (".png", ".pdf", ".svg")
-PUBLISHED = (0, (7.0, 3.0))  # dashes of a published level
 
 
 def figure7(run: Run, path: str | Path) -> Path:
     """Draws the counterpart of the paper's Fig. 7: membrane potentials and stretch sensor lengths.
 
-    Three panels over time, one colour per segment: potentials of the half-centres (contraction neurons solid, expansion
-    neurons dashed), the phases in which each segment contracts, and the stretch sensors' lengths (thick: mean of the
-    segment's sensors, thin: the first of them, dotted: rest length, dashed: where the published elongation ends, if
-    there is one).
+    Three panels over time, one colour and line style per segment: potentials of the half-centres (contraction neurons
+    thick, expansion neurons thin), the phases in which each segment contracts, and the stretch sensors' lengths (thick:
+    mean of the segment's sensors, thin: the first of them). Horizontal lines are the rest length and, where there are
+    published elongations, the lengths at which these end.
 
     Args:
         run: The run.
@@ -50,16 +54,15 @@ def figure7(run: Run, path: str | Path) -> Path:
     if data.sizes.get("time", 0) < 2 or "stretch_length" not in data:
         raise RunFileError(f"{run.path} holds too little to plot: fewer than two samples of stretch lengths")
     n_segments = run.config.body.n_segments
-    colors = segment_colors(n_segments)
+    looks = line_looks(n_segments)
     phase_height = 0.35 + 0.13 * n_segments
-    with canvas(5.0 + phase_height) as figure:
+    with canvas(5.3 + phase_height) as figure:
         neural, phases, lengths = figure.subplots(3, 1, sharex=True, height_ratios=[2.5, phase_height, 2.5])
-        _potentials(neural, run, colors)
-        _phases(phases, run, colors)
-        _lengths(lengths, run, colors)
+        _potentials(neural, run, looks)
+        _phases(phases, run, looks)
+        _lengths(lengths, run, looks)
         lengths.set(xlabel="time (s)", xlim=data["time"].values[[0, -1]])
-        title = plain(f"{run.config.name}: {n_segments} segments")
-        figure.suptitle(title, x=0.01, ha="left", fontsize=11, weight="bold")
+        _name_segments(figure, looks, f"{run.config.name}: {n_segments} segments")
         figure.align_ylabels()
         return save(figure, path)
 
@@ -82,29 +85,23 @@ def neuron_potentials(run: Run, role: str) -> dict[int, Array]:
     return {segment: traces[f"{role}_{segment}"] for segment in segments if f"{role}_{segment}" in traces}
 
 
-def _potentials(axes: Axes, run: Run, colors: list) -> None:
+def _potentials(axes: Axes, run: Run, looks: list[dict]) -> None:
     panel_title(axes, "Half-centres")
     axes.set_ylabel("membrane potential\nabove rest (mV)")
     if "potential" not in run.data:
         axes.text(0.5, 0.5, "no neurons recorded", transform=axes.transAxes, ha="center", color="0.4")
         return
-    styles = {"contraction": ("-", 1.5), "expansion": ("--", 1.0)}
-    of_roles = {role: neuron_potentials(run, role) for role in styles}
-    for segment, color in enumerate(colors, start=1):
-        for role, (style, width) in styles.items():
-            if segment in of_roles[role]:
-                axes.plot(run.data["time"].values, of_roles[role][segment], style, color=color, linewidth=width)
-    n = len(colors)
-    # Of many segments only the ends and the middle.
-    shown = range(n) if n <= 3 else (0, n // 2, n - 1)
-    entries = [("0.25", *look, role) for role, look in styles.items()]
-    _legend(axes, [*entries, *((colors[i], "-", 3.0, f"segment {i + 1}") for i in shown)])
+    widths = {"contraction": _THICK, "expansion": _THIN}
+    for role, width in widths.items():
+        for segment, trace in neuron_potentials(run, role).items():
+            axes.plot(run.data["time"].values, trace, **looks[segment - 1], linewidth=width)
+    _legend(axes, [("0.25", "-", width, f"{role} neuron") for role, width in widths.items()])
 
 
-def _phases(axes: Axes, run: Run, colors: list) -> None:
+def _phases(axes: Axes, run: Run, looks: list[dict]) -> None:
     """One bar for every stretch of time in which a segment is contracted, one row per segment."""
     data = run.data
-    n_segments = len(colors)
+    n_segments = len(looks)
     panel_title(axes, "Contraction (activation above 0.5)")
     step = max(1, -(-n_segments // 12))
     axes.set(ylabel="segment", ylim=(n_segments + 0.6, 0.4), yticks=range(1, n_segments + 1, step))
@@ -113,44 +110,64 @@ def _phases(axes: Axes, run: Run, colors: list) -> None:
         return
     time = data["time"].values
     activation = segment_activation(data["activation"].values, n_segments)
-    for i, color in enumerate(colors):
+    for i, look in enumerate(looks):
         spans = (time[[a, min(b, len(time) - 1)]].tolist() for a, b in stretches(activation[:, i] > CONTRACTED))
-        axes.broken_barh([(a, b - a) for a, b in spans], (i + 0.65, 0.7), facecolors=color)
+        axes.broken_barh([(a, b - a) for a, b in spans], (i + 0.65, 0.7), facecolors=look["color"])
 
 
-def _lengths(axes: Axes, run: Run, colors: list) -> None:
+def _lengths(axes: Axes, run: Run, looks: list[dict]) -> None:
     data = run.data
     panel_title(axes, "Stretch sensors")
     axes.set_ylabel("length (cm)")
     time = data["time"].values
     stretch = _CM * data["stretch_length"].values
     several = stretch.shape[2] > 1
-    for i, color in enumerate(colors):
+    for i, look in enumerate(looks):
         if several:
-            axes.plot(time, stretch[:, i, 0], "-", color=color, linewidth=0.7, alpha=0.9)
-        axes.plot(time, stretch[:, i].mean(axis=1), "-", color=color, linewidth=2.0)
-    axes.axhline(float((_CM * data["stretch_rest_length"].values).mean()), color="0.35", linestyle=":", linewidth=1.0)
-    entries: list[tuple] = [("0.25", "-", 2.0, "mean of its sensors" if several else "sensor")]
+            axes.plot(time, stretch[:, i, 0], **look, linewidth=_THIN)
+        axes.plot(time, stretch[:, i].mean(axis=1), **look, linewidth=_THICK)
+    rest = float((_CM * data["stretch_rest_length"].values).mean())
+    axes.axhline(rest, color="0.35", linewidth=0.6)
+    _name_level(axes, rest, "at rest")
+    entries: list[tuple] = [("0.25", "-", _THICK, "mean of its sensors" if several else "sensor")]
     if several and isinstance(run.config.body, WormBody):
-        entries.append(("0.25", "-", 0.7, run.config.body.springs.first_sensor))
-    entries.append(("0.35", ":", 1.0, "rest length"))
+        entries.append(("0.25", "-", _THIN, run.config.body.springs.first_sensor))
     levels = _published_levels(run)
-    # Each level's segment is named right of the panel, in turn above and below the line.
-    for rank, i in enumerate(np.argsort(levels)[::-1]):
-        axes.axhline(levels[i], color=colors[i], linestyle=PUBLISHED, linewidth=0.9)
-        axes.annotate(
-            f"paper, {i + 1}",
-            (1.0, levels[i]),
-            xycoords=("axes fraction", "data"),
-            xytext=(3, 0),
-            textcoords="offset points",
-            va="top" if rank % 2 else "bottom",
-            fontsize=7.0,
-            color="0.25",
-        )
     if levels:
-        entries.append(("0.25", PUBLISHED, 0.9, "as published"))
+        _draw_levels(axes, levels, looks)
+        entries.append(("0.25", (0, (_DASH_PT, _DASH_PT)), 1.0, "longest in the paper"))
     _legend(axes, entries)
+
+
+def _draw_levels(axes: Axes, levels: list[float], looks: list[dict]) -> None:
+    """Draws the segments' published levels, cm, and names them right of the panel, those that coincide together."""
+    n = len(levels)
+    together: list[list[int]] = []
+    low, high = axes.get_ylim()
+    for i in np.argsort(levels).tolist():
+        # Each line's dashes fall into the gaps of the others, so that coinciding lines are all seen.
+        dashes = (i * _DASH_PT, (_DASH_PT, _DASH_PT * max(n - 1, 1)))
+        axes.axhline(levels[i], color=looks[i]["color"], linestyle=dashes, linewidth=1.0)
+        if together and levels[i] - levels[together[-1][-1]] < _SAME * (high - low):
+            together[-1].append(i)
+        else:
+            together.append([i])
+    for group in together:
+        named = ", ".join(str(i + 1) for i in sorted(group))
+        _name_level(axes, float(np.mean([levels[i] for i in group])), f"paper: {named}")
+
+
+def _name_level(axes: Axes, level: float, text: str) -> None:
+    axes.annotate(
+        text,
+        (1.0, level),
+        xycoords=("axes fraction", "data"),
+        xytext=(3, 0),
+        textcoords="offset points",
+        va="center",
+        fontsize=7.0,
+        color="0.25",
+    )
 
 
 def _published_levels(run: Run) -> list[float]:
@@ -164,6 +181,22 @@ def _published_levels(run: Run) -> list[float]:
         if field in beside:
             return (_CM * (start + np.asarray(beside[field].value))).tolist()
     return []
+
+
+def _name_segments(figure: Figure, looks: list[dict], title: str) -> None:
+    """Puts a title and a legend of the segments above all panels: every one, or evenly spaced ones of many."""
+    n = len(looks)
+    named = np.unique(np.linspace(0, n - 1, min(n, _MOST_NAMED)).round().astype(int)).tolist()
+    entries = [(*looks[i].values(), _THICK, f"segment {i + 1}") for i in named]
+    figure.legend(
+        handles=line_entries(entries),
+        loc="outside upper left",
+        ncols=_NAMES_A_ROW,
+        handlelength=2.6,
+        title=plain(title),
+        title_fontproperties={"size": 11, "weight": "bold"},
+        alignment="left",
+    )
 
 
 def _legend(axes: Axes, entries: list[tuple]) -> None:

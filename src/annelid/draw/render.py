@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.analysis.rhombi import nearest_time
+from annelid.draw.overlay import background_of, legend_handle, length_name
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
@@ -28,6 +29,9 @@ FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1
 VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
 """Width and height in pixels by the kind of body; a video's are multiples of 16, as its codec likes them."""
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
+STRIP_SUFFIXES = (".png", ".pdf", ".svg")
+STRIP_SIZE = (840, 525)
+STRIP_RANGE, STRIP_COLUMNS, STRIP_DPI = (2, 24), 3, 300.0
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
 DEFAULT_CAMERA = "isometric"
 MOST_PICTURES = 200_000  # of a video, which are drawn some 30 a second
@@ -47,7 +51,13 @@ Progress = Callable[[int, int], object]  # called with the number of frames done
 
 
 def render_frame(
-    run: Run, time_s: float, path: str | Path, *, camera: str | None = None, size: tuple[int, int] | None = None
+    run: Run,
+    time_s: float,
+    path: str | Path,
+    *,
+    camera: str | None = None,
+    background: str | None = None,
+    size: tuple[int, int] | None = None,
 ) -> Path:
     """Draws the recorded posture nearest to a time.
 
@@ -56,6 +66,7 @@ def render_frame(
         time_s: Simulated time, s.
         path: Picture to write (``.png``, ``.jpg``).
         camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
+        background: ``white`` or ``dark``; by default a floor with squares of 10 cm, or, of a planar worm, white.
         size: Width and height, pixels; by default `FRAME_SIZE`.
 
     Returns:
@@ -70,11 +81,70 @@ def render_frame(
 
     path = with_suffix(path, FRAME_SUFFIXES, "a picture")
     size = size or FRAME_SIZE[run.config.body.kind]
-    with _scene(run, size, camera, fine=True) as scene:
+    with _scene(run, size, camera, background, fine=True) as scene:
         pixels = scene.picture(nearest_time(run, scene.times_s, time_s))
     with whole_file(path) as draft:
         imageio.v3.imwrite(draft, pixels)
     return path
+
+
+def render_strip(
+    run: Run,
+    path: str | Path,
+    n_frames: int = 6,
+    *,
+    camera: str | None = None,
+    background: str | None = None,
+) -> Path:
+    """Draws one cycle of a 3D worm as frames side by side with their times: the last whole one, or all of a run.
+
+    Args:
+        run: The run.
+        path: File to write; its suffix chooses the format (``.png``, ``.pdf``, ``.svg``).
+        n_frames: Number of frames, evenly spaced in time, 2 to 24.
+        camera: As in `render_frame`.
+        background: As in `render_frame`.
+
+    Returns:
+        The path written.
+
+    Raises:
+        RunFileError: As of `render_frame`, the worm is planar, or ``n_frames`` is out of range.
+        RenderingUnavailable: No OpenGL back-end works.
+    """
+    from annelid.analysis.gait import cycle_marks
+    from annelid.draw.canvas import WIDTH_IN, canvas, save
+
+    path = with_suffix(path, STRIP_SUFFIXES, "a strip of frames")
+    fewest, most = STRIP_RANGE
+    if not fewest <= n_frames <= most:
+        raise RunFileError(f"{n_frames} frames: a strip has {fewest} to {most}")
+    if run.config.body.is_planar:
+        raise RunFileError("a strip of frames shows a 3D worm, and this one is planar: draw its frames one by one")
+    width, height = STRIP_SIZE
+    with _worm_scene(run, STRIP_SIZE, camera, background, fine=True, words=False) as scene:
+        marks = cycle_marks(run)
+        start, end = marks[-2:] if len(marks) > 1 else scene.times_s[[0, -1]]
+        shown = [nearest_time(run, scene.times_s, t) for t in np.linspace(start, end, n_frames, endpoint=False)]
+        pictures = [scene.picture(frame) for frame in shown]
+        entries, length_m, pixels_per_m = scene.legend, scene.bar_m, scene.pixels_per_m
+    columns = min(n_frames, STRIP_COLUMNS)
+    rows = math.ceil(n_frames / columns)
+    height_in = rows * (WIDTH_IN / columns * height / width + 0.25) + 0.3
+    with canvas(height_in, dark=background == "dark") as figure:
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axes in panels:
+            axes.axis("off")
+        for axes, picture, frame in zip(panels, pictures, shown, strict=False):
+            axes.imshow(picture, interpolation="antialiased")
+            axes.set_title(f"{scene.times_s[frame]:.2f} s", fontsize=9.0, pad=3.0)
+        # The camera keeps its distance, so one bar is right for all.
+        bar, ink = [0.96 * width - length_m * pixels_per_m, 0.96 * width], background_of(background or "floor").ink
+        panels[0].plot(bar, [0.94 * height] * 2, color=ink, linewidth=1.6, solid_capstyle="butt")
+        panels[0].text(np.mean(bar), 0.92 * height, length_name(length_m), ha="center", fontsize=7.0, color=ink)
+        handles = [legend_handle(*entry) for entry in entries]
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=7.5, handlelength=1.4)
+        return save(figure, path, dpi=STRIP_DPI)
 
 
 def render_video(
@@ -84,10 +154,11 @@ def render_video(
     fps: float = 25.0,
     speed: float = 1.0,
     camera: str | None = None,
+    background: str | None = None,
     size: tuple[int, int] | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Draws the whole run as a video (H.264, or an animated GIF), without shadows, which cost most of the time.
+    """Draws the whole run as a video (H.264, or an animated GIF); its edges are less smooth than those of a frame.
 
     The file appears under its name only when it is complete.
 
@@ -97,6 +168,7 @@ def render_video(
         fps: Frames per second of the video, 1 to 240; the recorded posture nearest to each is shown.
         speed: Simulated seconds per second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
+        background: As in `render_frame`.
         size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
         progress: Called after every frame.
 
@@ -119,7 +191,7 @@ def render_video(
         width, height = VIDEO_SIZE[run.config.body.kind]
         # A GIF is large for what it shows, and so it is drawn smaller.
         size = (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
-    with _scene(run, size, camera, fine=False) as scene, whole_file(path) as draft:
+    with _scene(run, size, camera, background, fine=False) as scene, whole_file(path) as draft:
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
         pictures = (last - first) * fps / speed + 1.0
         if pictures > MOST_PICTURES:
@@ -137,16 +209,26 @@ def render_video(
     return path
 
 
-def _scene(run: Run, size: tuple[int, int], camera: str | None, *, fine: bool) -> WormScene | PlanarScene:
-    if run.config.body.is_planar:
-        from annelid.draw.planar_scene import PlanarScene
+def _scene(
+    run: Run, size: tuple[int, int], camera: str | None, background: str | None, *, fine: bool
+) -> WormScene | PlanarScene:
+    if not run.config.body.is_planar:
+        return _worm_scene(run, size, camera, background, fine=fine, words=True)
+    from annelid.draw.planar_scene import PlanarScene
 
-        if camera is not None:
-            raise RunFileError(f"camera {camera!r} does not apply: a planar worm has one view only")
-        return PlanarScene(run, *size)
+    if camera is not None:
+        raise RunFileError(f"camera {camera!r} does not apply: a planar worm has one view only")
+    if background is not None:
+        background_of(background)
+    return PlanarScene(run, *size, dark=background == "dark")
+
+
+def _worm_scene(
+    run: Run, size: tuple[int, int], camera: str | None, background: str | None, *, fine: bool, words: bool
+) -> WormScene:
     from annelid.draw.scene import WormScene
 
-    return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine)
+    return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine, background=background or "floor", words=words)
 
 
 @contextmanager

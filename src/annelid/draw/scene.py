@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from annelid.body import mesh_of
+from annelid.body.actuation import crossing_site
+from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.canvas import CONTRACTED, activation_color
 from annelid.draw.gl import Canvas, find_backend
+from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, Overlay, background_of, bar_length
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy
@@ -21,12 +26,16 @@ from annelid.simulation.runfile import Run
 
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
-AMBIENT, AMBIENT_ON_WHITE = 0.5, 0.7
-HEADLIGHT = 0.25  # light from all sides, and from the camera; the lamp adds 0.4
+HEADLIGHT = 0.25  # light from the camera; the lamp adds 0.4
 CONTRACTED_WIDTH = 1.8  # a contracted ring muscle is drawn this much thicker than a relaxed one
-HAZE = (0.94, 0.955, 0.97)  # what the floor fades into with distance
 PALE = 3.0  # on white, what lies this many half worms behind its middle would vanish
 SPRING_RGBA = (0.80, 0.58, 0.16, 1.0)  # axial springs, apart from the red of a contracted ring
+QUALITY = {"shadowsize": 2048, "numslices": 10, "numstacks": 4}
+"""Of thin rods few facets look like many: with the engine's own numbers shadows would make videos four times slower."""
+DRAWN_WIDTH = 1 / 0.16  # tendons have the width that they are built with where the worm's radius at rest is 16 cm
+LARGEST_BALL = 0.005 / 0.16  # radius of the ball that is drawn at a crossing, in radii of the worm at rest
+SMALLEST_BALL = 1.4  # the same, in radii of the strands, which would hide it
+LINK = 0.45  # radius of the bars in a soft crossing, in radii of its ball
 WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
 WAYPOINT_HALF_HEIGHT_M = 1e-3
 
@@ -37,15 +46,26 @@ class DrawnWorm:
     ``upright`` is the rotation from the model's axes, which lie in a slope, to upright ones, ``(3, 3)``.
     """
 
-    def __init__(self, config: RunConfig) -> None:
+    def __init__(self, config: RunConfig, background: str = "floor") -> None:
         from annelid.body import build_spec
         from annelid.body.actuation import ring_names
 
         assert isinstance(config.body, WormBody)
+        self._behind = background_of(background)
         spec = build_spec(config)
-        _light(spec)
+        _light(spec, self._behind)
         _mark_waypoints(spec, config)
-        self.model = spec.compile()
+        self.model = model = spec.compile()
+        self._has_waypoints = config.turning is not None and bool(config.turning.goals.points_m)
+        # What is drawn of springs, cables and crossings must not hide the mesh of a small worm.
+        model.tendon_width *= DRAWN_WIDTH * config.body.mesh.radius_m
+        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(mesh_of(config.body.mesh).n_crossings)])
+        model.geom_rgba[self._balls] = self._behind.ball
+        ball_m = model.geom_size[self._balls, 0]
+        ball_m = np.minimum(ball_m, LARGEST_BALL * config.body.mesh.radius_m)
+        model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * config.body.strands.radius_m)
+        bodies = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
+        self._links = np.flatnonzero(bodies & (model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value))
         self.posture = mujoco.MjData(self.model)
         self.upright = upright(config)
         self._rings = [self.model.tendon(name).id for name in ring_names(config.body.n_segments, config.body.rings)]
@@ -61,6 +81,35 @@ class DrawnWorm:
         for ring, width, value in zip(self._rings, self._widths, activation.tolist(), strict=True):
             self.model.tendon_rgba[ring] = (*activation_color(value), 1.0)
             self.model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * value)
+
+    def add_links(self, scene: mujoco.MjvScene) -> None:
+        """Adds a bar for each soft connection of a crossing, from one of its ends to the other."""
+        model, posture = self.model, self.posture
+        radius_m = LINK * float(model.geom_size[self._balls, 0].min())
+        capsule, rgba = mujoco.mjtGeom.mjGEOM_CAPSULE.value, np.array(self._behind.ball, dtype=np.float32)
+        for link in self._links.tolist():
+            ends = [
+                posture.xpos[body] + posture.xmat[body].reshape(3, 3) @ place
+                for body, place in zip(
+                    (model.eq_obj1id[link], model.eq_obj2id[link]), model.eq_data[link, :6].reshape(2, 3), strict=True
+                )
+            ]
+            if scene.ngeom < scene.maxgeom:
+                bar = scene.geoms[scene.ngeom]
+                mujoco.mjv_initGeom(bar, capsule, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+                mujoco.mjv_connector(bar, capsule, radius_m, *ends)
+                scene.ngeom += 1
+
+    def legend(self) -> list[Entry]:
+        """What the colours mean, of what this worm has."""
+        model = self.model
+        springs = any(model.tendon(i).name.startswith("spring_") for i in range(model.ntendon))
+        entries: list[Entry] = [("strand", STRAND_RGBA[0], "line")]
+        entries += [("axial spring", SPRING_RGBA, "line")] * springs
+        entries += [(f"ring, {name}", activation_color(at), "line") for name, at in (("relaxed", 0), ("contracted", 1))]
+        soft = "soft crossing, bars: its opening" if self._links.size else "crossing"
+        entries.append((soft, self._behind.ball, "ball"))
+        return [*entries, *([("waypoint", WAYPOINT_RGBA, "ball")] * self._has_waypoints)]
 
     def part_ends(self, qpos: NDArray[np.floating]) -> Array:
         """Both ends of every part of the worm in a posture, m, ``(point, 3)``.
@@ -79,7 +128,7 @@ class DrawnWorm:
 
 
 class _Scene(Canvas):
-    """Pictures of a worm from one direction and distance, with or without shadows and smooth edges (``fine``)."""
+    """Pictures of a worm from one direction and distance, with or without smooth edges (``fine``) and words on them."""
 
     def __init__(
         self,
@@ -90,9 +139,17 @@ class _Scene(Canvas):
         *,
         fine: bool,
         upright: Array | None,
+        background: str = "floor",
+        words: bool = True,
     ) -> None:
-        super().__init__(worm.model, *size, find_backend(), fine=fine, upright=upright)
+        sky = background == "floor"
+        super().__init__(worm.model, *size, find_backend(), fine=fine, sky=sky, upright=upright)
         self._worm = worm
+        self.legend = worm.legend()
+        self.pixels_per_m = size[1] / (2.0 * math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * distance_m)
+        self.bar_m = bar_length(size[0], self.pixels_per_m)
+        behind = background_of(background)
+        self._overlay = Overlay(size, self.legend, self.pixels_per_m, behind.ink, behind.haze) if words else None
         self.camera.azimuth, self.camera.elevation = angles_deg
         self.camera.distance = distance_m
 
@@ -101,16 +158,30 @@ class _Scene(Canvas):
     ) -> NDArray[np.uint8]:
         self._worm.pose(qpos, activation)
         self.camera.lookat[:] = target_m
-        return self.draw(self._worm.posture, caption)
+        pixels = self.draw(self._worm.posture, self._worm.add_links)
+        return pixels if self._overlay is None else self._overlay.stamped(pixels, caption)
 
 
 class WormScene(_Scene):
-    """Pictures of a 3D worm's run from a named view, see `annelid.draw.camera.VIEWS_DEG`."""
+    """Pictures of a 3D worm's run from a named view, see `annelid.draw.camera.VIEWS_DEG`.
 
-    def __init__(self, run: Run, width: int, height: int, camera: str, *, fine: bool) -> None:
+    The background is one of `annelid.draw.overlay.BACKGROUNDS`; ``words`` are the legend, a scale bar and the time.
+    """
+
+    def __init__(
+        self,
+        run: Run,
+        width: int,
+        height: int,
+        camera: str,
+        *,
+        fine: bool,
+        background: str = "floor",
+        words: bool = True,
+    ) -> None:
         assert isinstance(run.config.body, WormBody)
         angles = view_angles(camera, run.config.body.heading_deg)
-        worm = DrawnWorm(run.config)
+        worm = DrawnWorm(run.config, background)
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
         self._activation = run.data["activation"]
@@ -125,7 +196,8 @@ class WormScene(_Scene):
         _dim(worm.model, angles[1])
         if camera in FIXED:
             _set_fog(worm.model, 2.0 * distance, 6.0 * distance)
-        super().__init__(worm, (width, height), angles, distance, fine=fine, upright=worm.upright)
+        look: dict[str, Any] = {"background": background, "words": words}
+        super().__init__(worm, (width, height), angles, distance, fine=fine, upright=worm.upright, **look)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
         """Draws one recorded frame, as pixels of shape ``(height, width, 3)``."""
@@ -202,7 +274,7 @@ def render_still(
     if activation is None:
         model.tendon_rgba[:] = (*CONTRACTED, 1.0)
     model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
-    model.vis.headlight.ambient[:] = AMBIENT_ON_WHITE
+    model.vis.headlight.ambient[:] = BRIGHT
     model.vis.rgba.fog[:] = 1.0
     drawn = model.qpos0 if qpos is None else qpos
     points = worm.part_ends(drawn)
@@ -210,7 +282,7 @@ def render_still(
     distance = fitting_distance(points - target, *angles_deg, size[0] / size[1])
     reach = float(np.linalg.norm(points - target, axis=1).max())
     _set_fog(model, distance - reach, distance + PALE * reach)
-    with _Scene(worm, size, angles_deg, distance, fine=True, upright=None) as scene:
+    with _Scene(worm, size, angles_deg, distance, fine=True, upright=None, words=False) as scene:
         return Still(scene._draw(drawn, activation, target), target, angles_deg, distance)
 
 
@@ -283,23 +355,30 @@ def _middle(points_m: Array) -> Array:
 
 
 def _dim(model: mujoco.MjModel, elevation_deg: float) -> None:
-    """Dims the light from all sides where the floor would be white: it takes the more of the headlight the steeper."""
+    """Dims the light from all sides where the checkerboard would be white: steep views take more of the headlight."""
     steepness = abs(math.sin(math.radians(elevation_deg)))
-    model.vis.headlight.ambient[:] = min(AMBIENT, AMBIENT + 0.1 - HEADLIGHT * steepness)
+    if model.vis.headlight.ambient[0] < BRIGHT:
+        model.vis.headlight.ambient[:] = min(DIM, DIM + 0.1 - HEADLIGHT * steepness)
 
 
 def _set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
     model.vis.map.fogstart, model.vis.map.fogend = start_m / model.stat.extent, end_m / model.stat.extent
 
 
-def _light(spec: mujoco.MjSpec) -> None:
-    """Gives a model a picture's lens and light."""
+def _light(spec: mujoco.MjSpec, behind: Background) -> None:
+    """Gives a model a picture's lens and light, and its floor a colour."""
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
     visual.headlight.diffuse = [HEADLIGHT] * 3
     visual.headlight.specular = [0.05] * 3
-    visual.quality.shadowsize = 4096
-    visual.rgba.fog = [*HAZE, 1.0]
+    visual.headlight.ambient = [behind.ambient] * 3
+    for name, number in QUALITY.items():
+        setattr(visual.quality, name, number)
+    visual.rgba.fog = [*behind.haze, 1.0]
+    if behind.floor is not None:
+        floor = spec.material("floor")
+        floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = ""
+        floor.rgba = [*behind.floor, 1.0]
     visual.map.fogstart, visual.map.fogend = 4.0, 12.0
     for light in spec.lights:
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

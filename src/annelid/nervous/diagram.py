@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from annelid.errors import ConfigError
-from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
+from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, key_shapes, network_shapes, strength_of
 from annelid.nervous.neurons import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.text import printable
 
@@ -57,7 +57,10 @@ class Diagram:
         target = Path(path)
         forms = {".svg": self.svg, ".dot": self.graphviz, ".gv": self.graphviz}
         if target.suffix not in forms:
-            raise ConfigError(f"a diagram is saved as .svg, .dot or .gv, not as {target.name!r}")
+            raise ConfigError(
+                f"a diagram is saved as .svg, .dot or .gv, not as {target.name!r}: "
+                "annelid.draw.network_figure writes .png and .pdf"
+            )
         target.write_text(forms[target.suffix], encoding="utf-8")
         return target
 
@@ -66,10 +69,12 @@ def draw_diagram(network: Network) -> Diagram:
     """Draws a network.
 
     Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
-    rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim.
+    rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim. A key
+    below the network says so, and what abbreviated names stand for. `annelid.draw.network_figure` draws the same as
+    PNG, PDF or SVG.
     """
-    labels = {name: name for name in network.neurons}
-    shapes = network_shapes(network, labels, strengths=len(network.connections) <= _MOST_LABELLED)
+    shapes = network_shapes(network, strengths=len(network.connections) <= _MOST_LABELLED)
+    shapes += key_shapes(network, shapes, _PX / 96.0)
     return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network.name, shapes))
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -40,6 +40,11 @@ COLORS: dict[Effect, str] = {
     "rectified gap junction": _GREY,
 }
 _TRIANGLE, _DOT = 0.17, 0.065
+PAPER_SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
+"""The paper's symbols of the four neurons of a segment, by the role in a neuron's name."""
+_MEANINGS_A_ROW = 4
+_ROW, _KEY_COLUMNS, _KEY_UNIT_IN = 0.62, (0.56, 6.22, 11.33), 0.45  # the key's rows and columns, in its own unit
+_LONGEST_NAME = 9  # letters of a name that can be read in a neuron
 _ROUND = 48
 """Corners of what looks round."""
 _ARROW = "#4d4d4d"
@@ -90,14 +95,14 @@ def strength_of(connection: Connection) -> str:
     return f"{kind.conductance_uS:.3g} uS"
 
 
-def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bool) -> list[Shape]:
+def network_shapes(network: Network, *, strengths: bool) -> list[Shape]:
     """Draws each neuron, connection, input and output of a network once.
 
     The shapes are in order from back to front. Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i
     the place among the network's connections, ``input-<name>-<neuron>`` and ``output-<name>``. In each neuron stands
-    its label, and on each connection how strong it is if ``strengths``.
+    its label, and beside each connection how strong it is if ``strengths``.
     """
-    layout = lay_out(network)
+    layout, labels = lay_out(network), labels_of(network)
     columns, paths, marks, numbers, front = [], [], [], [], []
     for segment, names in layout.columns.items():
         columns += _column(f"segment {segment}", np.array([layout.places[name] for name in names]))
@@ -108,9 +113,8 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
         marks += mark
         if strengths:
             # A gap junction has its resistor in the middle.
-            share = 0.2 if "gap" in effect else 0.4
-            place = points_at(route, share * arc_length(route)[-1:])[0]
-            numbers.append(Words(strength_of(link), place, 7.0, halo=True))
+            share = 0.2 if "gap" in effect else 0.5
+            numbers.append(_beside(route, share, strength_of(link)))
     for stub in layout.inputs:
         front += [*arrow_shapes(stub.outer, stub.rim, f"input-{stub.name}-{stub.neuron}"), *_name_of(stub)]
     for stub in layout.outputs:
@@ -120,6 +124,15 @@ def network_shapes(network: Network, labels: Mapping[str, str], *, strengths: bo
         spiking, gated = neuron.firing is not None, bool(neuron.channels)
         front += neuron_shapes(place, labels[name], spiking=spiking, gated=gated, key=f"neuron-{name}")
     return [*columns, *paths, *marks, *numbers, *front]
+
+
+def _beside(route: Points, share: float, text: str) -> Words:
+    """Writes beside a path, at a share of its length."""
+    place, ahead = points_at(route, arc_length(route)[-1] * np.array([share, share + 0.02]))
+    normal = 1j * (ahead - place) / abs(ahead - place)
+    if abs(normal.real) < 0.5:
+        return Words(text, place + 0.09 * normal, 7.0, halo=True)
+    return Words(text, place + 0.05 * normal, 7.0, "left" if normal.real > 0.0 else "right", halo=True)
 
 
 def neuron_shapes(place: complex, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
@@ -424,3 +437,80 @@ def _angle_of(vector: complex) -> float:
 def _angle_between(one: float, other: float) -> float:
     """The smaller angle from one direction to another, rad, 0 .. π."""
     return abs((one - other + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def abbreviations(names: Iterable[str]) -> dict[str, str]:
+    """Shortens names, without their segments' numbers, to three letters, or more where these are not distinct."""
+    roles = list(dict.fromkeys(role_of(name) for name in names))
+    short: dict[str, str] = {}
+    for role in roles:
+        others = [other for other in roles if other != role]
+        lengths = range(min(3, len(role)), len(role) + 1)
+        short[role] = next((role[:n] for n in lengths if not any(o.startswith(role[:n]) for o in others)), role)
+    return short
+
+
+def labels_of(network: Network) -> dict[str, str]:
+    """Returns what stands in each neuron: the symbol of its role in a column, else its name, if long shortened."""
+    written = abbreviations(network.neurons) | PAPER_SYMBOLS
+    if not by_segment(network.neurons)[1]:
+        return {name: written[role_of(name)] for name in network.neurons}
+    return {n: n if len(n) <= _LONGEST_NAME else n.replace(role_of(n), written[role_of(n)], 1) for n in network.neurons}
+
+
+def _key(network: Network) -> list[str]:
+    """What the key has to explain: only what the network has."""
+    effects = {effect_of(network, link) for link in network.connections}
+    neurons = network.neurons.values()
+    key = ["neuron"] * any(not neuron.channels and neuron.firing is None for neuron in neurons)
+    key += ["neuron with gated channels"] * any(neuron.channels for neuron in neurons)
+    key += ["spiking neuron"] * any(neuron.firing is not None for neuron in neurons)
+    key += [what if "gap" in what else f"{what} synapse" for what in COLORS if what in effects]
+    return key + ["input current"] * bool(network.inputs) + ["output: potential read"] * bool(network.outputs)
+
+
+def key_shapes(network: Network, above: Iterable[Shape], unit_in: float) -> list[Shape]:
+    """Draws a key below other shapes: an example of each symbol beside its name, and what labels stand for.
+
+    Args:
+        network: The network.
+        above: The shapes that it explains.
+        unit_in: Length of a unit, inches.
+    """
+    labels = {role_of(name): label for name, label in labels_of(network).items() if label != name}
+    meanings = [f"{label}: {role}" for role, label in labels.items() if label != role]
+    shapes, height = _key_shapes(_key(network), meanings)
+    left, _, bottom, _ = frame_of(above, unit_in)
+    scale = _KEY_UNIT_IN / unit_in
+    origin = complex(left, bottom - scale * height)
+    return [
+        replace(s, points=origin + scale * s.points)
+        if isinstance(s, Line)
+        else replace(s, place=origin + scale * s.place)
+        for s in shapes
+    ]
+
+
+def _key_shapes(entries: Sequence[str], meanings: Sequence[str]) -> tuple[list[Shape], float]:
+    """Draws examples and rows of meanings in a unit of the key's own; returns the height, too."""
+    starts = range(0, len(meanings), _MEANINGS_A_ROW)
+    rows = [",  ".join(meanings[start : start + _MEANINGS_A_ROW]) for start in starts]
+    n_rows = -(-len(entries) // len(_KEY_COLUMNS))
+    height = _ROW * (n_rows + len(rows)) + 0.2
+    shapes: list[Shape] = []
+    for index, entry in enumerate(entries):
+        x, y = _KEY_COLUMNS[index // n_rows], height - _ROW * (index % n_rows + 0.5)
+        path = np.linspace(complex(x, y), complex(x + 0.93, y), 121)
+        what = entry.removesuffix(" synapse")
+        if what in COLORS:
+            shapes += connection_shapes(path, what)
+        elif "neuron" in entry:
+            shapes += neuron_shapes(path.mean(), "", spiking="spiking" in entry, gated="gated" in entry)
+        else:
+            shapes += arrow_shapes(path[0], path[-1])
+            rim = path[-1 if entry.startswith("input") else 0]
+            shapes.append(Line(rim + np.array([-0.15j, 0.15j]), "black"))
+        shapes.append(Words(entry, complex(x + 1.22, y), 9.0, "left"))
+    for row, meaning in enumerate(reversed(rows)):
+        shapes.append(Words(meaning, complex(_KEY_COLUMNS[0], 0.45 + _ROW * row), 9.0, "left"))
+    return shapes, height

@@ -166,7 +166,9 @@ def _figure_5(run: Run, series: Series, stem: Path) -> str:
 
 
 def _figure_6(run: Run, series: Series, stem: Path) -> str:
-    network_figure(peristalsis_network(run.config.body.n_segments, PeristalsisParameters()), stem)
+    network = peristalsis_network(run.config.body.n_segments, PeristalsisParameters())
+    for suffix in (".svg", ".png"):
+        network_figure(network, stem.with_suffix(suffix))
     return (
         "The network that controls the worm, drawn from the network object that the simulation steps: one column a "
         "segment. The contraction and the expansion neuron (U1, U2) form a half-centre: they have a persistent sodium "

@@ -10,7 +10,7 @@ import numpy as np
 
 from annelid.analysis.track import forward_position
 from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, line_entries, panel_title, save, segment_colors
+from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save
 from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
 from annelid.protocols import Array
@@ -58,14 +58,14 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
         panels = figure.subplots(1, 2 if any(seen) else 1, squeeze=False)[0]
         panel_title(panels[0], "Travel towards the front (cm)")
         panels[0].set_xlabel("time (s)")
-        for run, track, above, color in zip(runs, tracks, seen, segment_colors(len(runs)), strict=True):
+        for run, track, above, look in zip(runs, tracks, seen, line_looks(len(runs)), strict=True):
             if track is None:
                 continue
             ahead = forward_position(run)
-            panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), color=color)
+            panels[0].plot(run.data["time"].values, _CM * (ahead - ahead[0]), **look)
             if above:
-                panels[1].plot(track[:, 0], track[:, 1], color=color)
-                panels[1].plot(*track[-1, :2], marker="o", markersize=4, color=color)
+                panels[1].plot(track[:, 0], track[:, 1], **look)
+                panels[1].plot(*track[-1, :2], marker="o", markersize=4, color=look["color"])
         if any(seen):
             panel_title(panels[1], "Track of the middle from above (cm)")
             panels[1].set(xlabel="x, front towards the left (heading 0)", ylabel="y")
@@ -87,11 +87,11 @@ def _over_time(runs: Sequence[Run], labels: Sequence[str], panels: Mapping[str, 
         for i, (title, column) in enumerate(zip(panels, grid.T, strict=True)):
             panel_title(column[0], title)
             column[-1].set_xlabel("time (s)")
-            for run, of_run, color in zip(runs, curves, segment_colors(len(runs)), strict=True):
+            for run, of_run, look in zip(runs, curves, line_looks(len(runs)), strict=True):
                 for values, width in of_run[i]:
                     for axes, segment in zip(column, segments, strict=True):
                         if values is not None and segment < values.shape[1]:
-                            axes.plot(run.data["time"].values, values[:, segment], color=color, linewidth=width)
+                            axes.plot(run.data["time"].values, values[:, segment], **look, linewidth=width)
         for axes, segment in zip(grid[:, 0], segments, strict=True):
             axes.set_ylabel(f"segment {segment + 1}")
         _legend(figure, labels, drawn)
@@ -130,6 +130,6 @@ def _centre(run: Run) -> Values:
 
 def _legend(figure: Figure, labels: Sequence[str], drawn: Sequence[bool]) -> None:
     """Names the runs that were drawn, above all panels."""
-    runs = zip(segment_colors(len(labels)), labels, drawn, strict=True)
-    handles = line_entries((color, "-", 2.0, label) for color, label, shown in runs if shown)
-    figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 3))
+    runs = zip(line_looks(len(labels)), labels, drawn, strict=True)
+    handles = line_entries((*look.values(), 2.0, label) for look, label, shown in runs if shown)
+    figure.legend(handles=handles, loc="outside upper left", ncols=min(len(handles), 3), handlelength=2.8)

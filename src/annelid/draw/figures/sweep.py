@@ -5,18 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.draw.canvas import canvas, mark_lost, panel_title, plain, save_both, segment_colors
+from annelid.draw.canvas import canvas, mark_lost, plain, save_both, segment_colors
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORS = "viridis"
+COLORS, SIGNED = "viridis", "RdBu"
+"""Colours of numbers, and of such as lie on both sides of zero: white is zero, blue is positive, so forwards."""
+CONFIDENCE = 0.95
+_CELL_TEXT_IN = (0.36, 0.15)  # width and height of a number in a cell
+_PANEL_IN = (3.7, 2.6)
+_TITLE_LETTERS = 42
 _FAILED = "0.6"
 _MOST_TICKS = 8
 
@@ -25,7 +31,8 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
     """Draws numbers over the varied fields; runs without a number are marked with crosses.
 
     Args:
-        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: their mean is drawn.
+        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: their mean is drawn,
+            and its 95 % interval over one field.
         fields: The varied fields, coordinates of the data.
         numbers: Variables of the data, at most four; of three or more fields the first only.
         stem: Path without suffix; ``.svg`` and ``.png`` are written, and the latter's path is returned.
@@ -36,7 +43,7 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
             return save_both(figure, stem)
     columns = min(2, len(numbers))
     rows = ceil(len(numbers) / columns)
-    with canvas(0.5 + 2.6 * rows, 3.7 * columns if len(numbers) > 1 else 4.6) as figure:
+    with canvas(0.5 + _PANEL_IN[1] * rows, _PANEL_IN[0] * columns if len(numbers) > 1 else 4.6) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for i, (axes, name) in enumerate(zip(panels, numbers, strict=False)):
             if len(fields) == 1:
@@ -57,14 +64,58 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     y = values.transpose(data[field].dims[0], *others).values.reshape(len(x), -1)
     dot, line, *_ = segment_colors(4)
     order = np.argsort(x, kind="stable")
-    mean = np.ma.masked_invalid(y).mean(axis=1).filled(np.nan)
-    if y.shape[1] > 1:
-        axes.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="0.65", markersize=4.0)
+    mean, half = mean_interval(y)
     on_a_grid = data[field].dims == (field,)
-    axes.plot(x[order], mean[order], "o-" if on_a_grid else "o", color=line if on_a_grid else dot, markersize=3.5)
+    color = line if on_a_grid else dot
+    if y.shape[1] > 1:
+        axes.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="0.65", markersize=4.0, label="one run")
+        bars = f"mean, {100 * CONFIDENCE:g} % interval"
+        axes.errorbar(x, mean, half, fmt="none", ecolor=color, elinewidth=1.2, capsize=3.0, label=bars)
+        axes.legend(loc="best", fontsize=7.0)
+    axes.plot(x[order], mean[order], "o-" if on_a_grid else "o", color=color, markersize=3.5)
     mark_lost(axes, x[np.isnan(y).any(axis=1)], _FAILED, 0.03)
     _name_axis(axes, "x", data[field], ticks)
-    axes.set_ylabel(worded(name, values.attrs["units"]))
+    axes.set_ylabel(quantity(values, 30))
+
+
+def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the mean of each row without its NaN, and half of its confidence interval (Student's t).
+
+    Args:
+        values: Repeats side by side, ``(n, n_repeats)``.
+    """
+    from scipy.stats import t
+
+    known = np.isfinite(values)
+    n = known.sum(axis=1)
+    inside = np.ma.masked_invalid(values)
+    mean = inside.mean(axis=1).filled(np.nan)
+    half = np.full(len(values), np.nan)
+    if (several := n > 1).any():
+        spread = inside[several].std(axis=1, ddof=1).filled(np.nan)
+        half[several] = t.ppf(0.5 + 0.5 * CONFIDENCE, n[several] - 1) * spread / np.sqrt(n[several])
+    return mean, half
+
+
+def quantity(values: xr.DataArray, letters: int = _TITLE_LETTERS) -> str:
+    """Writes what numbers are, in words where their dataset has them, with their unit; in lines of so many letters."""
+    unit, words = values.attrs["units"], values.attrs.get("long_name")
+    text = worded(str(values.name), unit) if words is None else f"{words}{'' if unit == '1' else f' ({unit})'}"
+    return "\n".join(wrap(text, letters))
+
+
+def _write_in_cells(axes: Axes, mesh: Any, grid: np.ma.MaskedArray) -> None:
+    """Writes the numbers into the cells of a map, if they fit."""
+    rows, columns = grid.shape
+    # Axes and colour bar take about a third of a panel's width, and title and ticks of its height.
+    cell = (0.65 * _PANEL_IN[0] / columns, 0.65 * _PANEL_IN[1] / rows)
+    if cell[0] < _CELL_TEXT_IN[0] or cell[1] < _CELL_TEXT_IN[1]:
+        return
+    for row, column in zip(*np.nonzero(~np.ma.getmaskarray(grid)), strict=True):
+        value = float(grid[row, column])
+        red, green, blue, _ = mesh.to_rgba(value)
+        ink = "black" if 0.3 * red + 0.59 * green + 0.11 * blue > 0.5 else "white"
+        axes.text(column, row, f"{value:.3g}", ha="center", va="center", fontsize=7.5, color=ink)
 
 
 def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
@@ -73,7 +124,9 @@ def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], na
     (x, x_ticks), (y, y_ticks) = _axis(along_x.values), _axis(along_y.values)
     if fields[0] in values.dims:
         grid = np.ma.masked_invalid(values.transpose(fields[1], fields[0]).values)
-        shown: Any = axes.pcolormesh(np.arange(len(x) + 1) - 0.5, np.arange(len(y) + 1) - 0.5, grid, cmap=COLORS)
+        edges = np.arange(len(x) + 1) - 0.5, np.arange(len(y) + 1) - 0.5
+        shown: Any = axes.pcolormesh(*edges, grid, **_colors(grid))
+        _write_in_cells(axes, shown, grid)
         rows, columns = np.nonzero(np.ma.getmaskarray(grid))
         axes.plot(columns, rows, "x", color=_FAILED, markersize=5.0)
         # Cells are of one size, whatever the spacing of the values.
@@ -81,13 +134,22 @@ def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], na
     else:
         z = values.values
         known = np.isfinite(z)
-        shown = axes.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=18.0)
+        shown = axes.scatter(x[known], y[known], c=z[known], s=18.0, edgecolors="0.4", linewidths=0.3, **_colors(z))
         axes.plot(x[~known], y[~known], "x", color=_FAILED, markersize=5.0)
     axes.grid(visible=False)
     _name_axis(axes, "x", along_x, x_ticks)
     _name_axis(axes, "y", along_y, y_ticks)
     figure.colorbar(shown, ax=axes, pad=0.02)
-    panel_title(axes, worded(name, values.attrs["units"]))
+    axes.set_title(plain(quantity(values)), pad=5.0)
+
+
+def _colors(values: np.ndarray) -> dict[str, Any]:
+    """The map of colours of numbers, and its range where they lie on both sides of zero."""
+    known = values[np.isfinite(values)]
+    if not known.size or known.min() >= 0.0 or known.max() <= 0.0:
+        return {"cmap": COLORS}
+    reach = float(np.abs(known).max())
+    return {"cmap": SIGNED, "vmin": -reach, "vmax": reach}
 
 
 def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
@@ -103,7 +165,7 @@ def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str
     known = np.isfinite(z)
     low, high = (float(z[known].min()), float(z[known].max())) if known.any() else (0.0, 1.0)
     norm = Normalize(low, high if high > low else low + 1.0)
-    label = worded(name, values.attrs["units"])
+    label = quantity(values, 24)
     axes = figure.subplots()
     shares = []
     behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8}

@@ -162,6 +162,16 @@ def test_doctor_ends_well(annelid: Command) -> None:
     assert any(line.split()[:2] == ["ok", "mujoco"] for line in done.out.splitlines())
 
 
+def test_lists_are_printed_as_json(annelid: Command) -> None:
+    presets = {each["name"]: each for each in json.loads(annelid("presets", "--json").out)}
+    assert set(presets) == set(preset_names())
+    assert presets["riddle2023-fast"]["n_segments"] == 3
+    assert "pipe.bend" in {each["name"] for each in json.loads(annelid("arenas", "--json").out)}
+    assert {"item": "annelid", "ok": True}.items() <= json.loads(annelid("doctor", "--json").out)[0].items()
+    for wrong in (("presets", "wang"), ("arenas", "floor"), ("doctor", "--report")):
+        assert annelid(*wrong, "--json").exit_code == 2
+
+
 @pytest.mark.parametrize("command", ["run", "build", "show", "plot", "render", "bench", "presets", "doctor"])
 def test_every_command_teaches_by_example(annelid: Command, command: str) -> None:
     done = annelid(command, "--help")

@@ -2,15 +2,20 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import pytest
 from outcome import Command
+from typer.main import get_command
 
 from annelid.arena.kinds.pipe import Pipe
+from annelid.cli import app
 from annelid.config import field_paths, load_config, preset_names
 from annelid.simulation.runfile import open_run
 
@@ -175,11 +180,33 @@ def test_doctor_ends_well(annelid: Command) -> None:
     assert any(line.split()[:2] == ["ok", "mujoco"] for line in done.out.splitlines())
 
 
+def test_lists_are_printed_as_json(annelid: Command) -> None:
+    presets = {each["name"]: each for each in json.loads(annelid("presets", "--json").out)}
+    assert set(presets) == set(preset_names())
+    assert presets["riddle2023-fast"]["n_segments"] == 3
+    assert "pipe.bend" in {each["name"] for each in json.loads(annelid("arenas", "--json").out)}
+    assert {"item": "annelid", "ok": True}.items() <= json.loads(annelid("doctor", "--json").out)[0].items()
+    for wrong in (("presets", "wang"), ("arenas", "floor"), ("doctor", "--report")):
+        assert annelid(*wrong, "--json").exit_code == 2
+
+
 @pytest.mark.parametrize("command", ["run", "build", "show", "plot", "render", "bench", "presets", "doctor"])
 def test_every_command_teaches_by_example(annelid: Command, command: str) -> None:
     done = annelid(command, "--help")
     assert done.exit_code == 0
     assert f"\n  annelid {command}" in done.out
+
+
+def test_every_option_with_a_unit_says_it() -> None:
+    def options(command: Any) -> Iterator[Any]:
+        yield from command.params
+        for below in getattr(command, "commands", {}).values():
+            yield from options(below)
+
+    numbers = [each for each in options(get_command(app)) if "float" in str(each.type_descriptor.annotation)]
+    assert numbers
+    for option in numbers:
+        assert re.search(r"(?<!')\b(s|mV|mm|m|N|rad|share|a second|seconds)\b", option.help, re.IGNORECASE), option.opts
 
 
 @pytest.mark.parametrize(("typed", "offers"), [("annelid ru", "run"), ("annelid run --fid", "--fidelity")])

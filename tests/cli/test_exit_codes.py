@@ -147,3 +147,10 @@ def test_a_stream_that_takes_nothing_ends_no_command_in_a_traceback(line: str, c
         ["bash", "-c", script, sys.executable], capture_output=True, text=True, check=False, timeout=120
     )
     assert (done.returncode, done.stdout, done.stderr.strip()) == (code, "", told)
+
+
+def test_the_help_lists_every_code(annelid: Command) -> None:
+    said = re.search(r"Exit codes:(.*?)\.", " ".join(annelid("--help").out.split()))
+    assert said is not None
+    codes = {value for name, value in vars(entry).items() if name.startswith("EXIT_")}
+    assert {int(code) for code in re.findall(r"\d+", said[1])} == codes

@@ -153,7 +153,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return clock
 
 
-def test_lines_come_at_most_every_half_minute(clock: Clock) -> None:
+def test_lines_come_at_most_every_ten_seconds(clock: Clock) -> None:
     stream = io.StringIO()
     tell = Lines(stream)
     for second in range(101):
@@ -161,7 +161,17 @@ def test_lines_come_at_most_every_half_minute(clock: Clock) -> None:
         tell("running worms", second, 200, second / 200)
     lines = stream.getvalue().splitlines()
     assert len(lines) == 1 + 100 // LINE_EVERY_S
-    assert lines[1] == "running worms: 30 of 200 runs, about 2:50 left"
+    assert lines[1] == "running worms: 10 of 200 runs, about 3:10 left"
+
+
+def test_a_short_run_writes_no_line(clock: Clock) -> None:
+    stream = io.StringIO()
+    lines = Lines(stream, at_once=False)
+    for second in range(11):
+        assert not stream.getvalue()
+        clock.now = float(second)
+        lines("simulating", 0, 0, second / 20)
+    assert stream.getvalue() == "simulating: about 0:10 left\n"
 
 
 def test_time_left_is_that_of_the_stage(clock: Clock) -> None:

@@ -34,6 +34,7 @@ QUICK = {
     ("annelid", "render"): (),
     ("annelid", "plot"): (),
     ("annelid", "show"): (),
+    ("annelid", "runs"): (),
     ("annelid", "check"): (),
     ("annelid", "build"): ("--force",),
     ("annelid", "presets"): (),

@@ -23,6 +23,7 @@ from toy import N, SavedToyPlant, ToyController, ToyPlant, toy_config, without_d
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid.protocols import Recordable, Signal
+from annelid.references import entries
 from annelid.simulation import Run, container, loop, open_run, simulate
 from annelid.simulation.container import RawWriter, Variable
 from annelid.simulation.runfile import SCHEMA_VERSION, migrated, read_config, verify_run
@@ -53,6 +54,18 @@ def test_plain_xarray_opens_it_and_every_variable_has_units_and_a_name(run: Run)
             data["status_code"]
         )
         assert data["stretch_rest_length"].values == pytest.approx(0.1)
+
+
+def test_the_attributes_are_those_of_cf(run: Run) -> None:
+    attrs = run.data.attrs
+    assert attrs["Conventions"] == "CF-1.11"
+    assert run.config.name in attrs["title"]
+    assert attrs["history"].startswith(attrs["created"])
+    assert attrs["annelid_version"] in attrs["source"]
+    assert set(attrs["references"].split(":")[0].split(", ")) <= set(entries())
+    assert attrs["comment"]
+    with xarray.open_dataset(run.path, engine="h5netcdf") as data:
+        assert data["time"].dtype == data["frame_time"].dtype == float  # not decoded as dates
 
 
 def test_every_dimension_is_a_scale_as_netcdf4_asks(run: Run) -> None:

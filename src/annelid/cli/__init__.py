@@ -3,6 +3,7 @@
 from annelid.cli.entry import Command, app, experiments, main
 from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
 from annelid.cli.run import run_command
+from annelid.cli.runs import runs_command
 from annelid.cli.studies import (
     bench_command,
     calibrate_command,
@@ -23,6 +24,7 @@ for _name, _command in (
     ("run", run_command),
     ("check", check),
     ("build", build),
+    ("runs", runs_command),
     ("show", show),
     ("compare", compare_command),
     ("plot", plot),

@@ -193,6 +193,9 @@ def _start(
     annelid bench                      speed and error side by side: about 15 minutes
     annelid presets                    what else there is
     annelid doctor                     is everything in place?
+
+    Exit codes: 0 done, 2 refused, 3 stopped by a guard, 4 runs failed, 5 all runs failed, 130 interrupted, 1 anything
+    unexpected.
     """
 
 

@@ -316,8 +316,8 @@ def export_command(
             min=1, max=10_000_000, metavar="N", help="Only every Nth sample, and every Nth frame (csv, mat, parquet)."
         ),
     ] = None,
-    from_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="From this time on (not mjcf).")] = None,
-    to_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Up to this time (not mjcf).")] = None,
+    from_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="From this time on, s (not mjcf).")] = None,
+    to_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Up to this time, s (not mjcf).")] = None,
     force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
@@ -120,15 +122,16 @@ def run_command(
     result = None
     try:
         if uncertainty is None:
-            done = simulate(config, folder, resume=resume, progress=False if quiet else None, overwrite=force)
+            progress = False if quiet else _lines(config.duration_s)
+            done = simulate(config, folder, resume=resume, progress=progress, overwrite=force)
         else:
             from annelid.experiment import uncertainty as study
             from annelid.experiment.progress import in_stage, study_progress
 
             spread = study.read_spread(uncertainty_from).but(_errors(vary))
             further = ["--out", str(folder)] if out is None else []
-            with going_on(folder, *further), study_progress(quiet=quiet) as progress:
-                report = in_stage(progress, "error bars")
+            with going_on(folder, *further), study_progress(quiet=quiet) as shown:
+                report = in_stage(shown, "error bars")
                 result = study.uncertainty(
                     config, uncertainty, folder, spread=spread, jobs=jobs, overwrite=force, progress=report
                 )
@@ -155,6 +158,16 @@ def run_command(
     if result is not None:
         stopped = sum(bool(run.message) for run in result.runs)
         end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
+
+
+def _lines(end_s: float) -> Callable[[float, float], object] | None:
+    """Returns what writes a line on stderr every ten seconds of a run; None on a terminal, which gets a bar."""
+    from annelid.experiment.progress import Lines
+
+    if sys.stderr.isatty():
+        return None
+    lines = Lines(sys.stderr, at_once=False)
+    return lambda simulated_s, _: lines(f"simulating {end_s:g} s", 0, 0, simulated_s / end_s)
 
 
 def _errors(vary: list[str] | None) -> dict[str, float]:

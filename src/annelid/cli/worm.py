@@ -84,6 +84,7 @@ def build(
 def presets(
     name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
     """List the presets, or print one: every field with its source, and the preset that it is inherited from.
 
@@ -99,6 +100,13 @@ def presets(
     from annelid.draw.table import field_lines, presets_table
     from annelid.terminal import Console
 
+    if as_json:
+        _refuse_with_json(name is not None or fields)
+        known = [load_config(each) for each in preset_names()]
+        listing = [(c.name, c.summary, c.body.n_segments, c.duration_s) for c in known]
+        keys = ("name", "summary", "n_segments", "duration_s")
+        typer.echo(json.dumps([dict(zip(keys, each, strict=True)) for each in listing], indent=2))
+        return
     if name is not None and not fields:
         typer.echo(preset_text(name), nl=False)
         return
@@ -110,6 +118,7 @@ def presets(
 
 def arenas(
     name: Annotated[str | None, typer.Argument(help="Print this arena's commented TOML.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
     """List the arenas that a 3D worm can be put into, or print one.
 
@@ -124,6 +133,11 @@ def arenas(
     from annelid.draw.table import arenas_table
     from annelid.terminal import Console
 
+    if as_json:
+        _refuse_with_json(name is not None)
+        listing = [{"name": each, "summary": arena_summary(each)} for each in arena_names()]
+        typer.echo(json.dumps(listing, indent=2))
+        return
     if name is not None:
         typer.echo(arena_text(name), nl=False)
         return
@@ -134,6 +148,7 @@ def doctor(
     report: Annotated[
         bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
     ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
     """Say what is missing and how to install it.
 
@@ -145,9 +160,18 @@ def doctor(
     """
     from annelid.draw.doctor import examine
 
+    if as_json:
+        _refuse_with_json(report)
+        typer.echo(json.dumps([asdict(finding) for finding in examine()], indent=2))
+        return
     if report:
         from annelid.draw.doctor import bug_report
 
         typer.echo(bug_report(list(examine())))
     else:
         typer.echo("\n".join(finding.line() for finding in examine()))
+
+
+def _refuse_with_json(given: bool) -> None:
+    if given:
+        raise typer.BadParameter("--json prints the list: it goes with nothing else")

@@ -14,7 +14,7 @@ from annelid.simulation.progress import clock_text
 StudyProgress = Callable[[str, int, int, float], object]
 """Called with the stage, the number of its runs done, their total, and the share of its work that is done."""
 
-LINE_EVERY_S = 30.0
+LINE_EVERY_S = 10.0
 
 
 def in_stage(progress: StudyProgress | None, stage: str) -> Callable[[int, int, float], object] | None:
@@ -59,10 +59,12 @@ class TimeLeft:
 
 
 class Lines:
-    """Writes a plain line at most every half minute."""
+    """Writes a plain line at most every ten seconds."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._left, self._last = stream, TimeLeft(), -float("inf")
+    def __init__(self, stream: TextIO, *, at_once: bool = True) -> None:
+        """Takes where to write; the first line comes at once, or after ten seconds."""
+        self._stream, self._left = stream, TimeLeft()
+        self._last = -float("inf") if at_once else time.monotonic()
 
     def __call__(self, stage: str, done: int, total: int, share: float) -> None:
         """Takes note of how far a stage has come."""

@@ -94,14 +94,27 @@ def loop_signals(n_muscles: int) -> Recordable:
 
 
 def global_attributes(config: RunConfig, parts: Sequence[Recordable]) -> dict[str, Any]:
-    """Returns the file's global attributes: what the parts add, the whole configuration, and versions."""
+    """Returns the file's global attributes: what the parts add, the whole configuration, versions, and those of CF.
+
+    Three of CF's attributes are left out. ``featureType`` would promise that all variables are series at places or
+    along paths. ``axis`` and ``standard_name`` of a time ask for units with a date, which simulated time does not have.
+    """
+    created, version = datetime.now(UTC).isoformat(timespec="seconds"), _version("annelid")
+    sections = (config.body, config.arena, config.turning, config.controller)
+    cited = (key for section in sections if section is not None for key, _ in section.cited())
     return {name: value for part in parts for name, value in part.attrs.items()} | {
+        "Conventions": "CF-1.11",
+        "title": f"simulated run of {config.name}",
+        "source": f"annelid {version}, a simulation of a soft earthworm robot",
+        "history": f"{created}: run by annelid {version}",
+        "references": f"{', '.join(dict.fromkeys(('annelid', *cited)))}: annelid cite prints these entries",
+        "comment": "config has the whole configuration as JSON; times are from the start of the simulation",
         runfile.SCHEMA: runfile.SCHEMA_VERSION,
         "config": config.model_dump_json(),
         # The format's integers have 64 bits, a seed may have more.
         "seed": config.seed if config.seed < 2**63 else str(config.seed),
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "annelid_version": _version("annelid"),
+        "created": created,
+        "annelid_version": version,
         "mujoco_version": _version("mujoco-core"),
         "numpy_version": np.__version__,
         "python_version": platform.python_version(),

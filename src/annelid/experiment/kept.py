@@ -1,0 +1,116 @@
+"""The runs that lie below a folder: what each is, and removing the files that annelid wrote for it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from annelid.errors import AnnelidError, ConfigError, RunFileError
+from annelid.experiment.attempt import OUTCOME_NAME
+from annelid.simulation.lock import LOCK_NAME, locked
+from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
+from annelid.textfiles import parse_json
+
+PICTURES = ("figure7.png", "frame.png", "video.mp4")
+"""What `annelid run` draws into a run's folder."""
+UNREADABLE = "unreadable"
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What lies in one folder."""
+
+    folder: Path
+    preset: str | None
+    """Name of the configuration; None where there is no run file, or it cannot be read."""
+    duration_s: float | None
+    """Simulated time that was reached."""
+    size_bytes: int
+    """Size of the files that annelid wrote there."""
+    changed: str
+    """When the newest of them was written, UTC."""
+    status: str
+    """How the run ended; ``outcome only`` where a study kept the numbers, ``unreadable`` for a damaged file."""
+
+
+def kept_runs(root: Path) -> Iterator[Kept]:
+    """Yields the runs and kept outcomes in a folder and below it, in the order of their paths; follows no links."""
+    if not root.is_dir():
+        raise ConfigError(f"there is no folder {root}")
+    for name, below, files in os.walk(root):
+        # Hidden folders are attempts of studies that still go on or were killed.
+        below[:] = sorted(entry for entry in below if not entry.startswith("."))
+        if FILE_NAME in files or (OUTCOME_NAME in files and _is_outcome(Path(name) / OUTCOME_NAME)):
+            yield _kept(Path(name))
+
+
+def _kept(folder: Path) -> Kept:
+    import xarray
+
+    preset = duration_s = None
+    status = "outcome only"
+    if (folder / FILE_NAME).exists():
+        try:
+            preset = read_config(folder).name
+            # Not `open_run`, which would load all of a large file.
+            with xarray.open_dataset(folder / FILE_NAME, engine="h5netcdf") as data:
+                n_samples = int(data["samples_written"])
+                duration_s = float(data["time"][n_samples - 1]) if n_samples else 0.0
+                status = STATUSES[int(data["status_code"])]
+        except (RunFileError, OSError, KeyError, IndexError, ValueError):
+            status = UNREADABLE
+    states = [path.lstat() for path in _own_files(folder, status)]
+    newest = max((state.st_mtime for state in states), default=folder.stat().st_mtime)
+    changed = datetime.fromtimestamp(newest, UTC).isoformat(timespec="seconds")
+    return Kept(folder, preset, duration_s, sum(state.st_size for state in states), changed, status)
+
+
+def _is_outcome(path: Path) -> bool:
+    """Whether a file is an outcome, of this or another version."""
+    try:
+        content = parse_json(path.read_text(encoding="utf-8"), "the outcome")
+    except (AnnelidError, OSError, ValueError):
+        return False
+    return isinstance(content, dict) and {"reader", "summary", "rhythm"} <= content.keys()
+
+
+def _own_files(folder: Path, status: str) -> list[Path]:
+    """Returns the files that annelid wrote; nothing shows it for those of an unreadable run."""
+    names = () if status in (UNREADABLE, "outcome only") else (FILE_NAME, *PICTURES)
+    files = [folder / name for name in names]
+    if _is_outcome(folder / OUTCOME_NAME):
+        files.append(folder / OUTCOME_NAME)
+    return [path for path in files if path.is_file() and not path.is_symlink()]
+
+
+def remove(run: Kept) -> int:
+    """Removes the files of a run that `kept_runs` listed, and its folder if nothing else is in it.
+
+    Returns the number of files removed. Raises `RunFileError` where another process writes there, or a file stays.
+    """
+    if not run.folder.is_dir() or run.folder.is_symlink():
+        raise RunFileError(f"{run.folder} is not there any more")
+    if run.status == UNREADABLE:
+        raise RunFileError(f"{run.folder} is unreadable, so annelid may not have written it: remove it yourself")
+    removed = 0
+    try:
+        with ExitStack() as stack:
+            # A study locks its own folder, above those of its runs.
+            for above in reversed(run.folder.absolute().parents):
+                if (above / LOCK_NAME).exists():
+                    stack.enter_context(locked(above))
+            stack.enter_context(locked(run.folder))
+            for path in _own_files(run.folder, _kept(run.folder).status):
+                path.unlink()
+                removed += 1
+    except OSError as error:
+        raise RunFileError(f"cannot remove {error.filename}: {error.strerror}") from None
+    # Where anything else is in it, such as a file of the user's, the folder stays.
+    with suppress(OSError):
+        if {entry.name for entry in run.folder.iterdir()} <= {LOCK_NAME}:
+            run.folder.rmdir()
+    return removed

@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.config import RunConfig
-from annelid.draw.figures.network_diagram import PAPER_SYMBOLS, abbreviations
 from annelid.nervous import Network
-from annelid.nervous.drawing import role_of
 from annelid.simulation.stepping import build_controller
 from annelid.simulation.worm import WormPlant
 
@@ -30,14 +28,11 @@ def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
 
 
 def network_html(network: Network) -> str:
-    """Returns the diagram of `annelid.nervous.Network.diagram`, with short labels and a class for every neuron."""
-    svg, short = network.diagram().svg, abbreviations(network.neurons) | PAPER_SYMBOLS
+    """Returns the diagram of `annelid.nervous.Network.diagram`, with a class for every neuron."""
+    svg = network.diagram().svg
     for number, name in enumerate(network.neurons):
         svg = svg.replace(f'id="{escape(f"neuron-{name}")}"', f'class="annelid-n{number}"', 1)
-        svg = svg.replace(f">{escape(name)}</text>", f">{escape(short[role_of(name)])}</text>")
-    roles = dict.fromkeys(map(role_of, network.neurons))
-    names = ", ".join(f"{escape(short[role])} {escape(role)}" for role in roles if short[role] != role)
-    key = f"blue {FULL_MV:g} mV below rest, white at rest, orange {FULL_MV:g} mV above. {names}"
+    key = f"blue {FULL_MV:g} mV below rest, white at rest, orange {FULL_MV:g} mV above"
     return f'<div class="annelid-network">{svg}<p style="font-size:0.8em;margin:0.3em 0.6em">{key}</p></div>'
 
 

@@ -1,9 +1,8 @@
 """Slip: what pressure feedback saves of its cost, and how well a robot can detect it from stretch and pressure.
 
-The same six-segment worm crawls with and without feedback, over frictions. Its body is that of a preset of the
-six-segment robot with ideal muscles, the network that of its controller. Feedback was tuned on `PRESET` at the
-frictions `TUNED_AT`; every other friction is a test, and so is every other gait. The detector's constants were chosen
-on one run, `CHOSEN_ON`; the others test it.
+The same six-segment worm crawls on several frictions by the paper's network, by that with pressure feedback, and by a
+wave by the clock, which senses nothing. Feedback and wave were tuned with one budget on the friction `TUNED_AT`; every
+other friction is a test. The detector's constants were chosen on one run, `CHOSEN_ON`; the others test it.
 """
 
 from __future__ import annotations
@@ -20,160 +19,151 @@ from rich.table import Table as TerminalTable
 from annelid.analysis import (
     Detection,
     DetectionScore,
-    SlipCost,
     detect_slip,
     precision_recall,
     score_detections,
     slip_cost,
 )
-from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
-from annelid.errors import ConfigError
 from annelid.experiment import Case, Store
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import terminal_table
+from annelid_studies.tables import Estimate, mean_and_interval, terminal_table
+from annelid_studies.worms import Effort
 
 PRESET = "riddle2025-muscles"
-GAITS = (PRESET, "crawler")
-"""Presets of that robot under the paper's network, as published and tuned for speed."""
-TUNED_AT = (0.5, 0.85)
-"""Frictions at which the feedback was tuned."""
-FRICTIONS = (0.3, 0.5, 0.7, 0.85, 1.0, 1.2, 1.5)
-QUICK_FRICTIONS = (0.7, 1.0)
+TUNED_AT = 0.7
+"""Friction at which feedback and timed wave were tuned."""
+FRICTIONS: Mapping[Effort, tuple[float, ...]] = {"full": (0.3, 0.7, 1.0), "quick": (0.7, 1.0)}
+STEPS_S: Mapping[Effort, tuple[float, ...]] = {"full": (0.01, 0.005), "quick": (0.01,)}
+"""Physics steps: the preset's, and half of it."""
+DRAWS: Mapping[Effort, int] = {"full": 4, "quick": 2}
+FRICTION_SPREAD = 0.01
+"""Largest relative change of the friction in a draw."""
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
-PLAIN, EXTENSION, PRESSURE = "none", "no pressure", "with pressure"
-LOSS_TICKS = (2, 5, 10, 20, 50, 100)
-FEEDBACKS = (PLAIN, EXTENSION, PRESSURE)
-"""What is fed back beside the paper's stretch sensors: nothing, what of our design needs no touch, all of it."""
+PLAIN, EXTENSION, PRESSURE, TIMED = "paper's network", "feedback, no pressure", "pressure feedback", "timed wave"
+
+
+def _feedback(hold: float) -> dict[str, Any]:
+    network = {"kind": "sns", "gate_start": "toolbox", "gate_time_constant_ms": 318.0}
+    strengths = {"hold": hold, "release": 5.93, "exchange": 0.204}
+    return {"controller": {"kind": "sns-pressure", "network": network, **strengths}, "sensor.tolerance_m": 0.00203}
+
+
+CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
+    PLAIN: {},
+    EXTENSION: _feedback(0.0),
+    PRESSURE: _feedback(0.877),
+    TIMED: {"controller": {"kind": "timed", "rise_s": 0.0365, "hold_s": 0.328, "fall_s": 0.058, "interval_s": 0.1206}},
+}
+"""What drives the worm: the preset's controller, feedback with and without what needs touch, and the baseline."""
 
 
 class Reading(NamedTuple):
-    """One run with one of `FEEDBACKS` on one friction."""
+    """One controller on one friction at one physics step: means over draws, with 95 % intervals."""
 
-    feedback: str
     friction: float
-    cost: SlipCost | None  # Speed and loss; None where there are no whole cycles to judge
-    one_wave: bool  # Whether the segments contract in order, in one wave from front to rear
+    step_s: float
+    controller: str
+    in_order: int  # Runs whose segments contract in one wave from front to rear
+    draws: int
+    speed_m_per_s: Estimate
+    loss_J_per_m: Estimate
+    faster: Estimate  # Than the timed wave on the same draws, as a share of its speed
+    saved: Estimate  # Of the timed wave's loss per metre on the same draws, as a share
 
 
-def case(feedback: str, friction: float, preset: str = PRESET) -> Case:
-    """Returns the run of one kind of feedback, one of `FEEDBACKS`, on one friction, with one of `GAITS`."""
-    changes: dict[str, Any] = {"arena.friction": friction, "duration_s": DURATION_S}
-    if feedback != PLAIN:
-        changes["controller"] = {"kind": "sns-pressure", "network": load_config(preset).controller.model_dump()}
-    if feedback == EXTENSION:
-        changes["controller"]["hold"] = 0.0
-    return Case(preset, changes)
+def case(controller: str, friction: float, **changes: Any) -> Case:
+    """Returns the run by one of `CONTROLLERS` on one friction."""
+    own = {**CONTROLLERS[controller], "arena.friction": friction, "duration_s": DURATION_S}
+    return Case(PRESET, {**own, **changes})
 
 
-def slip_feedback(store: Store, frictions: Sequence[float], preset: str = PRESET) -> list[Reading]:
-    """Runs the worm with every feedback on every friction, as far as the store does not have it.
-
-    Returns:
-        One reading a run, friction by friction.
+def slip_feedback(store: Store, effort: Effort) -> list[Reading]:
+    """Runs the worm by every controller on every friction, as far as the store does not have the runs.
 
     Raises:
-        ConfigError: The preset is none of `GAITS`.
         AnnelidError: A run cannot be made.
     """
-    if preset not in GAITS:
-        raise ConfigError(f"preset is {preset!r}: must be one of {', '.join(GAITS)}")
-    cases = {(feedback, friction): case(feedback, friction, preset) for friction in frictions for feedback in FEEDBACKS}
-    store.compute(cases.values(), "feedback")
-    return [Reading(*at, slip_cost(store.run(one)), store[one].rhythm.is_one_wave) for at, one in cases.items()]
+    spread = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, DRAWS[effort]).tolist()
+    cases = {
+        (friction, step, controller): [
+            case(controller, round(friction * (1.0 + part), 6), seed=seed, **{"clock.physics_timestep_s": step})
+            for seed, part in enumerate(spread, start=1)
+        ]
+        for step in STEPS_S[effort]
+        for friction in FRICTIONS[effort]
+        for controller in CONTROLLERS
+    }
+    store.compute([one for own in cases.values() for one in own], "feedback")
+    numbers = {at: np.array([_speed_and_loss(store, one) for one in own]) for at, own in cases.items()}
+    readings = []
+    for at, own in cases.items():
+        speed, loss = numbers[at].T
+        timed_speed, timed_loss = numbers[*at[:2], TIMED].T
+        estimates = (speed, loss, speed / timed_speed - 1.0, 1.0 - loss / timed_loss)
+        in_order = sum(store[one].rhythm.is_one_wave for one in own)
+        readings.append(Reading(*at, in_order, len(own), *(mean_and_interval(each.tolist()) for each in estimates)))
+    return readings
 
 
-def percent(value: float, of: float) -> float:
-    """By how much a value is above another one, in percent of that."""
-    return 100.0 * (value / of - 1.0)
-
-
-def compared(readings: Sequence[Reading], reading: Reading) -> tuple[float, float, float] | None:
-    """Compares a reading with that without feedback on the same friction.
-
-    Returns:
-        Speed gained, loss saved over time, and loss saved over distance, in percent; None where either has no cycles.
-    """
-    [plain] = [one.cost for one in readings if (one.friction, one.feedback) == (reading.friction, PLAIN)]
-    own = reading.cost
-    if plain is None or own is None:
-        return None
-    return (
-        percent(own.speed_m_per_s, plain.speed_m_per_s),
-        -percent(own.loss_W, plain.loss_W),
-        -percent(own.loss_J_per_m, plain.loss_J_per_m),
-    )
+def _speed_and_loss(store: Store, one: Case) -> tuple[float, float]:
+    cost = slip_cost(store.run(one))
+    return (nan, nan) if cost is None else (cost.speed_m_per_s, cost.loss_J_per_m)
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
-    """Writes one row a run as CSV with a header, and returns its path."""
-    costs, gains = ("period_s", "speed_m_per_s", "loss_W", "loss_J_per_m"), ("faster", "saved_per_s", "saved_per_m")
-
-    def cells(one: Reading) -> list[object]:
-        numbers = *(getattr(one.cost, name, nan) for name in costs), *(compared(readings, one) or (nan,) * 3)
-        texts = [f"{number:.5g}" for number in numbers]
-        return [one.feedback, f"{one.friction:g}", one.cost.cycles if one.cost else 0, *texts, one.one_wave]
-
-    header = ["feedback", "friction", "cycles", *costs, *(f"{gain}_percent" for gain in gains), "one_wave"]
-    return write_csv(path, header, map(cells, readings))
+    """Writes one row a reading as CSV with a header, and returns its path; intervals as two columns more."""
+    estimates = Reading._fields[5:]
+    header = [*Reading._fields[:5], *(f"{name}{end}" for name in estimates for end in ("", "_low", "_high"))]
+    rows = ([*one[:5], *(f"{number:.5g}" for each in one[5:] for number in each)] for one in readings)
+    return write_csv(path, header, rows)
 
 
-def feedback_table(readings: Sequence[Reading], preset: str = PRESET) -> TerminalTable:
-    """Tabulates speed and loss, and what feedback gains and saves on the same friction."""
+def feedback_table(readings: Sequence[Reading]) -> TerminalTable:
+    """Tabulates speed and loss, and the loss saved against the timed wave on the same draws."""
     rows = []
     for one in readings:
-        cost, gains = one.cost, compared(readings, one)
-        numbers = ["no whole cycles", "", *[""] * 3]
-        if cost is not None:
-            percents = [f"{gain:+.0f}" for gain in gains] if gains and one.feedback != PLAIN else [""] * 3
-            numbers = [f"{100 * cost.speed_m_per_s:.1f}", f"{cost.loss_J_per_m:.2f}", *percents]
-        friction = f"{one.friction:g}{'*' if one.friction in TUNED_AT else ''}"
-        rows.append([friction, one.feedback, "yes" if one.one_wave else "no", *numbers])
-    header = ["friction", "feedback", "wave", "cm/s", "J/m", "faster (%)", "saved (%)", "per m (%)"]
-    caption = f"* feedback was tuned here{'' if preset == PRESET else f', on {PRESET}'}"
-    return terminal_table(Table(header, rows), f"slip of {preset}, over whole cycles", n_words=2, caption=caption)
+        (saved, low, high), faster = one.saved, one.faster[0]
+        compared = [""] * 2 if one.controller == TIMED else [f"{100 * faster:+.0f}", _percent(saved, low, high)]
+        where = [f"{one.friction:g}{'*' if one.friction == TUNED_AT else ''}", f"{1e3 * one.step_s:g}"]
+        numbers = [f"{one.in_order} of {one.draws}", f"{100 * one.speed_m_per_s[0]:.1f}", f"{one.loss_J_per_m[0]:.2f}"]
+        rows.append([*where, one.controller, *numbers, *compared])
+    header = ["friction", "step (ms)", "controller", "in order", "cm/s", "J/m", "faster (%)", "saved per m (%)"]
+    caption = "* tuned here; faster and saved: than the timed wave, 95 % interval"
+    return terminal_table(Table(header, rows), f"slip of {PRESET}, over complete cycles", n_words=3, caption=caption)
 
 
-def feedback_figure(readings: Sequence[Reading], preset: str, stem: Path) -> Path:
-    """Draws loss per metre and speed against friction; dotted lines where the preset's feedback was tuned."""
-    found = [
-        (feedback, [(one.friction, one.cost) for one in readings if one.feedback == feedback and one.cost is not None])
-        for feedback in FEEDBACKS
-    ]
-    lines = {feedback: own for feedback, own in found if own}
-    tuned_at = TUNED_AT if preset == PRESET else ()
+def _percent(mean: float, low: float, high: float) -> str:
+    return f"{100 * mean:+.0f} ({100 * low:+.0f} .. {100 * high:+.0f})"
+
+
+def feedback_figure(readings: Sequence[Reading], stem: Path) -> Path:
+    """Draws loss per metre and speed against friction at the preset's step; dotted where controllers were tuned."""
+    shown = [one for one in readings if one.step_s == readings[0].step_s]
     with canvas(3.0) as figure:
         cost, pace = figure.subplots(1, 2)
         for axes, scale, name in ((cost, 1.0, "loss_J_per_m"), (pace, 100.0, "speed_m_per_s")):
-            axes.set_xlabel("friction of the floor" + (" (dotted: tuned here)" if tuned_at else ""))
-            for friction in tuned_at:
-                axes.axvline(friction, color="0.35", linewidth=0.8, linestyle=":")
-            numbers = {
-                feedback: ([friction for friction, _ in own], [scale * getattr(each, name) for _, each in own])
-                for feedback, own in lines.items()
-            }
+            axes.set_xlabel("friction of the floor (dotted: tuned here)")
+            axes.axvline(TUNED_AT, color="0.35", linewidth=0.8, linestyle=":")
+            numbers = {}
+            for controller in CONTROLLERS:
+                own = [one for one in shown if one.controller == controller]
+                numbers[controller] = [one.friction for one in own], [scale * getattr(one, name)[0] for one in own]
             draw_lines(axes, numbers, markersize=4)
+            axes.set_ylim(bottom=0.0)
         panel_title(cost, "What slip costs")
-        cost.set(ylabel="work lost to friction (J/m)", yscale="log")
-        cost.set_yticks(LOSS_TICKS, [f"{loss}" for loss in LOSS_TICKS])
-        cost.minorticks_off()
-        cost.legend(title="feedback")
+        cost.set_ylabel("work lost to friction (J/m)")
+        cost.legend()
         panel_title(pace, "How fast it is")
         pace.set_ylabel("speed (cm/s)")
-        pace.set_ylim(bottom=0.0)
         return save_both(figure, stem)
 
 
 LIMIT_M_PER_S = 0.1
 """The detector's own limit."""
 LIMITS_M_PER_S = np.geomspace(0.005, 1.0, 60)
-TIMED = {
-    "controller": {"kind": "timed", "rise_s": 0.1, "hold_s": 0.5, "fall_s": 0.1, "interval_s": 0.38},
-    "arena.friction": 0.7,
-    "duration_s": DURATION_S,
-}
 CHOSEN_ON = "sns, friction 0.7"
 CASES: dict[str, Case] = {
     CHOSEN_ON: case(PLAIN, 0.7),
@@ -181,7 +171,7 @@ CASES: dict[str, Case] = {
     "sns, friction 1.5": case(PLAIN, 1.5),
     "sns-pressure, friction 0.3": case(PRESSURE, 0.3),
     "sns-pressure, friction 1": case(PRESSURE, 1.0),
-    "timed wave, friction 0.7": Case(PRESET, TIMED),
+    "timed wave, friction 0.7": case(TIMED, 0.7),
 }
 """The runs that the detector reads, by what tables and figures call them."""
 QUICK_CASES = (CHOSEN_ON, "sns-pressure, friction 1")

@@ -18,6 +18,8 @@ T = TypeVar("T")
 K = TypeVar("K")
 
 CONFIDENCE = 0.95
+Estimate = tuple[float, float, float]
+"""A mean and the ends of its 95 % interval."""
 
 
 def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
@@ -28,7 +30,7 @@ def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
     return found
 
 
-def mean_and_interval(values: Sequence[float]) -> tuple[float, float, float]:
+def mean_and_interval(values: Sequence[float]) -> Estimate:
     """Returns the mean of numbers and the ends of its 95 % interval by Student's t; NaN where there are too few."""
     from scipy.stats import sem, t
 

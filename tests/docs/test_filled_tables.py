@@ -27,10 +27,7 @@ NUMBER = re.compile(r"^\W*\d[\d.,]*(?![\d-])")
 WAITING = (
     "results/arena_contacts.csv",
     "results/batch_throughput.csv",
-    "results/challenge.csv",
-    "results/challenge_tasks.csv",
     "results/environments.csv",
-    "results/slip_parts.csv",
     "results/weak_middle.csv",
 )
 """Result files that do not exist yet: their tables have the numbers of earlier runs."""
@@ -65,13 +62,7 @@ NO_WORM = {
 }
 """Result files that are not of presets, and why."""
 
-STALE = (
-    "pipes.csv",
-    "slip.csv",
-    "slip_crawler.csv",
-    "slip_detector.csv",
-    "turning.csv",
-)
+STALE = ("slip.csv",)
 """Result files whose worms have changed since: to be measured again."""
 
 LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))

@@ -28,7 +28,6 @@ from annelid.cli.common import (
 from annelid.cli.entry import lock, study
 
 SLIP = Path("slip")
-GAIT = "riddle2025-muscles"
 
 
 @study("speed")
@@ -105,31 +104,30 @@ def gaits_command(
 @study("slip")
 def slip_command(
     output: Output = SLIP,
-    preset: Annotated[str, typer.Option(help="Gait that gets the feedback: riddle2025-muscles or crawler.")] = GAIT,
-    quick: Annotated[bool, typer.Option("--quick", help="Two frictions only.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Two frictions, two draws and one step only.")] = False,
     jobs: Jobs = None,
     cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
-    """Measure what pressure feedback saves of the work lost to friction.
+    """Measure what pressure feedback saves of the work lost to friction, against a wave by the clock.
 
-    A six-segment worm crawls on several frictions with the paper's network, and with that of controller sns-pressure,
-    without and with its pressure neurons. Speed and loss are computed over complete cycles; "saved" is per second and
-    per metre. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. Twenty-one runs of
-    about ten seconds each; docs/slip.md explains the results.
+    A six-segment worm crawls on several frictions by the paper's network, by controller sns-pressure with and without
+    its pressure neurons, and by a timed wave, tuned with the same budget as the feedback. Speed and loss per metre are
+    means over draws of the friction within one percent, computed over complete cycles, at the preset's step and at half
+    of it; "saved" is against the timed wave on the same draws. Writes slip.csv, .png and .svg, and keeps runs, so that
+    an interrupted call goes on. 96 runs of ten to twenty seconds each; docs/slip.md explains the results.
 
     \b
     annelid experiment slip --quick
-    annelid experiment slip --preset crawler -o slip-crawler
+    annelid experiment slip -o slip
     """
     from annelid_studies import slip
 
-    frictions = slip.QUICK_FRICTIONS if quick else slip.FRICTIONS
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
-        readings = slip.slip_feedback(store, frictions, preset)
+        readings = slip.slip_feedback(store, "quick" if quick else "full")
     path = slip.write_readings(readings, output / "slip.csv")
-    written = path, slip.feedback_figure(readings, preset, path.with_suffix(""))
-    print_results(written, slip.feedback_table(readings, preset), quiet=quiet)
+    written = path, slip.feedback_figure(readings, path.with_suffix(""))
+    print_results(written, slip.feedback_table(readings), quiet=quiet)
 
 
 @study("slip-detector")

@@ -35,8 +35,8 @@ PRESET = "riddle2025-muscles"
 TUNED_AT = 0.7
 """Friction at which feedback and timed wave were tuned."""
 FRICTIONS: Mapping[Effort, tuple[float, ...]] = {"full": (0.3, 0.7, 1.0), "quick": (0.7, 1.0)}
-STEPS_S: Mapping[Effort, tuple[float, ...]] = {"full": (0.01, 0.005), "quick": (0.01,)}
-"""Physics steps: the preset's, and half of it."""
+STEP_S = 0.01
+"""Physics step of the preset."""
 DRAWS: Mapping[Effort, int] = {"full": 4, "quick": 2}
 FRICTION_SPREAD = 0.01
 """Largest relative change of the friction in a draw."""
@@ -61,10 +61,9 @@ CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
 
 
 class Reading(NamedTuple):
-    """One controller on one friction at one physics step: means over draws, with 95 % intervals."""
+    """One controller on one friction: means over draws, with 95 % intervals."""
 
     friction: float
-    step_s: float
     controller: str
     in_order: int  # Runs whose segments contract in one wave from front to rear
     draws: int
@@ -80,19 +79,24 @@ def case(controller: str, friction: float, **changes: Any) -> Case:
     return Case(PRESET, {**own, **changes})
 
 
-def slip_feedback(store: Store, effort: Effort) -> list[Reading]:
+def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> list[Reading]:
     """Runs the worm by every controller on every friction, as far as the store does not have the runs.
+
+    Args:
+        store: Where runs are kept.
+        effort: How many frictions and draws there are.
+        half_step: Whether bodies move in steps half as long.
 
     Raises:
         AnnelidError: A run cannot be made.
     """
+    step = 0.5 * STEP_S if half_step else STEP_S
     spread = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, DRAWS[effort]).tolist()
     cases = {
-        (friction, step, controller): [
+        (friction, controller): [
             case(controller, round(friction * (1.0 + part), 6), seed=seed, **{"clock.physics_timestep_s": step})
             for seed, part in enumerate(spread, start=1)
         ]
-        for step in STEPS_S[effort]
         for friction in FRICTIONS[effort]
         for controller in CONTROLLERS
     }
@@ -101,7 +105,7 @@ def slip_feedback(store: Store, effort: Effort) -> list[Reading]:
     readings = []
     for at, own in cases.items():
         speed, loss = numbers[at].T
-        timed_speed, timed_loss = numbers[*at[:2], TIMED].T
+        timed_speed, timed_loss = numbers[at[0], TIMED].T
         estimates = (speed, loss, speed / timed_speed - 1.0, 1.0 - loss / timed_loss)
         in_order = sum(store[one].rhythm.is_one_wave for one in own)
         readings.append(Reading(*at, in_order, len(own), *(mean_and_interval(each.tolist()) for each in estimates)))
@@ -115,9 +119,9 @@ def _speed_and_loss(store: Store, one: Case) -> tuple[float, float]:
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
     """Writes one row a reading as CSV with a header, and returns its path; intervals as two columns more."""
-    estimates = Reading._fields[5:]
-    header = [*Reading._fields[:5], *(f"{name}{end}" for name in estimates for end in ("", "_low", "_high"))]
-    rows = ([*one[:5], *(f"{number:.5g}" for each in one[5:] for number in each)] for one in readings)
+    estimates = Reading._fields[4:]
+    header = [*Reading._fields[:4], *(f"{name}{end}" for name in estimates for end in ("", "_low", "_high"))]
+    rows = ([*one[:4], *(f"{number:.5g}" for each in one[4:] for number in each)] for one in readings)
     return write_csv(path, header, rows)
 
 
@@ -127,12 +131,12 @@ def feedback_table(readings: Sequence[Reading]) -> TerminalTable:
     for one in readings:
         (saved, low, high), faster = one.saved, one.faster[0]
         compared = [""] * 2 if one.controller == TIMED else [f"{100 * faster:+.0f}", _percent(saved, low, high)]
-        where = [f"{one.friction:g}{'*' if one.friction == TUNED_AT else ''}", f"{1e3 * one.step_s:g}"]
+        friction = f"{one.friction:g}{'*' if one.friction == TUNED_AT else ''}"
         numbers = [f"{one.in_order} of {one.draws}", f"{100 * one.speed_m_per_s[0]:.1f}", f"{one.loss_J_per_m[0]:.2f}"]
-        rows.append([*where, one.controller, *numbers, *compared])
-    header = ["friction", "step (ms)", "controller", "in order", "cm/s", "J/m", "faster (%)", "saved per m (%)"]
+        rows.append([friction, one.controller, *numbers, *compared])
+    header = ["friction", "controller", "in order", "cm/s", "J/m", "faster (%)", "saved per m (%)"]
     caption = "* tuned here; faster and saved: than the timed wave, 95 % interval"
-    return terminal_table(Table(header, rows), f"slip of {PRESET}, over complete cycles", n_words=3, caption=caption)
+    return terminal_table(Table(header, rows), f"slip of {PRESET}, over complete cycles", n_words=2, caption=caption)
 
 
 def _percent(mean: float, low: float, high: float) -> str:
@@ -140,8 +144,7 @@ def _percent(mean: float, low: float, high: float) -> str:
 
 
 def feedback_figure(readings: Sequence[Reading], stem: Path) -> Path:
-    """Draws loss per metre and speed against friction at the preset's step; dotted where controllers were tuned."""
-    shown = [one for one in readings if one.step_s == readings[0].step_s]
+    """Draws loss per metre and speed against friction; dotted where controllers were tuned."""
     with canvas(3.0) as figure:
         cost, pace = figure.subplots(1, 2)
         for axes, scale, name in ((cost, 1.0, "loss_J_per_m"), (pace, 100.0, "speed_m_per_s")):
@@ -149,7 +152,7 @@ def feedback_figure(readings: Sequence[Reading], stem: Path) -> Path:
             axes.axvline(TUNED_AT, color="0.35", linewidth=0.8, linestyle=":")
             numbers = {}
             for controller in CONTROLLERS:
-                own = [one for one in shown if one.controller == controller]
+                own = [one for one in readings if one.controller == controller]
                 numbers[controller] = [one.friction for one in own], [scale * getattr(one, name)[0] for one in own]
             draw_lines(axes, numbers, markersize=4)
             axes.set_ylim(bottom=0.0)

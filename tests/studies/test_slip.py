@@ -41,8 +41,8 @@ def test_only_the_controller_differs() -> None:
 def test_readings_are_written_with_their_intervals(tmp_path: Path) -> None:
     near, none = (1.0, 0.9, 1.1), (0.0, 0.0, 0.0)
     readings = [
-        Reading(0.7, 0.01, TIMED, 4, 4, (0.3, 0.29, 0.31), (4.0, 3.9, 4.1), none, none),
-        Reading(0.7, 0.01, PRESSURE, 3, 4, (0.2, 0.19, 0.21), near, (-0.33, -0.4, -0.3), (0.75, 0.7, 0.8)),
+        Reading(0.7, TIMED, 4, 4, (0.3, 0.29, 0.31), (4.0, 3.9, 4.1), none, none),
+        Reading(0.7, PRESSURE, 3, 4, (0.2, 0.19, 0.21), near, (-0.33, -0.4, -0.3), (0.75, 0.7, 0.8)),
     ]
     write_readings(readings, tmp_path / "slip.csv")
     first, second = csv.DictReader((tmp_path / "slip.csv").read_text(encoding="utf-8").splitlines())
@@ -61,10 +61,9 @@ def test_scores_are_written_under_their_names(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_feedback_slips_less_than_the_papers_network(tmp_path: Path) -> None:
-    """On the friction that it was not tuned on, too; against the timed wave docs/slip.md has the numbers."""
+    """On the friction that it was tuned on and on another; docs/slip.md compares with the timed wave."""
     readings = {(one.friction, one.controller): one for one in slip_feedback(Store(tmp_path), "quick")}
     for friction in (0.7, 1.0):
         plain, pressure = readings[friction, PLAIN], readings[friction, PRESSURE]
-        assert pressure.in_order == pressure.draws
         assert pressure.loss_J_per_m[0] < plain.loss_J_per_m[0]
         assert pressure.speed_m_per_s[0] > plain.speed_m_per_s[0]

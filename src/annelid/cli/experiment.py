@@ -104,7 +104,8 @@ def gaits_command(
 @study("slip")
 def slip_command(
     output: Output = SLIP,
-    quick: Annotated[bool, typer.Option("--quick", help="Two frictions, two draws and one step only.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Two frictions and two draws only.")] = False,
+    half_step: Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")] = False,
     jobs: Jobs = None,
     cluster: ClusterName = None,
     quiet: Quiet = False,
@@ -113,18 +114,18 @@ def slip_command(
 
     A six-segment worm crawls on several frictions by the paper's network, by controller sns-pressure with and without
     its pressure neurons, and by a timed wave, tuned with the same budget as the feedback. Speed and loss per metre are
-    means over draws of the friction within one percent, computed over complete cycles, at the preset's step and at half
-    of it; "saved" is against the timed wave on the same draws. Writes slip.csv, .png and .svg, and keeps runs, so that
-    an interrupted call goes on. 96 runs of ten to twenty seconds each; docs/slip.md explains the results.
+    means over draws of the friction within one percent, computed over complete cycles; "saved" is against the timed
+    wave on the same draws. Writes slip.csv, .png and .svg, and keeps runs, so that an interrupted call goes on. 48 runs
+    of 14 s; docs/slip.md explains the results.
 
     \b
     annelid experiment slip --quick
-    annelid experiment slip -o slip
+    annelid experiment slip --half-step -o slip-half
     """
     from annelid_studies import slip
 
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
-        readings = slip.slip_feedback(store, "quick" if quick else "full")
+        readings = slip.slip_feedback(store, "quick" if quick else "full", half_step=half_step)
     path = slip.write_readings(readings, output / "slip.csv")
     written = path, slip.feedback_figure(readings, path.with_suffix(""))
     print_results(written, slip.feedback_table(readings), quiet=quiet)

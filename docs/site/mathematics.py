@@ -27,7 +27,7 @@ class Formula(InlineProcessor):
             html = mathml(m["inline"], "inline")
         else:
             number = TAG.search(m["display"])
-            html = f'<span class="formula">{mathml(TAG.sub("", m["display"]), "block")}</span>'
+            html = f'<span class="formula" tabindex="0">{mathml(TAG.sub("", m["display"]), "block")}</span>'
             if number:
                 html = f'<span class="equation" id="equation-{number[1]}">{html}<span>({number[1]})</span></span>'
         return self.md.htmlStash.store(html), m.start(0), m.end(0)
@@ -54,7 +54,13 @@ def mathml(latex: str, display: str) -> str:
     html = convert(latex, display=display)
     if "\\" in html or "&</" in html:
         raise ValueError(f"cannot be written as MathML: {latex}")
-    return html
+    html = re.sub(r"<mo>(&#x02016;|&#x0007C;)</mo>", r'<mo stretchy="false">\1</mo>', html)
+    return re.sub('<mi mathvariant="bold">([A-Za-z])</mi>', lambda letter: f"<mi>{bold(letter[1])}</mi>", html)
+
+
+def bold(letter: str) -> str:
+    """Returns the bold form of a Latin letter, since some browsers ignore that it should be bold."""
+    return chr((0x1D400 - ord("A") if letter.isupper() else 0x1D41A - ord("a")) + ord(letter))
 
 
 def makeExtension(**settings: object) -> Mathematics:

@@ -9,6 +9,7 @@ nor package change.
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -55,7 +56,9 @@ def build(folder: Path) -> Path:
     (folder / "mkdocs.yml").write_text(yaml.safe_dump(settings, sort_keys=False), encoding="utf-8")
     shutil.rmtree(site, ignore_errors=True)
     command = [sys.executable, "-m", "zensical", "build", "--clean", "--strict", "-f", str(folder / "mkdocs.yml")]
-    subprocess.run(command, check=True)
+    # Where the generator finds our extension, `mathematics`.
+    found = os.pathsep.join(filter(None, [str(Path(__file__).parent), os.environ.get("PYTHONPATH")]))
+    subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": found})
     return site
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 SIZES = ((1280, "light"), (400, "dark"))
-PAGES = ("index.html", "gait.html", "live_view.html", "reference/api/control.html")
+PAGES = ("index.html", "gait.html", "explanation/equations.html", "live_view.html", "reference/api/control.html")
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,8 @@ def global_attributes(config: RunConfig, parts: Sequence[Recordable]) -> dict[st
         "Conventions": "CF-1.11",
         "title": f"simulated run of {config.name}",
         "source": f"annelid {version}, a simulation of a soft earthworm robot",
-        "history": f"{created}: run by annelid {version}",
+        # Its time is in `created`: all else of two runs of one configuration is the same.
+        "history": f"run by annelid {version}",
         "references": f"{', '.join(dict.fromkeys(('annelid', *cited)))}: annelid cite prints these entries",
         "comment": "config has the whole configuration as JSON; times are from the start of the simulation",
         runfile.SCHEMA: runfile.SCHEMA_VERSION,

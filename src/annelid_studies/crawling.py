@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from rich.table import Table as TerminalTable
 
+from annelid.analysis import mean_and_interval
 from annelid.body import WormBody
 from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
@@ -21,8 +22,8 @@ from annelid.errors import ConfigError
 from annelid.experiment import Case, Judged, Store, finer_steps, judge, more_elements
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import grouped, mean_and_interval, terminal_table
-from annelid_studies.worms import Effort
+from annelid_studies.tables import grouped, terminal_table
+from annelid_studies.worms import Effort, drawn_frictions
 
 GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""
@@ -30,8 +31,6 @@ HEADLINES = ("riddle2025", "riddle2025-muscles", "crawler", "crawler-timed", "cr
 """The gaits that have a headline by default."""
 PERTURBED: Mapping[Effort, int] = {"full": 8, "quick": 2}
 """How many runs with a friction of their own a headline has."""
-FRICTION_SPREAD = 0.01
-"""Largest relative change of the friction in a perturbed run."""
 
 Quantity = Literal["friction", "segments"]
 VALUES: Mapping[Quantity, Mapping[Effort, tuple[float, ...]]] = {
@@ -217,11 +216,7 @@ def variants(gait: str, effort: Effort) -> tuple[list[dict[str, Any]], dict[str,
     config = load_config(gait)
     if not isinstance(config.body, WormBody) or config.arena is None:
         raise ConfigError(f"{gait} is a planar worm: this study needs a 3D worm")
-    drawn = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, PERTURBED[effort])
-    perturbed = [
-        {"arena.friction": round(config.arena.friction * (1.0 + change), 6), "seed": seed}
-        for seed, change in enumerate(drawn.tolist(), start=1)
-    ]
+    perturbed = drawn_frictions(config.arena.friction, PERTURBED[effort])
     half = finer_steps(config)[0]
     if effort == "quick":
         return perturbed, {"half_step": half}

@@ -17,12 +17,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from rich.table import Table as TerminalTable
 
-from annelid.analysis import Track, passage_of, track_of
+from annelid.analysis import Track, mean_and_interval, passage_of, track_of
 from annelid.draw import canvas, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.tables import grouped, mean_and_interval, tabulated, terminal_table
+from annelid_studies.tables import grouped, tabulated, terminal_table
 
 CM = 100.0
 Ground = Literal["flat", "straight pipe", "bend"]

@@ -19,27 +19,26 @@ from rich.table import Table as TerminalTable
 from annelid.analysis import (
     Detection,
     DetectionScore,
+    Estimate,
     detect_slip,
+    mean_and_interval,
     precision_recall,
     score_detections,
     slip_cost,
 )
+from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
-from annelid.experiment import Case, Store
+from annelid.experiment import Case, Store, finer_steps
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import Estimate, mean_and_interval, terminal_table
-from annelid_studies.worms import Effort
+from annelid_studies.tables import terminal_table
+from annelid_studies.worms import Effort, drawn_frictions
 
 PRESET = "riddle2025-muscles"
 TUNED_AT = 0.7
 """Friction at which feedback and timed wave were tuned."""
 FRICTIONS: Mapping[Effort, tuple[float, ...]] = {"full": (0.3, 0.7, 1.0), "quick": (0.7, 1.0)}
-STEP_S = 0.01
-"""Physics step of the preset."""
 DRAWS: Mapping[Effort, int] = {"full": 4, "quick": 2}
-FRICTION_SPREAD = 0.01
-"""Largest relative change of the friction in a draw."""
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
 PLAIN, EXTENSION, PRESSURE, TIMED = "paper's network", "feedback, no pressure", "pressure feedback", "timed wave"
@@ -90,12 +89,10 @@ def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> l
     Raises:
         AnnelidError: A run cannot be made.
     """
-    step = 0.5 * STEP_S if half_step else STEP_S
-    spread = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, DRAWS[effort]).tolist()
+    steps = finer_steps(load_config(PRESET))[0] if half_step else {}
     cases = {
         (friction, controller): [
-            case(controller, round(friction * (1.0 + part), 6), seed=seed, **{"clock.physics_timestep_s": step})
-            for seed, part in enumerate(spread, start=1)
+            case(controller, friction, **steps, **drawn) for drawn in drawn_frictions(friction, DRAWS[effort])
         ]
         for friction in FRICTIONS[effort]
         for controller in CONTROLLERS

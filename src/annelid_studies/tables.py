@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple
-from math import nan
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 from rich.table import Table as TerminalTable
 
 from annelid.markdown import Table
@@ -17,10 +15,6 @@ from annelid.output import write_csv
 T = TypeVar("T")
 K = TypeVar("K")
 
-CONFIDENCE = 0.95
-Estimate = tuple[float, float, float]
-"""A mean and the ends of its 95 % interval."""
-
 
 def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
     """Groups things by what a function returns for them, in the order in which they come."""
@@ -28,17 +22,6 @@ def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
     for item in items:
         found.setdefault(key(item), []).append(item)
     return found
-
-
-def mean_and_interval(values: Sequence[float]) -> Estimate:
-    """Returns the mean of numbers and the ends of its 95 % interval by Student's t; NaN where there are too few."""
-    from scipy.stats import sem, t
-
-    if not values:
-        return nan, nan, nan
-    mean, n = float(np.mean(values)), len(values)
-    half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1) * sem(values)) if n > 1 else nan
-    return mean, mean - half, mean + half
 
 
 def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:

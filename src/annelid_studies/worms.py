@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
+import numpy as np
+
 from annelid.experiment import Case
 
 Effort = Literal["quick", "full"]
@@ -17,6 +19,9 @@ PAPERS_MESH = {"body.mesh.elements_per_side": 3, "body.formulation.solver_tolera
 
 RODS_STEP_S = 0.01
 """Step of the rods with rigid crossings in the examinations, s."""
+
+FRICTION_SPREAD = 0.01
+"""Largest relative change of the friction in a perturbed run."""
 
 HOLD_S, REST_S = 0.8, 0.4
 """In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
@@ -44,3 +49,12 @@ def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: flo
         {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
     ]
     return {"controller": {"kind": "program", "contractions": contractions}, "duration_s": contractions[-1]["stop_s"]}
+
+
+def drawn_frictions(friction: float, n: int) -> list[dict[str, Any]]:
+    """Returns the changes of n perturbed runs, each with its seed and a friction within `FRICTION_SPREAD` of one."""
+    drawn = np.random.default_rng(0).uniform(-FRICTION_SPREAD, FRICTION_SPREAD, n).tolist()
+    return [
+        {"arena.friction": round(friction * (1.0 + change), 6), "seed": seed}
+        for seed, change in enumerate(drawn, start=1)
+    ]

@@ -13,7 +13,6 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.tune import Judged
 from annelid_studies.crawling import (
-    FRICTION_SPREAD,
     PERTURBED,
     VALUES,
     Headline,
@@ -27,6 +26,7 @@ from annelid_studies.crawling import (
     write_headlines,
     write_readings,
 )
+from annelid_studies.worms import FRICTION_SPREAD
 
 MUSCLES, SERVOS = "riddle2025-muscles", "riddle2025"
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from annelid import load_config, open_run, simulate
-from annelid.analysis import passage_of, track_of
+from annelid.analysis import mean_and_interval, passage_of, track_of
 from annelid.body import WormBody
 from annelid.control.open_loop import TimedWave
 from annelid_studies.riddle2025 import (
@@ -22,7 +22,6 @@ from annelid_studies.riddle2025 import (
     comparison_picture,
     comparison_table,
     in_figure,
-    mean_and_interval,
     points,
     repeated,
     speed_of_line,

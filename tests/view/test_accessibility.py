@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from live_page import ARGUMENTS, CHROMIUM, open_show
+from live_page import CHROMIUM, open_show
 
 from annelid.config import load_config
 from annelid.draw import html_page
 
-pytest.importorskip("axe_playwright_python", reason="the script of axe-core is missing: pip install '.[dev]'")
+pytest.importorskip("axe_playwright_python", reason="the script of axe-core is missing: pip install '.[test]'")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here to open pages with")
 
 if TYPE_CHECKING:
@@ -21,16 +21,6 @@ if TYPE_CHECKING:
 
 SIZES = ((1280, "light"), (400, "dark"))
 PAGES = ("index.html", "gait.html", "explanation/equations.html", "live_view.html", "reference/api/control.html")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}-{size[1]}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from live_page import ARGUMENTS, CHROMIUM, open_show, pixels, screen_place, slider, wait_for
+from live_page import CHROMIUM, open_show, pixels, screen_place, slider, wait_for
 
 from annelid.config import load_config
 from annelid.simulation.loop import simulate
@@ -27,16 +27,6 @@ if TYPE_CHECKING:
 VIEW = {"width": 760, "height": 480}
 MOVED = 1.0
 """Mean change of a pixel's value beyond which something has moved."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield chromium
-        chromium.close()
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from matplotlib import colormaps
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from annelid.draw.figures.sweep import (
@@ -16,7 +17,6 @@ from annelid.draw.figures.sweep import (
     _label,
     _line,
     _map,
-    mean_interval,
     quantity,
     sweep_figure,
     worded,
@@ -105,10 +105,15 @@ def test_numbers_are_named_in_words_with_their_unit() -> None:
 
 
 def test_repeats_have_the_interval_of_students_t() -> None:
-    mean, half = mean_interval(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, np.nan], [5.0, np.nan, np.nan], [np.nan] * 3]))
-    np.testing.assert_allclose(mean, [2.0, 1.5, 5.0, np.nan])
-    # t(0.975) is 4.303 with two degrees of freedom and 12.706 with one.
-    np.testing.assert_allclose(half, [4.303 / np.sqrt(3.0), 12.706 * 0.5, np.nan, np.nan], rtol=1e-3)
+    coords = {"x": ("x", np.arange(3.0), {"units": "1"})}
+    values = np.array([[1.0, 2.0, 3.0], [1.0, 2.0, np.nan], [5.0, np.nan, np.nan]])
+    data = xr.Dataset({"slip_ratio": (("x", "repeat"), values, {"units": "1"})}, coords)
+    axes = Figure().subplots()
+    _line(axes, data, "x", "slip_ratio")
+    [bars] = [part for part in axes.collections if isinstance(part, LineCollection)]
+    heights = [float(np.diff(ends[:, 1])[0]) for ends in bars.get_segments() if np.isfinite(ends).all() and len(ends)]
+    # t(0.975) is 4.303 with two degrees of freedom and 12.706 with one; one run alone has no interval.
+    assert heights == pytest.approx([2 * 4.303 / np.sqrt(3.0), 12.706], rel=1e-3)
     axes = Figure().subplots()
     _line(axes, grid(["arena.friction"], True), "arena.friction", "slip_ratio")
     assert len(axes.containers) == 1

@@ -15,6 +15,7 @@ from annelid.lazy import lazy
 if TYPE_CHECKING:
     from annelid.analysis.detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
     from annelid.analysis.gait import SlipCost, slip_cost
+    from annelid.analysis.interval import CONFIDENCE, Estimate, mean_and_interval
     from annelid.analysis.paper import (
         PAPER_ELONGATION_M,
         PAPER_END_DIFFERENCE,
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from annelid.analysis.track import Track, forward_position, track_of, turn_of
 
 __all__ = [
+    "CONFIDENCE",
     "CONTRACTED",
     "DESIGN_INTERVAL_S",
     "PAPER_ELONGATION_M",
@@ -47,6 +49,7 @@ __all__ = [
     "Deformation",
     "Detection",
     "DetectionScore",
+    "Estimate",
     "Gait",
     "Passage",
     "RhythmScore",
@@ -63,6 +66,7 @@ __all__ = [
     "gait",
     "interior_deficit",
     "lengthening_score",
+    "mean_and_interval",
     "middle_deficit",
     "nearest_frame",
     "passage_of",

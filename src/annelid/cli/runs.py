@@ -33,11 +33,11 @@ def runs_command(
     annelid runs sweep --json
     annelid runs --clean runs/riddle2023-001 --yes
     """
-    from annelid.experiment.kept import kept_runs, remove
+    from annelid.experiment.kept import remove, runs_below
 
     if clean and as_json:
         raise typer.BadParameter("--json prints the list: it does not go with --clean")
-    found = list(kept_runs(folder)) if folder != Path("runs") or folder.is_dir() else []
+    found = list(runs_below(folder)) if folder != Path("runs") or folder.is_dir() else []
     if clean:
         # Paths to remove come from the list, never from what was typed.
         named = {path.resolve() for path in clean}

@@ -143,6 +143,9 @@ class NeuralController(SegmentController):
     A segment's activation is a function of its contraction minus its expansion neuron, U1 - U2:
     ``1 / (1 + exp(-slope (U1 - U2)))`` (Riddle et al. 2023, Eq. 2, whose printed exponent has the other sign), or
     ``0.5 + clip(U1 - U2, -R, R) / (2 R)`` (Riddle et al. 2022).
+
+    Attributes:
+        network: The network that is stepped.
     """
 
     _GATE = "inactivation gate h of the persistent sodium channel; NaN for neurons without one"
@@ -170,6 +173,7 @@ class NeuralController(SegmentController):
         """
         super().__init__(n_segments, n_muscles)
         self._timestep_s = control_timestep_s
+        self.network = network
         self._stepper = network.compile(1e3 * control_timestep_s, scheme)
         self._of_role = {role: slice(place, n_segments * len(roles), len(roles)) for place, role in enumerate(roles)}
         self._slope_per_mV = slope_per_mV

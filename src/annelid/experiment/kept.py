@@ -37,7 +37,7 @@ class Kept:
     """How the run ended; ``outcome only`` where a study kept the numbers, ``unreadable`` for a damaged file."""
 
 
-def kept_runs(root: Path) -> Iterator[Kept]:
+def runs_below(root: Path) -> Iterator[Kept]:
     """Yields the runs and kept outcomes in a folder and below it, in the order of their paths; follows no links."""
     if not root.is_dir():
         raise ConfigError(f"there is no folder {root}")
@@ -88,7 +88,7 @@ def _own_files(folder: Path, status: str) -> list[Path]:
 
 
 def remove(run: Kept) -> int:
-    """Removes the files of a run that `kept_runs` listed, and its folder if nothing else is in it.
+    """Removes the files of a run that `runs_below` listed, and its folder if nothing else is in it.
 
     Returns the number of files removed. Raises `RunFileError` where another process writes there, or a file stays.
     """

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from html import escape
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.config import RunConfig
 from annelid.nervous import Network
-from annelid.simulation.stepping import build_controller
 from annelid.simulation.worm import WormPlant
 
 FULL_MV = 20.0
@@ -22,9 +19,8 @@ BELOW, AT_REST, ABOVE = (0.48, 0.62, 0.95), (1.0, 1.0, 1.0), (0.96, 0.58, 0.25)
 
 def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
     """Returns the network of these neurons that the controller of a configuration steps, or None without one."""
-    with _compiled() as networks:
-        build_controller(config, WormPlant(config))
-    return next((network for network in networks if tuple(network.neurons) == tuple(neurons)), None)
+    network = getattr(config.controller.build(config, WormPlant(config)), "network", None)
+    return network if isinstance(network, Network) and list(network.neurons) == list(neurons) else None
 
 
 def network_html(network: Network) -> str:
@@ -45,20 +41,3 @@ def colors_html(potential_mV: ArrayLike) -> str:
     rule = ".annelid-n{0}{{fill:rgb({1} {2} {3})}}.annelid-n{0}+polygon{{fill:none}}"
     rules = (rule.format(number, *color) for number, color in enumerate(colors.tolist()))
     return f"<style>{''.join(rules)}</style>"
-
-
-@contextmanager
-def _compiled() -> Iterator[list[Network]]:
-    """Gives a list of all networks that are compiled meanwhile: a controller keeps only what it has compiled."""
-    networks: list[Network] = []
-    compile_network = Network.compile
-
-    def noted(network: Network, *arguments: Any, **options: Any) -> Any:
-        networks.append(network)
-        return compile_network(network, *arguments, **options)
-
-    Network.compile = noted  # type: ignore[method-assign]
-    try:
-        yield networks
-    finally:
-        Network.compile = compile_network  # type: ignore[method-assign]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from annelid.analysis.interval import CONFIDENCE, mean_and_interval
 from annelid.draw.canvas import canvas, mark_lost, plain, save_both, segment_colors
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 COLORS, SIGNED = "viridis", "RdBu"
 """Colours of numbers, and of such as lie on both sides of zero: white is zero, blue is positive, so forwards."""
-CONFIDENCE = 0.95
 _CELL_TEXT_IN = (0.36, 0.15)  # width and height of a number in a cell
 _PANEL_IN = (3.7, 2.6)
 _TITLE_LETTERS = 42
@@ -64,7 +64,8 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     y = values.transpose(data[field].dims[0], *others).values.reshape(len(x), -1)
     dot, line, *_ = segment_colors(4)
     order = np.argsort(x, kind="stable")
-    mean, half = mean_interval(y)
+    found = np.array([mean_and_interval(row[np.isfinite(row)].tolist()) for row in y])
+    mean, half = found[:, 0], found[:, 2] - found[:, 0]
     on_a_grid = data[field].dims == (field,)
     color = line if on_a_grid else dot
     if y.shape[1] > 1:
@@ -76,25 +77,6 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     mark_lost(axes, x[np.isnan(y).any(axis=1)], _FAILED, 0.03)
     _name_axis(axes, "x", data[field], ticks)
     axes.set_ylabel(quantity(values, 30))
-
-
-def mean_interval(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the mean of each row without its NaN, and half of its confidence interval (Student's t).
-
-    Args:
-        values: Repeats side by side, ``(n, n_repeats)``.
-    """
-    from scipy.stats import t
-
-    known = np.isfinite(values)
-    n = known.sum(axis=1)
-    inside = np.ma.masked_invalid(values)
-    mean = inside.mean(axis=1).filled(np.nan)
-    half = np.full(len(values), np.nan)
-    if (several := n > 1).any():
-        spread = inside[several].std(axis=1, ddof=1).filled(np.nan)
-        half[several] = t.ppf(0.5 + 0.5 * CONFIDENCE, n[several] - 1) * spread / np.sqrt(n[several])
-    return mean, half
 
 
 def quantity(values: xr.DataArray, letters: int = _TITLE_LETTERS) -> str:

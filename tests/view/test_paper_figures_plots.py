@@ -22,11 +22,11 @@ from annelid.nervous.drawing import (
     Words,
     abbreviations,
     effect_of,
-    key_shapes,
     labels_of,
     lay_out,
     network_shapes,
 )
+from annelid.nervous.key import key_shapes
 from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid_studies.riddle2023.figures import muscle_surface, planar_models, robot_lengths

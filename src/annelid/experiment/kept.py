@@ -87,16 +87,16 @@ def _own_files(folder: Path, status: str) -> list[Path]:
     return [path for path in files if path.is_file() and not path.is_symlink()]
 
 
-def remove(run: Kept) -> int:
+def remove(run: Kept) -> None:
     """Removes the files of a run that `runs_below` listed, and its folder if nothing else is in it.
 
-    Returns the number of files removed. Raises `RunFileError` where another process writes there, or a file stays.
+    Raises:
+        RunFileError: Another process writes there, the run is unreadable, or a file cannot be removed.
     """
     if not run.folder.is_dir() or run.folder.is_symlink():
         raise RunFileError(f"{run.folder} is not there any more")
     if run.status == UNREADABLE:
         raise RunFileError(f"{run.folder} is unreadable, so annelid may not have written it: remove it yourself")
-    removed = 0
     try:
         with ExitStack() as stack:
             # A study locks its own folder, above those of its runs.
@@ -106,11 +106,9 @@ def remove(run: Kept) -> int:
             stack.enter_context(locked(run.folder))
             for path in _own_files(run.folder, _kept(run.folder).status):
                 path.unlink()
-                removed += 1
     except OSError as error:
         raise RunFileError(f"cannot remove {error.filename}: {error.strerror}") from None
     # Where anything else is in it, such as a file of the user's, the folder stays.
     with suppress(OSError):
         if {entry.name for entry in run.folder.iterdir()} <= {LOCK_NAME}:
             run.folder.rmdir()
-    return removed

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from annelid.config import RunConfig
 from annelid.nervous import Network
+from annelid.nervous.drawing import meanings_of
 from annelid.simulation.worm import WormPlant
 
 FULL_MV = 20.0
@@ -25,10 +26,11 @@ def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
 
 def network_html(network: Network) -> str:
     """Returns the diagram of `annelid.nervous.Network.diagram`, with a class for every neuron."""
-    svg = network.diagram().svg
+    svg = network.diagram(details=False).svg
     for number, name in enumerate(network.neurons):
         svg = svg.replace(f'id="{escape(f"neuron-{name}")}"', f'class="annelid-n{number}"', 1)
-    key = f"blue {FULL_MV:g} mV below rest, white at rest, orange {FULL_MV:g} mV above"
+    colors = f"blue {FULL_MV:g} mV below rest, white at rest, orange {FULL_MV:g} mV above"
+    key = escape("; ".join([colors, *meanings_of(network)]))
     return f'<div class="annelid-network">{svg}<p style="font-size:0.8em;margin:0.3em 0.6em">{key}</p></div>'
 
 

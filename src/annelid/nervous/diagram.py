@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from annelid.errors import ConfigError
-from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, key_shapes, network_shapes, strength_of
+from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
+from annelid.nervous.key import key_shapes
 from annelid.nervous.neurons import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
 from annelid.text import printable
 
@@ -65,16 +66,21 @@ class Diagram:
         return target
 
 
-def draw_diagram(network: Network) -> Diagram:
+def draw_diagram(network: Network, *, details: bool = True) -> Diagram:
     """Draws a network.
 
     Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
     rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim. A key
     below the network says so, and what abbreviated names stand for. `annelid.draw.network_figure` draws the same as
     PNG, PDF or SVG.
+
+    Args:
+        network: The network.
+        details: Whether the picture has the key, and strengths where there are few connections.
     """
-    shapes = network_shapes(network, strengths=len(network.connections) <= _MOST_LABELLED)
-    shapes += key_shapes(network, shapes, _PX / 96.0)
+    shapes = network_shapes(network, strengths=details and len(network.connections) <= _MOST_LABELLED)
+    if details:
+        shapes += key_shapes(network, shapes, _PX / 96.0)
     return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network.name, shapes))
 
 

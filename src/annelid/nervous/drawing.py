@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -42,8 +42,6 @@ COLORS: dict[Effect, str] = {
 _TRIANGLE, _DOT = 0.17, 0.065
 PAPER_SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
 """The paper's symbols of the four neurons of a segment, by the role in a neuron's name."""
-_MEANINGS_A_ROW = 4
-_ROW, _KEY_COLUMNS, _KEY_UNIT_IN = 0.62, (0.56, 6.22, 11.33), 0.45  # the key's rows and columns, in its own unit
 _LONGEST_NAME = 9  # letters of a name that can be read in a neuron
 _ROUND = 48
 """Corners of what looks round."""
@@ -458,59 +456,7 @@ def labels_of(network: Network) -> dict[str, str]:
     return {n: n if len(n) <= _LONGEST_NAME else n.replace(role_of(n), written[role_of(n)], 1) for n in network.neurons}
 
 
-def _key(network: Network) -> list[str]:
-    """What the key has to explain: only what the network has."""
-    effects = {effect_of(network, link) for link in network.connections}
-    neurons = network.neurons.values()
-    key = ["neuron"] * any(not neuron.channels and neuron.firing is None for neuron in neurons)
-    key += ["neuron with gated channels"] * any(neuron.channels for neuron in neurons)
-    key += ["spiking neuron"] * any(neuron.firing is not None for neuron in neurons)
-    key += [what if "gap" in what else f"{what} synapse" for what in COLORS if what in effects]
-    return key + ["input current"] * bool(network.inputs) + ["output: potential read"] * bool(network.outputs)
-
-
-def key_shapes(network: Network, above: Iterable[Shape], unit_in: float) -> list[Shape]:
-    """Draws a key below other shapes: an example of each symbol beside its name, and what labels stand for.
-
-    Args:
-        network: The network.
-        above: The shapes that it explains.
-        unit_in: Length of a unit, inches.
-    """
+def meanings_of(network: Network) -> list[str]:
+    """Returns what labels stand for, ``"U1: contraction"``, of those that are not the names themselves."""
     labels = {role_of(name): label for name, label in labels_of(network).items() if label != name}
-    meanings = [f"{label}: {role}" for role, label in labels.items() if label != role]
-    shapes, height = _key_shapes(_key(network), meanings)
-    left, _, bottom, _ = frame_of(above, unit_in)
-    scale = _KEY_UNIT_IN / unit_in
-    origin = complex(left, bottom - scale * height)
-    return [
-        replace(s, points=origin + scale * s.points)
-        if isinstance(s, Line)
-        else replace(s, place=origin + scale * s.place)
-        for s in shapes
-    ]
-
-
-def _key_shapes(entries: Sequence[str], meanings: Sequence[str]) -> tuple[list[Shape], float]:
-    """Draws examples and rows of meanings in a unit of the key's own; returns the height, too."""
-    starts = range(0, len(meanings), _MEANINGS_A_ROW)
-    rows = [",  ".join(meanings[start : start + _MEANINGS_A_ROW]) for start in starts]
-    n_rows = -(-len(entries) // len(_KEY_COLUMNS))
-    height = _ROW * (n_rows + len(rows)) + 0.2
-    shapes: list[Shape] = []
-    for index, entry in enumerate(entries):
-        x, y = _KEY_COLUMNS[index // n_rows], height - _ROW * (index % n_rows + 0.5)
-        path = np.linspace(complex(x, y), complex(x + 0.93, y), 121)
-        what = entry.removesuffix(" synapse")
-        if what in COLORS:
-            shapes += connection_shapes(path, what)
-        elif "neuron" in entry:
-            shapes += neuron_shapes(path.mean(), "", spiking="spiking" in entry, gated="gated" in entry)
-        else:
-            shapes += arrow_shapes(path[0], path[-1])
-            rim = path[-1 if entry.startswith("input") else 0]
-            shapes.append(Line(rim + np.array([-0.15j, 0.15j]), "black"))
-        shapes.append(Words(entry, complex(x + 1.22, y), 9.0, "left"))
-    for row, meaning in enumerate(reversed(rows)):
-        shapes.append(Words(meaning, complex(_KEY_COLUMNS[0], 0.45 + _ROW * row), 9.0, "left"))
-    return shapes, height
+    return [f"{label}: {role}" for role, label in labels.items() if label != role]

@@ -164,9 +164,13 @@ class Network:
         total += np.abs(arrays.weights[arrays.drive["rectified"], len(arrays.neurons) :]).sum(axis=0)
         return float(np.min(2.0 * arrays.capacitance_nF / np.maximum(total, np.finfo(float).tiny)))
 
-    def diagram(self) -> Diagram:
-        """Returns the network drawn: ``.graphviz`` (source text), ``.svg``, and ``.save(path)`` for either."""
-        return draw_diagram(self)
+    def diagram(self, *, details: bool = True) -> Diagram:
+        """Returns the network drawn: ``.graphviz`` (source text), ``.svg``, and ``.save(path)`` for either.
+
+        Args:
+            details: Whether the picture has a key, and strengths where there are few connections.
+        """
+        return draw_diagram(self, details=details)
 
     def table(self) -> str:
         """Returns neurons, connections, inputs and outputs as Markdown tables."""

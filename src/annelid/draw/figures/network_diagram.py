@@ -10,7 +10,8 @@ import numpy as np
 
 from annelid.draw.canvas import WIDTH_IN, canvas, plain, save
 from annelid.nervous import Network
-from annelid.nervous.drawing import Shape, Words, frame_of, key_shapes, network_shapes
+from annelid.nervous.drawing import Shape, Words, frame_of, network_shapes
+from annelid.nervous.key import key_shapes
 from annelid.output import with_suffix
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _CM = 100.0
 _DASH_PT = 5.0  # of a published level, in line widths
-_SAME = 0.035  # levels nearer than this share of the panel's height are named together
+_SAME = 0.05  # levels nearer than this share of the panel's height are named together
 _MOST_NAMED, _NAMES_A_ROW = 16, 8  # segments in the legend: of more, as many from the first to the last
 _THICK, _THIN = 1.8, 0.8
 PLOT_SUFFIXES = (".png", ".pdf", ".svg")

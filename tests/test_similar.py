@@ -52,7 +52,9 @@ def test_similar_worms_move_alike(tmp_path: Path) -> None:
         run = simulate(config.model_copy(update={"duration_s": duration_s}), tmp_path / f"{radius_m}", progress=False)
         numbers = summary(run)
         assert numbers.period_s is not None
-        found.append([numbers.period_s / sqrt(radius_m), *(one / radius_m for one in numbers.elongation_mean_max_m)])
+        found.append(
+            [numbers.period_s / sqrt(radius_m), *(np.array(numbers.elongation_mean_max_m, dtype=float) / radius_m)]
+        )
     assert found[0] == pytest.approx(found[1], rel=0.01)
 
 

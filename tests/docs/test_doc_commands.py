@@ -36,6 +36,7 @@ QUICK = {
     ("annelid", "show"): (),
     ("annelid", "runs"): (),
     ("annelid", "check"): (),
+    ("annelid", "new"): ("--force",),
     ("annelid", "build"): ("--force",),
     ("annelid", "presets"): (),
     ("annelid", "arenas"): (),

@@ -14,7 +14,7 @@ from annelid.cli.studies import (
     sweep_command,
     tune_command,
 )
-from annelid.cli.worm import arenas, build, check, doctor, presets
+from annelid.cli.worm import arenas, build, check, doctor, new, presets
 from annelid.registry import load_extensions, load_home
 
 __all__ = ["app", "main"]
@@ -22,6 +22,7 @@ __all__ = ["app", "main"]
 # In the order in which the help lists them.
 for _name, _command in (
     ("run", run_command),
+    ("new", new),
     ("check", check),
     ("build", build),
     ("runs", runs_command),

@@ -21,7 +21,40 @@ from annelid.cli.common import (
     overrides_of,
     refuse_existing,
 )
-from annelid.cli.entry import EXIT_USAGE
+from annelid.cli.entry import EXIT_USAGE, complain
+
+
+def new(
+    path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The file to write.")],
+    radius: Annotated[float, typer.Option(help="Radius of the tube at rest, m.")] = 0.16,
+    segments: Annotated[int, typer.Option(help="Segments, from 3 on.")] = 3,
+    helices: Annotated[int, typer.Option(help="Strands, half of each handedness; even, from 6 on.")] = 12,
+    length: Annotated[
+        float | None, typer.Option(help="Length at rest, m.  [default: so that rhombi have the paper's shape]")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write a worm of your own size, every coupled number with its rule.
+
+    Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as the paper's
+    robot of rods does. Replace what you can measure. A geometry that cannot work is refused here.
+
+    \b
+    annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4
+    annelid run mine.toml
+    """
+    from annelid.config import load_config
+    from annelid.experiment.similar import worm_text
+    from annelid.output import write_text
+    from annelid.plausibility import refuse_nonsense
+
+    if path.suffix != ".toml":
+        raise typer.BadParameter(f"{path} must end in .toml")
+    refuse_existing(path, force, "another name")
+    written = write_text(path, worm_text(radius, segments, helices, length))
+    for doubt in refuse_nonsense(load_config(written)):
+        complain(f"warning: {doubt}")
+    typer.echo(written)
 
 
 def check(

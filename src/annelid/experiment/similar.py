@@ -1,0 +1,200 @@
+"""A worm of another size that moves as a known one does: every coupled number by Froude similarity.
+
+Lengths grow with the radius and times with its square root, so that gravity stays what it is. The material is stiffer
+in proportion to the side of a rhombus, which keeps the mesh's stiffness over its weight, and forces grow with the
+weight. With the known worm's shape and numbers of segments and strands the whole motion is the known one's, enlarged;
+with others it is close to it.
+"""
+
+from __future__ import annotations
+
+from math import ceil, log, pi, sqrt
+from typing import Any
+
+from annelid.body.assemble import build_spec, compile_spec
+from annelid.body.estimates import bearable_force_N, rhombus_of
+from annelid.body.worm import Mesh, WormBody
+from annelid.config import RunConfig, check_section, load_config, toml_value
+from annelid.errors import ConfigError
+from annelid.morphology import rhombus
+from annelid.plausibility import tolerance_window_m
+
+BASE = "riddle2023-rods"
+"""The preset that new worms are similar to."""
+LARGEST_ANGLE_RAD = pi / 6
+"""Largest angle by which a strand may turn in one element."""
+LEAST_SHAPE, MOST_SHAPE = 1.2, 4.0
+"""Turn of a strand along one radius of the axis, rad, within which meshes are known to walk; the base's is 2.24."""
+CYCLES = 4
+"""Cycles of the paper's network, 0.875 s a segment at the base's size, that a run lasts."""
+TURN_S = 0.875
+
+CLOCK = "steps of the clock, times: radius^0.5"
+
+Fields = dict[str, tuple[Any, str]]
+"""Values by dotted path, each with the rule that it follows."""
+
+
+def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, length_m: float | None = None) -> Fields:
+    """Returns the fields in which a worm differs from `BASE`.
+
+    Args:
+        radius_m: Radius at rest.
+        n_segments: Segments.
+        n_helices: Strands, half of each handedness.
+        length_m: Length at rest; by default that at which rhombi have the shape of the base's.
+
+    Raises:
+        ConfigError: A number is out of its range, or with this length strands would lie along the body or the rings.
+    """
+    asked: Fields = {
+        "body.mesh.n_segments": (n_segments, "as asked"),
+        "body.mesh.n_helices": (n_helices, "as asked"),
+        "body.mesh.radius_m": (radius_m, "as asked"),
+    }
+    base = load_config(BASE)
+    known, arena = base.body, base.arena
+    assert isinstance(known, WormBody)
+    # Checked before anything is computed from them.
+    check_section(
+        Mesh, known.mesh.model_dump() | {path.rpartition(".")[2]: value for path, (value, _) in asked.items()}
+    )
+    assert arena is not None
+    scale = radius_m / known.mesh.radius_m
+    slower = sqrt(scale)
+    planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m)
+    turn = pi / (n_helices // 2)
+    elements = max(known.mesh.elements_per_side, ceil(turn / LARGEST_ANGLE_RAD - 1e-9))
+    shape, own = rhombus_of(known), rhombus(n_helices, radius_m, rate, elements)
+    # Of a rhombus of strands as thick as the side asks for, the weight goes with side^3 and the force that bends them
+    # with E side^2: a modulus in proportion to the side keeps their ratio.
+    longer = own.side_m / shape.side_m
+    strands, pins, springs, rings = known.strands, known.pins, known.springs, known.rings
+    ranges = [length * own.ring_length_m / shape.ring_length_m for length in rings.length_ranges(1)[0]]
+    impedance = [*arena.contact_impedance[:2], arena.contact_impedance[2] * scale]
+    young_Pa, shear_Pa = strands.young_modulus_Pa * longer, strands.shear_modulus_Pa * longer
+    of_length = "the length asked for" if length_m else "rhombi of the base's shape"
+    fields: Fields = asked | {
+        "body.mesh.angular_rate_rad_per_m": (rate, of_length),
+        "body.mesh.elements_per_side": (elements, "a strand turns by 30 degrees in an element at most"),
+        "body.mesh.planes_between_rings": (planes, "rhombi close to the base's shape"),
+        "body.mesh.free_planes_at_ends": (planes - 1, "one less than between rings"),
+        "body.mesh.rear_overhang_m": (turn / rate / 2.0, "half the distance of two planes"),
+        "body.strands.radius_m": (strands.radius_m * longer, "in proportion to the side of a rhombus"),
+        "body.strands.young_modulus_Pa": (young_Pa, "side of a rhombus: as stiff for its weight as the base"),
+        "body.strands.shear_modulus_Pa": (shear_Pa, "the base's ratio to Young's modulus"),
+        "body.strands.linear_density_kg_per_m": (strands.linear_density_kg_per_m * longer**2, "the base's density"),
+        "body.strands.damping_time_s": ((strands.material_damping_s or 0.0) * slower, "a time: radius^0.5"),
+        "body.pins.mass_kg": (pins.mass_kg * longer**3, "the base's share of the weight"),
+        "body.pins.radius_m": (pins.radius_m * scale, "a length"),
+        "body.springs.stiffness_N_per_m": (
+            springs.stiffness_N_per_m * longer**2,
+            "strands' bending stiffness over side^3",
+        ),
+        "body.rings.length_range_m": (ranges, "the base's share of the ring at rest"),
+        "body.rings.maximum_velocity": (
+            rings.model_dump()["maximum_velocity"] / slower,
+            "lengths a second: radius^-0.5",
+        ),
+        "body.formulation.edge_time_constant_s": (
+            known.formulation.model_dump()["edge_time_constant_s"] * slower,
+            "a time",
+        ),
+        "arena.contact_time_constant_s": (arena.contact_time_constant_s * slower, "a time"),
+        "arena.contact_impedance": (impedance, "the last is a length"),
+        "arena.floor_gap_m": (arena.model_dump()["floor_gap_m"] * scale, "a length"),
+    }
+    weight = longer**3 * n_helices / known.mesh.n_helices * n_segments / known.mesh.n_segments
+    fields |= _times(base, n_segments, slower) | {
+        "guard.kinetic_energy_J": (base.guard.kinetic_energy_J * weight * scale, "weight times length"),
+        "guard.height_m": (base.guard.height_m * scale, "a length"),
+        "guard.depth_m": (base.guard.depth_m * scale, "a length"),
+    }
+    # What follows from the whole mesh. The window was measured at the base's damping, which a similar worm's is.
+    similar = load_config(BASE, _values(fields) | {"body.strands.damping_time_s": strands.material_damping_s})
+    body = similar.body
+    window = tolerance_window_m(similar)
+    assert isinstance(body, WormBody)
+    assert window is not None
+    force = rings.forces(1)[0] * bearable_force_N(body) / bearable_force_N(known)
+    low, high = window
+    if low >= high:
+        raise ConfigError(f"n_helices = {n_helices}: neighbours lift a segment further than it lengthens; take more")
+    fields["body.rings.peak_force_N"] = (force, "the base's share of what the mesh bears")
+    fields["sensor.tolerance_m"] = ((low + high) / 2.0, f"middle of the window {1e3 * low:.2g} to {1e3 * high:.2g} mm")
+    return {path: (value if rule == CLOCK else _rounded(value), rule) for path, (value, rule) in fields.items()}
+
+
+def worm_text(radius_m: float, n_segments: int = 3, n_helices: int = 12, length_m: float | None = None) -> str:
+    """Returns `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
+
+    Raises:
+        ConfigError: As `similar_worm`, or the engine refuses the body.
+    """
+    fields = similar_worm(radius_m, n_segments, n_helices, length_m)
+    compile_spec(build_spec(load_config(BASE, _values(fields))))
+    tables: dict[str, list[str]] = {"": []}
+    for path, (value, rule) in fields.items():
+        table, _, name = path.rpartition(".")
+        tables.setdefault(table, []).append(f"{f'{name} = {toml_value(value)}':<40}  # {rule}")
+    heading = [
+        f"# A worm of radius {radius_m:g} m, {n_segments} segments and {n_helices} strands that moves as {BASE} does.",
+        "# Numbers follow from the geometry by Froude similarity; the rule stands beside each. Replace what you can",
+        "# measure on your robot. annelid check compares the numbers with one another.",
+        f'extends = "{BASE}"',
+    ]
+    parts = ["\n".join(([f"[{name}]"] if name else heading) + lines) for name, lines in tables.items()]
+    return "\n\n".join(parts) + "\n"
+
+
+def _times(base: RunConfig, n_segments: int, slower: float) -> Fields:
+    """The network's, the clock's and the records' times."""
+    network, control_s = base.controller.model_dump(), float(f"{base.clock.control_timestep_s * slower:.2g}")
+    steps = round(base.clock.physics_timestep_s / base.clock.control_timestep_s)
+    physics_s, rule = steps * control_s, "a time constant: radius^0.5"
+    n_steps = ceil(CYCLES * n_segments * TURN_S * slower / physics_s)
+    times: Fields = {
+        "controller.capacitance_nF": (network["capacitance_nF"] * slower, rule),
+        "controller.gate_time_constant_ms": (network["gate_time_constant_ms"] * slower, rule),
+        "sensor.startup_hold_s": (base.sensor.startup_hold_s * slower, "a time: radius^0.5"),
+    }
+    whole = {
+        "duration_s": n_steps * physics_s,
+        "clock.control_timestep_s": control_s,
+        "clock.physics_timestep_s": physics_s,
+        "record.signals_interval_s": physics_s,
+        "record.frames_interval_s": 2 * physics_s,
+    }
+    return times | {path: (round(value, 9), CLOCK) for path, value in whole.items()}
+
+
+def _planes_and_rate(
+    known: WormBody, radius_m: float, n_segments: int, n_helices: int, length_m: float | None
+) -> tuple[int, float]:
+    """Planes between rings, and turn of a strand along the axis, rad/m, that give a length."""
+    mesh = known.mesh
+    shape, half = mesh.angular_rate_rad_per_m * mesh.radius_m, n_helices // 2
+    if length_m is None:
+        return mesh.planes_between_rings, shape / radius_m
+
+    def rate(planes: int) -> float:
+        return pi / half * (2 * (planes - 1) + (n_segments - 1) * planes + 1) / length_m
+
+    planes = min((4, 6, 8), key=lambda one: abs(log(rate(one) * radius_m / shape)))
+    if not LEAST_SHAPE <= (turn := rate(planes) * radius_m) <= MOST_SHAPE:
+        most, least = (length_m * turn / bound for bound in (LEAST_SHAPE, MOST_SHAPE))
+        raise ConfigError(
+            f"length_m = {length_m:g} does not fit {n_segments} segments of radius {radius_m:g} m: "
+            f"with {planes} planes between rings it must be between {least:.2g} and {most:.2g} m"
+        )
+    return planes, rate(planes)
+
+
+def _values(fields: Fields) -> dict[str, Any]:
+    return {path: value for path, (value, _) in fields.items()}
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_rounded(one) for one in value]
+    return float(f"{value:.5g}") if isinstance(value, float) else value

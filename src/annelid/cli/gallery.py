@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 QUICK_MINUTES = 3.0
 """Pictures that take longer are made only if they are named, or with --all."""
-TILE_PX, TILE_COLUMNS, TILE_DPI = (560, 350), 4, 180.0
+TILE_PX, TILE_COLUMNS = (560, 350), 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Picture:
     results: str = ""
     time_s: float = 0.0
     camera: str | None = None
-    from_above: Sequence[str] = ()
+    cameras: Mapping[str, str] = field(default_factory=dict)
     study: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -98,7 +98,7 @@ def gallery_command(
     if as_list or as_json:
         print_list(as_json)
         return
-    makers, known = _makers(), pictures()
+    made_by, known = makers(), pictures()
     for name in names or []:
         if name not in known:
             raise ConfigError(f"there is no picture {name!r}: {suggest(name, known)}")
@@ -112,7 +112,7 @@ def gallery_command(
         store.compute([case for name in chosen for case in cases(known[name]).values()], "gallery")
         for name in chosen:
             one = known[name]
-            drawn = makers[one.maker](Job(one, kept / Path(name).stem, results / one.results, store))
+            drawn = made_by[one.maker](Job(one, kept / Path(name).stem, results / one.results, store))
             typer.echo(shutil.copyfile(drawn, output / name))
 
 
@@ -181,6 +181,7 @@ def _arenas(job: Job) -> Path:
     from annelid.analysis.rhombi import nearest_time
     from annelid.draw.canvas import WIDTH_IN, canvas, save
     from annelid.draw.overlay import legend_handle
+    from annelid.draw.render import DEFAULT_CAMERA
     from annelid.draw.scene import WormScene
 
     found = cases(job.picture)
@@ -192,17 +193,16 @@ def _arenas(job: Job) -> Path:
             axes.axis("off")
         entries = []
         for axes, (name, case) in zip(panels, found.items(), strict=False):
-            run, camera = job.store.run(case), "top" if name in job.picture.from_above else "isometric"
+            run, camera = job.store.run(case), job.picture.cameras.get(name, DEFAULT_CAMERA)
             with WormScene(run, width, height, camera, fine=True, words=False) as scene:
                 axes.imshow(scene.picture(nearest_time(run, scene.times_s, job.picture.time_s)))
                 entries = scene.legend
             axes.set_title(name, fontsize=8.0, pad=2.0)
-        # The last row has room.
+        # The first place that is left.
         handles = [legend_handle(*entry) for entry in entries]
-        panels[-1].legend(
-            handles=handles, loc="center", fontsize=8.0, title=f"{job.picture.time_s:g} s after the start"
-        )
-        return save(figure, job.stem.with_suffix(".png"), dpi=TILE_DPI)
+        title = f"{job.picture.time_s:g} s after the start"
+        panels[len(found)].legend(handles=handles, loc="center left", fontsize=8.0, title=title, alignment="left")
+        return save(figure, job.stem.with_suffix(".png"))
 
 
 def _sweep(job: Job) -> Path:
@@ -298,7 +298,7 @@ def _uncertainty(job: Job) -> Path:
     return uncertainty_figure([elongation, panel("period (s)", "period_s", 1.0)], job.stem.with_suffix(".png"))
 
 
-def _makers() -> Mapping[str, Callable[[Job], Path]]:
+def makers() -> Mapping[str, Callable[[Job], Path]]:
     """All that an entry of the list can ask for."""
     from annelid_studies import riddle2025
     from annelid_studies.challenge import ranking, report

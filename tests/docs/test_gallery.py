@@ -14,7 +14,7 @@ from test_doc_commands import check_annelid, check_program
 from typer.testing import CliRunner
 
 from annelid.cli import app
-from annelid.cli.gallery import makers, cases, pictures
+from annelid.cli.gallery import cases, makers, pictures
 from fill_tables import MARKED
 
 GALLERY = "docs/gallery.md"

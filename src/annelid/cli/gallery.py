@@ -142,19 +142,14 @@ def cases(picture: Picture) -> Mapping[str, Case]:
     from annelid.config import arena_names
     from annelid.experiment import Case
 
-    command: Any = get_command(app)
-    words = shlex.split(picture.command)[2:]
-    given = (
-        command.commands["run"]
-        .make_context("run", words, parent=command.make_context("annelid", [], resilient_parsing=True))
-        .params
-    )
+    program: Any = get_command(app)
+    above = program.make_context("annelid", [], resilient_parsing=True)
+    given = program.commands["run"].make_context("run", shlex.split(picture.command)[2:], parent=above).params
+    changes = overrides_of(given["assignments"], duration_s=given["duration"], seed=given["seed"])
     return {
         arena: Case(
             given["preset"],
-            base=config_of(
-                given["preset"], overrides_of(given["assignments"], duration_s=given["duration"]), arena=arena
-            ),
+            base=config_of(given["preset"], dict(changes), given["segments"], given["fidelity"], arena),
         )
         for arena in (arena_names() if picture.maker == "arenas" else [given["arena"]])
     }
@@ -215,7 +210,7 @@ def _sweep(job: Job) -> Path:
 
 def _command(job: Job) -> Path:
     words = [*shlex.split(job.picture.command)[1:], "--quiet", "-o", str(job.stem)]
-    done = subprocess.run([sys.executable, "-m", "annelid", *words], check=False)
+    done = subprocess.run([sys.executable, "-m", "annelid", *words], stdout=subprocess.DEVNULL, check=False)
     if done.returncode:
         raise RunKilled(f"{job.picture.command}: ended with exit code {done.returncode}")
     return job.stem / f"{job.stem.name}.png"

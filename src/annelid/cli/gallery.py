@@ -18,13 +18,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from annelid.cli.common import Jobs, Quiet, config_of, kept_runs, overrides_of, refuse_existing
+from annelid.cli.common import Jobs, Quiet, config_of, kept_runs, overrides_of
 from annelid.cli.entry import app
 from annelid.errors import ConfigError, RunKilled, suggest
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from annelid.experiment import Case, Store
-    from annelid.simulation import Run
 
 QUICK_MINUTES = 3.0
 """Pictures that take longer are made only if they are named, or with --all."""
@@ -44,11 +45,6 @@ class Picture:
     camera: str | None = None
     cameras: Mapping[str, str] = field(default_factory=dict)
     study: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def is_quick(self) -> bool:
-        """Whether it is made where no picture is named."""
-        return self.maker != "by-hand" and self.minutes <= QUICK_MINUTES
 
 
 class Job(NamedTuple):
@@ -95,8 +91,13 @@ def gallery_command(
     annelid gallery slip.png arenas.png
     annelid gallery -o drafts
     """
-    if as_list or as_json:
-        print_list(as_json)
+    if as_json:
+        typer.echo(json.dumps({name: asdict(one) for name, one in pictures().items()}, indent=2))
+        return
+    if as_list:
+        from annelid.terminal import Console
+
+        Console().print(_listing())
         return
     made_by, known = makers(), pictures()
     for name in names or []:
@@ -104,10 +105,10 @@ def gallery_command(
             raise ConfigError(f"there is no picture {name!r}: {suggest(name, known)}")
         if known[name].maker == "by-hand":
             raise ConfigError(f"{name} is not remade by this command, but with: {known[name].command}")
-    chosen = names or [name for name, one in known.items() if one.is_quick or (every and one.maker != "by-hand")]
+    chosen = names or [
+        name for name, one in known.items() if one.maker != "by-hand" and (every or one.minutes <= QUICK_MINUTES)
+    ]
     output.mkdir(parents=True, exist_ok=True)
-    for name in chosen:
-        refuse_existing(output / name, force=True)
     with kept_runs(kept, jobs=jobs, cluster=None, quiet=quiet) as store:
         store.compute([case for name in chosen for case in cases(known[name]).values()], "gallery")
         for name in chosen:
@@ -116,21 +117,15 @@ def gallery_command(
             typer.echo(shutil.copyfile(drawn, output / name))
 
 
-def print_list(as_json: bool) -> None:
-    """Prints the list as a table or as JSON."""
-    if as_json:
-        typer.echo(json.dumps({name: asdict(one) for name, one in pictures().items()}, indent=2))
-        return
+def _listing() -> Table:
     from rich.table import Table
-
-    from annelid.terminal import Console
 
     table = Table("picture", "minutes", "made from", "command", box=None)
     table.columns[0].no_wrap = True
     for name, one in pictures().items():
         source = one.results or {"by-hand": "by hand", "command": "the command"}.get(one.maker, "runs")
         table.add_row(name, f"{one.minutes:g}", source, one.command)
-    Console().print(table)
+    return table
 
 
 def cases(picture: Picture) -> Mapping[str, Case]:
@@ -145,31 +140,22 @@ def cases(picture: Picture) -> Mapping[str, Case]:
     program: Any = get_command(app)
     above = program.make_context("annelid", [], resilient_parsing=True)
     given = program.commands["run"].make_context("run", shlex.split(picture.command)[2:], parent=above).params
+    preset, segments, fidelity = given["preset"], given["segments"], given["fidelity"]
     changes = overrides_of(given["assignments"], duration_s=given["duration"], seed=given["seed"])
-    return {
-        arena: Case(
-            given["preset"],
-            base=config_of(given["preset"], dict(changes), given["segments"], given["fidelity"], arena),
-        )
-        for arena in (arena_names() if picture.maker == "arenas" else [given["arena"]])
-    }
+    arenas = arena_names() if picture.maker == "arenas" else [given["arena"]]
+    return {one: Case(preset, base=config_of(preset, dict(changes), segments, fidelity, one)) for one in arenas}
 
 
-def _run(job: Job) -> Run:
-    (case,) = cases(job.picture).values()
-    return job.store.run(case)
-
-
-def _frame(job: Job) -> Path:
+def _of_run(job: Job) -> Path:
+    from annelid.draw import RUN_FIGURES
     from annelid.draw.render import render_frame
 
-    return render_frame(_run(job), job.picture.time_s, job.stem.with_suffix(".png"), camera=job.picture.camera)
-
-
-def _figure(job: Job) -> Path:
-    from annelid.draw import RUN_FIGURES
-
-    return RUN_FIGURES.find(job.picture.maker)(_run(job), job.stem.with_suffix(".png"))
+    one, path = job.picture, job.stem.with_suffix(".png")
+    (case,) = cases(one).values()
+    run = job.store.run(case)
+    if one.maker == "frame":
+        return render_frame(run, one.time_s, path, camera=one.camera)
+    return RUN_FIGURES.find(one.maker)(run, path)
 
 
 def _arenas(job: Job) -> Path:
@@ -179,24 +165,21 @@ def _arenas(job: Job) -> Path:
     from annelid.draw.render import DEFAULT_CAMERA
     from annelid.draw.scene import WormScene
 
-    found = cases(job.picture)
+    found, time_s, handles = cases(job.picture), job.picture.time_s, []
     width, height = TILE_PX
     rows = -(-(len(found) + 1) // TILE_COLUMNS)
     with canvas(rows * (WIDTH_IN / TILE_COLUMNS * height / width + 0.2)) as figure:
         panels = figure.subplots(rows, TILE_COLUMNS, squeeze=False).ravel()
         for axes in panels:
             axes.axis("off")
-        entries = []
         for axes, (name, case) in zip(panels, found.items(), strict=False):
             run, camera = job.store.run(case), job.picture.cameras.get(name, DEFAULT_CAMERA)
             with WormScene(run, width, height, camera, fine=True, words=False) as scene:
-                axes.imshow(scene.picture(nearest_time(run, scene.times_s, job.picture.time_s)))
-                entries = scene.legend
+                axes.imshow(scene.picture(nearest_time(run, scene.times_s, time_s)))
+                handles = [legend_handle(*entry) for entry in scene.legend]
             axes.set_title(name, fontsize=8.0, pad=2.0)
-        # The first place that is left.
-        handles = [legend_handle(*entry) for entry in entries]
-        title = f"{job.picture.time_s:g} s after the start"
-        panels[len(found)].legend(handles=handles, loc="center left", fontsize=8.0, title=title, alignment="left")
+        look: dict[str, Any] = {"loc": "center left", "alignment": "left", "fontsize": 8.0}
+        panels[len(found)].legend(handles=handles, title=f"{time_s:g} s after the start", **look)
         return save(figure, job.stem.with_suffix(".png"))
 
 
@@ -216,43 +199,28 @@ def _command(job: Job) -> Path:
     return job.stem / f"{job.stem.name}.png"
 
 
-def _table(path: Path) -> list[dict[str, str]]:
-    """Reads the rows of a result file."""
+def _rows(job: Job) -> list[dict[str, str]]:
     from annelid.textfiles import read_text
 
-    return list(csv.DictReader(read_text(path).splitlines()))
+    return list(csv.DictReader(read_text(job.results).splitlines()))
 
 
-def _number(cell: str) -> float:
-    return float(cell or nan)
-
-
-def _fields(draw: Callable[[Any, Path], Path], kind: type[Any], job: Job) -> Path:
+def _fields(draw: Callable[[Any, Path], Path], kind: Any, job: Job) -> Path:
     """Draws rows of which every column is a field; an empty cell is NaN where it is no text."""
     from pydantic import TypeAdapter
 
-    texts = {name for name, of in kind.__annotations__.items() if of == "str"}
-    rows = [{name: cell or ("" if name in texts else nan) for name, cell in row.items()} for row in _table(job.results)]
-    return draw(TypeAdapter(list[kind]).validate_python(rows), job.stem)
+    empty = {name: "" if of == "str" else nan for name, of in kind.__annotations__.items()}
+    rows = [{name: cell or empty[name] for name, cell in row.items()} for row in _rows(job)]
+    return draw([TypeAdapter(kind).validate_python(row) for row in rows], job.stem)
 
 
 def _slip(job: Job) -> Path:
     from annelid_studies import slip
 
-    ends = ("", "_low", "_high")
-    readings = [
-        slip.Reading(
-            float(row["friction"]),
-            row["controller"],
-            int(row["in_order"]),
-            int(row["draws"]),
-            *(
-                (_number(row[name]), *(_number(row[name + end]) for end in ends[1:]))
-                for name in slip.Reading._fields[4:]
-            ),
-        )
-        for row in _table(job.results)
-    ]
+    readings = []
+    for friction, controller, in_order, draws, *numbers in (row.values() for row in _rows(job)):
+        estimates: Any = zip(*[map(float, numbers)] * 3, strict=True)
+        readings.append(slip.Reading(float(friction), controller, int(in_order), int(draws), *estimates))
     return slip.feedback_figure(readings, job.stem)
 
 
@@ -267,28 +235,22 @@ def _tuning(job: Job) -> Path:
     from annelid.draw.figures.experiments import Mark, progress_figure
     from annelid.experiment.tune import START
 
-    marks = [
-        Mark(
-            START if row["trial"] == "start" else int(row["trial"]),
-            (_number(row["speed_m_per_s"]),),
-            not row["problem"],
-        )
-        for row in _table(job.results)
-    ]
+    numbers = [START if row["trial"] == "start" else int(row["trial"]) for row in _rows(job)]
+    rows = zip(numbers, _rows(job), strict=True)
+    marks = [Mark(number, (float(row["speed_m_per_s"] or nan),), not row["problem"]) for number, row in rows]
     return progress_figure(marks, "speed (m/s)", True, job.stem)
 
 
 def _uncertainty(job: Job) -> Path:
     from annelid.draw.figures.experiments import Panel, uncertainty_figure
 
-    kinds = ("parameters", "time_step", "elements")
-
     def panel(title: str, start: str, scale: float) -> Panel:
-        own = [row for row in _table(job.results) if row["quantity"].startswith(start)]
-        errors = {kind.replace("_", " "): [scale * _number(row[kind]) for row in own] for kind in kinds}
+        own = [row for row in _rows(job) if row["quantity"].startswith(start)]
+        numbers = {kind: [scale * float(row[kind] or nan) for row in own] for kind in ("value", *kinds)}
         ticks = [row["quantity"].partition(".")[2] for row in own]
-        return Panel(title, ticks, [scale * float(row["value"]) for row in own], errors)
+        return Panel(title, ticks, numbers["value"], {name: numbers[kind] for kind, name in kinds.items()})
 
+    kinds = {"parameters": "parameters", "time_step": "time step", "elements": "elements"}
     elongation = panel("elongation of each segment, mean of its sensors (cm)", "elongation_mean_max_m.", 100.0)
     return uncertainty_figure([elongation, panel("period (s)", "period_s", 1.0)], job.stem.with_suffix(".png"))
 
@@ -299,9 +261,7 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
     from annelid_studies.challenge import ranking, report
 
     return {
-        "frame": _frame,
-        "figure7": _figure,
-        "track": _figure,
+        **dict.fromkeys(("frame", "figure7", "track"), _of_run),
         "arenas": _arenas,
         "sweep": _sweep,
         "command": _command,

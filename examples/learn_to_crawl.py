@@ -49,8 +49,9 @@ def main(folder: Path, generations: int = 25, **worm: object) -> tuple[float, fl
     print(f"return of the start {start:.2f}, learned {learned:.2f}, with {np.round(search.mean, 3).tolist()}")
     with canvas(3.0) as figure:
         axes = figure.subplots(subplot_kw={"xlabel": "generation", "ylabel": "return"})
-        axes.plot(curve, "o", color="0.7", markersize=3)
-        axes.plot(np.mean(curve, axis=1))
+        dots = axes.plot(curve, "o", color="0.7", markersize=3)
+        mean = axes.plot(np.mean(curve, axis=1))
+        axes.legend([dots[0], mean[0]], ["one worm", "mean of a generation"], loc="lower right")
         save(figure, folder / "learning_curve.png")
     return start, learned
 

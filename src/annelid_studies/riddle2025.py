@@ -248,12 +248,13 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
             bends.text(least - 0.02, height, f"they draw {gait}", transform=line, ha="right", va="center", fontsize=6.0)
         flat.set_xlabel("friction of the ground")
         bends.set_xlabel("radius of the centre line (m)")
-        flat.set_ylim(bottom=0.0)
+        # Room for the legend.
+        flat.set_ylim(0.0, 1.25 * flat.get_ylim()[1])
         bends.set_ylim(0.0, 1.3 * CM * AXIS_M_PER_S[1])
         bends.set_xlim(0.1, 1.4)
         for axes in (flat, bends):
             if axes.get_legend_handles_labels()[0]:
-                axes.legend(loc="best" if axes is flat else "lower right")
+                axes.legend(loc="upper right" if axes is flat else "lower right")
         return save_both(figure, stem)
 
 

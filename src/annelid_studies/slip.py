@@ -216,7 +216,9 @@ def detector_figure(detections: Mapping[str, Detection], stem: Path) -> Path:
     together = score_detections(list(detections.values()), LIMIT_M_PER_S)
     with canvas(3.6) as figure:
         axes = figure.subplots()
-        curves = {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}
+        found = {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}
+        # Where nothing is reported there is no precision.
+        curves = {name: (recall[known := np.isfinite(of)], of[known]) for name, (recall, of) in found.items()}
         draw_lines(axes, curves, markers=False, linewidth=1.1)
         chosen: dict[str, Any] = {"marker": "o", "markersize": 7, "color": "black", "linestyle": "none"}
         axes.plot(together.recall, together.precision, label="all runs, as it is set", **chosen)

@@ -51,7 +51,12 @@ Step = Command | Script | Written
 
 def steps_of(page: str) -> list[Step]:
     """Returns what a page tells its reader to do, in order."""
-    tokens = MarkdownIt("commonmark").enable("table").parse(PAGES[page])
+    return steps_in(PAGES[page])
+
+
+def steps_in(text: str) -> list[Step]:
+    """Returns what a text tells its reader to do, in order."""
+    tokens = MarkdownIt("commonmark").enable("table").parse(text)
     return [step for token in tokens for step in _steps(token)]
 
 

@@ -1,6 +1,7 @@
 """The command line, a thin skin over the library. Heavy imports are inside the commands, so help is quick."""
 
 from annelid.cli.entry import Command, app, experiments, main
+from annelid.cli.gallery import gallery_command
 from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
 from annelid.cli.run import run_command
 from annelid.cli.runs import runs_command
@@ -40,6 +41,7 @@ for _name, _command in (
     ("sweep", sweep_command),
     ("tune", tune_command),
     ("calibrate", calibrate_command),
+    ("gallery", gallery_command),
     ("cite", cite),
     ("presets", presets),
     ("arenas", arenas),

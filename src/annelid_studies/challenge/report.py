@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple
+from itertools import cycle
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -114,10 +115,11 @@ def ranking_figure(found: Sequence[Standing], stem: Path) -> Path:
     overall = [one for one in found if one.task == ALL]
     with canvas(3.6) as figure:
         energy, robust = figure.subplots(1, 2, sharey=True)
-        for one, color in zip(overall, segment_colors(len(overall)), strict=True):
+        looks = zip(overall, segment_colors(len(overall)), cycle((-10, 3)), strict=False)
+        for one, color, above in looks:
             y = (one.ratio, one.ratio_low, one.ratio_high)
-            _point(energy, one.entrant, (one.electric_J_per_m, one.electric_low, one.electric_high), y, color)
-            _point(robust, one.entrant, (one.robust, one.robust_low, one.robust_high), y, color)
+            _point(energy, one.entrant, (one.electric_J_per_m, one.electric_low, one.electric_high), y, color, above)
+            _point(robust, one.entrant, (one.robust, one.robust_low, one.robust_high), y, color, above)
         panel_title(energy, "Speed against energy")
         energy.set(xlabel="electrical energy (J/m)", ylabel="speed over the reference's, mean of tasks", xscale="log")
         for show in (energy.xaxis.set_major_formatter, energy.xaxis.set_minor_formatter):
@@ -127,10 +129,12 @@ def ranking_figure(found: Sequence[Standing], stem: Path) -> Path:
         return save_both(figure, stem)
 
 
-def _point(axes: Any, name: str, x: tuple[float, ...], y: tuple[float, ...], color: Any) -> None:
+def _point(axes: Any, name: str, x: tuple[float, ...], y: tuple[float, ...], color: Any, above: float) -> None:
     """Draws a number with its interval in both directions and a name beside it; one that is infinite is left out."""
     if not isfinite(x[0]):
         return
     spans = [[[max(of[0] - of[1], 0.0)], [max(of[2] - of[0], 0.0)]] if np.isfinite(of).all() else None for of in (x, y)]
     axes.errorbar(x[0], y[0], xerr=spans[0], yerr=spans[1], fmt="o", color=color, markersize=4.0, linewidth=1.0)
-    axes.annotate(name, (x[0], y[0]), xytext=(4, 3), textcoords="offset points", fontsize=7.5, color=color)
+    # A share near 1 has no room to its right.
+    look: dict[str, Any] = {"xytext": (-4, above), "ha": "right"} if 0.7 < x[0] <= 1.0 else {"xytext": (4, above)}
+    axes.annotate(name, (x[0], y[0]), textcoords="offset points", fontsize=7.5, color="0.15", **look)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ N_OUTLINES = 6  # outlines drawn, the first and the last posture among them
 FIRST, LAST = "#9bb0c9", "#1b2a6b"
 FRONT = "#c2410c"
 WALL = "#bf784d"
+INK = "0.15"
 _EDGE_IN = 1.3  # room that labels take beside the plot, inches
 
 
@@ -64,7 +65,9 @@ def _draw_track(axes: Axes, track: Track) -> None:
         shade = shades(place / (N_OUTLINES - 1))
         axes.fill(*track.outline_m(sample).T, facecolor=(*shade[:3], 0.12), edgecolor=shade, linewidth=0.9)
         x, y = track.middle_m[sample]
-        axes.annotate(f"{track.time_s[sample]:.0f} s", (x, y), color=shade, fontsize=7, ha="center", va="center")
+        # Below the line that it would hide.
+        below: Any = {"xytext": (0, -4), "textcoords": "offset points", "ha": "center", "va": "top"}
+        axes.annotate(f"{track.time_s[sample]:.0f} s", (x, y), color=INK, fontsize=7, **below)
     axes.plot(*track.front_m.T, color=FRONT, linewidth=0.7, label="foremost ring")
     axes.plot(*track.middle_m.T, color=LAST, linewidth=1.6, label="middle of the body")
     axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")

@@ -1,0 +1,101 @@
+"""The list of `annelid gallery` is that of the pictures and of the pages that show them; the command remakes them."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import tomlkit
+from doc_commands import PAGES, ROOT, Command, steps_in
+from test_doc_commands import check_annelid, check_program
+from typer.testing import CliRunner
+
+from annelid.cli import app
+from annelid.cli.gallery import cases, makers, pictures
+from fill_tables import MARKED
+
+GALLERY = "docs/gallery.md"
+SHOWN = re.compile(r"!\[[^\]]*\]\((?:docs/)?images/([^)]+)\)")
+
+
+def words_of(command: str) -> Command:
+    return Command(tuple(shlex.split(command)))
+
+
+def test_the_list_has_every_picture_and_the_pages_that_show_it() -> None:
+    shown = {page: set(SHOWN.findall(text)) for page, text in PAGES.items()}
+    listed = {name: {page for page in shown if name in shown[page]} for name in pictures()}
+    assert {name: set(one.pages) for name, one in pictures().items()} == listed
+    assert {path.name for path in (ROOT / "docs" / "images").iterdir()} == set(pictures())
+    assert set().union(*shown.values()) == set(pictures())
+
+
+def test_the_gallery_shows_the_commands_of_the_list() -> None:
+    _, *parts = re.split(r"(?=^!\[)", PAGES[GALLERY], flags=re.MULTILINE)
+    for part in parts:
+        (name,) = SHOWN.findall(part)
+        first = next(step for step in steps_in(part) if isinstance(step, Command))
+        assert first == words_of(pictures()[name].command), f"{GALLERY}: the command of {name} differs from the list"
+
+
+@pytest.mark.parametrize("name", pictures())
+def test_a_picture_can_be_made_as_the_list_says(name: str) -> None:
+    one = pictures()[name]
+    command = words_of(one.command)
+    (check_annelid if command.words[0] == "annelid" else check_program)(command)
+    assert one.maker in {*makers(), "by-hand"}
+    if one.results:
+        assert (ROOT / "docs" / "results" / one.results).exists()
+    assert all(case.config.duration_s >= one.time_s for case in cases(one).values())
+
+
+def test_the_command_of_numbers_is_that_of_their_table() -> None:
+    made_by = {
+        file: [words_of(command) for command in found["command"].split("; ")]
+        for page in PAGES.values()
+        for found in MARKED.finditer(page)
+        for file in found["files"].split(", ")
+    }
+    for name, one in pictures().items():
+        for command in made_by.get(f"results/{one.results}", []):
+            assert command.words[: len(words_of(one.command).words)] == words_of(one.command).words, name
+
+
+def test_the_sweep_is_that_of_its_page() -> None:
+    page = PAGES["docs/sweeps.md"]
+    block = page[page.index('    preset = "riddle2025-muscles"') : page.index("## What is varied")]
+    assert tomlkit.parse(re.sub(r"^    ", "", block, flags=re.MULTILINE)).unwrap() == pictures()["sweep.png"].study
+
+
+def test_pictures_of_numbers_are_redrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    names = [name for name, one in pictures().items() if one.results]
+    done = CliRunner().invoke(app, ["gallery", *names, "-q", "-o", f"{tmp_path}/made", "--kept", f"{tmp_path}/kept"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout.split() == [f"{tmp_path}/made/{name}" for name in names]
+    assert {path.read_bytes()[1:4] for path in (tmp_path / "made").iterdir()} == {b"PNG"}
+
+
+def test_a_worm_is_drawn_once_its_run_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    short = {"command": "annelid run riddle2022-planar --duration 0.2", "minutes": 0.1, "pages": []}
+    listed = {"walk.png": short | {"maker": "frame", "time_s": 0.1}, "figure7.png": short | {"maker": "figure7"}}
+    known = {name: type(pictures()["worm.png"])(**one) for name, one in listed.items()}
+    monkeypatch.setattr("annelid.cli.gallery.pictures", lambda: known)
+    for _ in range(2):
+        done = CliRunner().invoke(app, ["gallery", "-q", "-o", f"{tmp_path}/made", "--kept", f"{tmp_path}/kept"])
+        assert done.exit_code == 0, done.output
+    assert {path.name for path in (tmp_path / "made").iterdir()} == set(known)
+    assert len(list((tmp_path / "kept" / "runs").glob("run-*"))) == 1
+
+
+def test_the_list_is_printed_and_unknown_names_are_refused() -> None:
+    listed = json.loads(CliRunner().invoke(app, ["gallery", "--json"]).stdout)
+    assert listed["slip.png"]["results"] == "slip.csv"
+    assert "slip.csv" in CliRunner().invoke(app, ["gallery", "--list"]).stdout
+    for name, sentence in (("slip", "slip.png"), ("live_view.png", "annelid view")):
+        refused = CliRunner().invoke(app, ["gallery", name])
+        assert refused.exit_code == 2
+        assert sentence in refused.output

@@ -1,6 +1,7 @@
 """The command line, a thin skin over the library. Heavy imports are inside the commands, so help is quick."""
 
 from annelid.cli.entry import Command, app, experiments, main
+from annelid.cli.result import with_json
 from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
 from annelid.cli.run import run_command
 from annelid.cli.runs import runs_command
@@ -18,6 +19,9 @@ from annelid.cli.worm import arenas, build, check, doctor, presets
 from annelid.registry import load_extensions, load_home
 
 __all__ = ["app", "main"]
+
+_NO_JSON = {"view", "cite"}
+"""A view goes on until it is closed; BibTeX is a format for programs already."""
 
 # In the order in which the help lists them.
 for _name, _command in (
@@ -44,7 +48,7 @@ for _name, _command in (
     ("arenas", arenas),
     ("doctor", doctor),
 ):
-    app.command(_name, cls=Command)(_command)
+    app.command(_name, cls=Command)(_command if _name in _NO_JSON else with_json(_command))
 app.add_typer(experiments, name="experiment")
 load_home("annelid.cli.experiment")
 load_extensions()

@@ -296,7 +296,10 @@ def load_frame_command(
     loop = frame.cable_force(tension, cable_friction)
     loops = {config.name: loop, "measured": measured}
     written = frame.write_loop(loop, tension, table), frame.draw_loops(loops, table.with_suffix(""))
-    print_results(written, frame.frame_table(loops), quiet=quiet)
+    found = {
+        name: {"peak_N": loop.force_N.max().item(), "lost_share": loop.lost_share()} for name, loop in loops.items()
+    }
+    print_results(written, frame.frame_table(loops), quiet=quiet, results={"loops": found})
 
 
 @study("weak-middle")

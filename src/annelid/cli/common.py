@@ -35,7 +35,11 @@ Preset = Annotated[
 NamedPreset = Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
 Assignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Set any field by its dotted path; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="FIELD=VALUE",
+        help="Set any field by its dotted path, in the unit at the end of its name; may be repeated.",
+    ),
 ]
 Segments = Annotated[int | None, typer.Option("--segments", help="Number of segments, at least 3.")]
 FidelityLevel = Annotated[

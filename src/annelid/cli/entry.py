@@ -199,7 +199,7 @@ def _start(
     annelid doctor                     is everything in place?
 
     Exit codes: 0 done, 2 refused, 3 stopped by a guard, 4 runs failed, 5 all runs failed, 130 interrupted, 1 anything
-    unexpected.
+    unexpected. With --json, a command prints its result as one JSON document.
     """
 
 

@@ -264,10 +264,14 @@ def load_frame_command(
     speed: Annotated[float, typer.Option(help="Speed of the cable, mm/s.")] = 10.0,
     cable_friction: Annotated[
         float,
-        typer.Option(min=0.0, max=20.0, help="Friction of the cable: coefficient times its wrap angle, rad."),
+        typer.Option(
+            min=0.0,
+            max=20.0,
+            help="Friction of the cable, a number without unit: coefficient times its wrap angle in rad.",
+        ),
     ] = 0.0,
     data: Annotated[
-        Path | None, typer.Option(help="Measured loop to compare with.  [default: the one of annelid]")
+        Path | None, typer.Option(help="Measured loop to compare with: CSV of mm, N.  [default: the one of annelid]")
     ] = None,
     quiet: Quiet = False,
     force: Force = False,

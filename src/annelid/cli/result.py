@@ -45,6 +45,8 @@ def with_json(command: Callable[..., None]) -> Callable[..., None]:
         try:
             with redirect_stdout(sys.stderr):
                 command(*words, **options)
+            if not documents:
+                give_files(())
         finally:
             _documents.reset(mark)
             for document in documents:
@@ -82,11 +84,11 @@ def give_files(paths: Iterable[Path], results: Mapping[str, Any] | None = None) 
         return False
     document = documents[0] if documents else {"files": [], "results": {}}
     document.setdefault("files", []).extend(paths)
-    document.setdefault("results", {}).update(results or {})
+    if results:
+        document["results"].update(results)
     document["versions"] = {name: version(name) for name in ("annelid", "mujoco-core", "numpy")}
     document["versions"]["python"] = platform.python_version()
-    give(document)
-    return True
+    return give(document)
 
 
 def records(paths: Sequence[Path]) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def run_command(
         list[str] | None,
         typer.Option(
             metavar="PARAMETER=ERROR",
-            help="Relative error of a parameter, for example floor_friction=0.2; 0 leaves it out; may be repeated.",
+            help="Relative error of a parameter: floor_friction=0.2 is 20 %; 0 leaves it out; may be repeated.",
         ),
     ] = None,
     jobs: Annotated[

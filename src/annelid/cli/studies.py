@@ -380,7 +380,7 @@ def tune_command(
         list[str] | None,
         typer.Option(
             metavar="FIELD=RANGE",
-            help="A field as LOW:HIGH, LOW:HIGH:log or VALUE,VALUE,..; may be repeated."
+            help="A field as LOW:HIGH, LOW:HIGH:log or VALUE,VALUE,.., in its own unit; may be repeated."
             "  [default: timing and sensors of the preset's controller]",
         ),
     ] = None,
@@ -389,14 +389,14 @@ def tune_command(
         float | None, typer.Option(help="Simulated time of each run, s.  [default: the preset's]")
     ] = None,
     trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Runs that the search may take.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of the optimiser.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the optimiser.")] = 0,
     numerics: Annotated[
         float | None,
         typer.Option(
             min=0.0,
             metavar="SHARE",
-            help="Largest share of the muscles' work that the integrator may take or add; more is no gait."
-            "  [default: any]",
+            help="Largest share of the muscles' work, 0.1 for 10 %, that the integrator may take or add; more is no"
+            " gait.  [default: any]",
         ),
     ] = None,
     jobs: Jobs = None,
@@ -434,9 +434,11 @@ def tune_command(
         for generation in tune.search(task, store):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)
-    print_results(written, tune.results_table(task, found), quiet=quiet)
+    best = tune.leader(found, objectives)
+    best_run = {"best_run": None if best is None else best.path.name}
+    print_results(written, tune.results_table(task, found), quiet=quiet, results=best_run)
     end_study(len(found), sum(trial.failed for trial in found), output / tune.HISTORY)
-    if tune.leader(found, objectives) is None:
+    if best is None:
         complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / tune.HISTORY}")
         raise typer.Exit(EXIT_ALL_FAILED)
 
@@ -449,7 +451,9 @@ def calibrate_command(
         list[str] | None,
         typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: the first three]"),
     ] = None,
-    data: Annotated[Path | None, typer.Option(help="Measured loop to fit.  [default: the one of annelid]")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Measured loop to fit: CSV of mm, N.  [default: the one of annelid]")
+    ] = None,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:

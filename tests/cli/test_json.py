@@ -202,7 +202,7 @@ def test_a_command_prints_its_result_as_json_and_nothing_else(
     done = DONE[name](annelid, finished, monkeypatch)
     assert done.exit_code == (entry.EXIT_ALL_FAILED if name == "tune" else 0), done.err
     document = strict(done.out)
-    assert isinstance(document, list if name in LISTS else dict)
+    assert isinstance(document, list) == (name in LISTS)
     if name in STUDIES:
         assert all(rows == [{**ROWS[0], "drift": None}] for rows in document["results"].values())
     if name not in {*LISTS, "show"}:

@@ -20,12 +20,8 @@ from typing import Annotated, Any
 import typer
 
 _HELP = "Print the result as one JSON document, and nothing else on stdout; docs/data_out.md lists its keys."
-_OPTION = inspect.Parameter(
-    "as_json",
-    inspect.Parameter.KEYWORD_ONLY,
-    default=False,
-    annotation=Annotated[bool, typer.Option("--json", help=_HELP)],
-)
+_Json = Annotated[bool, typer.Option("--json", help=_HELP)]
+_OPTION = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_Json)
 _documents: ContextVar[list[Any] | None] = ContextVar("_documents", default=None)
 """What a command has given so far: one document or none yet; None without --json."""
 
@@ -53,8 +49,7 @@ def with_json(command: Callable[..., None]) -> Callable[..., None]:
                 typer.echo(json.dumps(_strict(document), indent=2, allow_nan=False))
 
     signature = inspect.signature(command, eval_str=True)
-    added = {_OPTION.name: _OPTION.annotation}
-    run.__annotations__ = command.__annotations__ | added
+    run.__annotations__ = command.__annotations__ | {"as_json": _Json}
     run.__signature__ = signature.replace(parameters=[*signature.parameters.values(), _OPTION])  # type: ignore[attr-defined]
     return run
 

@@ -25,7 +25,7 @@ _OPTION = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=F
 _documents: ContextVar[list[Any] | None] = ContextVar("_documents", default=None)
 """What a command has given so far: one document or none yet; None without --json."""
 
-# As Python writes numbers. A digest such as 12e4 has no sign behind its e, so it stays text.
+# As Python writes numbers. A digest or a name such as 12e4 or 007 is none, so it stays text.
 _NUMBER = re.compile(r"-?((0|[1-9]\d*)(\.\d+)?(e[+-]\d+)?|nan|inf)|")
 
 
@@ -101,16 +101,15 @@ def records(paths: Sequence[Path]) -> dict[str, Any]:
 def _rows(path: Path) -> list[dict[str, Any]]:
     with path.open(newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
-    columns = map(_values, header, zip(*rows, strict=True))
+    columns = map(_values, zip(*rows, strict=True))
     return [dict(zip(header, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-def _values(name: str, cells: tuple[str, ...]) -> list[Any]:
+def _values(cells: tuple[str, ...]) -> list[Any]:
     """Reads a column: truths or numbers where all cells are, else texts; an empty cell is None."""
     if all(cell in ("", "True", "False") for cell in cells):
         return [cell == "True" if cell else None for cell in cells]
-    # The name of a run's folder is a text, whatever its digits.
-    if name != "run" and all(map(_NUMBER.fullmatch, cells)):
+    if all(map(_NUMBER.fullmatch, cells)):
         return [None if not cell else int(cell) if cell.lstrip("-").isdigit() else float(cell) for cell in cells]
     return [cell or None for cell in cells]
 

@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from annelid.cli.entry import main, study
+from annelid.cli.result import give_files
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store
 
@@ -28,8 +29,11 @@ def slippery(
     cases = {value: Case("riddle2023-fast", {"arena.friction": value, "duration_s": 1.0}) for value in (1.0, friction)}
     store = Store(output / "runs")
     store.compute(cases.values())
-    for value, case in cases.items():
-        typer.echo(f"friction {value:g}: {100 * store[case].summary.elongation_mean_max_m[0]:.2f} cm")
+    found = {value: store[case].summary.elongation_mean_max_m[0] for value, case in cases.items()}
+    for value, elongation_m in found.items():
+        typer.echo(f"friction {value:g}: {100 * elongation_m:.2f} cm")
+    # What `--json` prints as results; the lines above then go to stderr.
+    give_files((), {"elongation_m": found})
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ def test_a_worm_is_drawn_once_its_run_is_there(tmp_path: Path, monkeypatch: pyte
 
 
 def test_the_list_is_printed_and_unknown_names_are_refused() -> None:
-    listed = json.loads(CliRunner().invoke(app, ["gallery", "--json"]).stdout)
+    listed = json.loads(CliRunner().invoke(app, ["gallery", "--list", "--json"]).stdout)
     assert listed["slip.png"]["results"] == "slip.csv"
     assert "slip.csv" in CliRunner().invoke(app, ["gallery", "--list"]).stdout
     for name, sentence in (("slip", "slip.png"), ("live_view.png", "annelid view")):

@@ -2,6 +2,7 @@
 
 from annelid.cli.entry import Command, app, experiments, main
 from annelid.cli.gallery import gallery_command
+from annelid.cli.result import with_json
 from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
 from annelid.cli.run import run_command
 from annelid.cli.runs import runs_command
@@ -19,6 +20,9 @@ from annelid.cli.worm import arenas, build, check, doctor, new, presets
 from annelid.registry import load_extensions, load_home
 
 __all__ = ["app", "main"]
+
+_NO_JSON = {"view", "cite"}
+"""A view goes on until it is closed; BibTeX is a format for programs already."""
 
 # In the order in which the help lists them.
 for _name, _command in (
@@ -47,7 +51,7 @@ for _name, _command in (
     ("arenas", arenas),
     ("doctor", doctor),
 ):
-    app.command(_name, cls=Command)(_command)
+    app.command(_name, cls=Command)(_command if _name in _NO_JSON else with_json(_command))
 app.add_typer(experiments, name="experiment")
 load_home("annelid.cli.experiment")
 load_extensions()

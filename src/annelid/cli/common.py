@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock, typed_command
+from annelid.cli.result import give_files, records, wants_json
 from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
@@ -34,7 +35,11 @@ Preset = Annotated[
 NamedPreset = Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
 Assignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="Set any field by its dotted path; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="FIELD=VALUE",
+        help="Set any field by its dotted path, in the unit at the end of its name; may be repeated.",
+    ),
 ]
 Segments = Annotated[int | None, typer.Option("--segments", help="Number of segments, at least 3.")]
 FidelityLevel = Annotated[
@@ -153,22 +158,47 @@ def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
         raise RunFileError(f"{path} cannot be written: {written} does not allow it")
 
 
-def print_results(paths: Iterable[object], *tables: Table, quiet: bool) -> None:
-    """Prints the tables of a study unless it is to be quiet, and the paths of its files."""
+def print_results(paths: Iterable[Path], *tables: Table, quiet: bool, results: Mapping[str, Any] | None = None) -> None:
+    """Prints the tables of a study unless it is to be quiet, and the paths of its files.
+
+    With --json these are the paths and what the files hold, and further results by name.
+    """
     from annelid.terminal import Console
 
-    for table in () if quiet else tables:
-        Console().print(table)
-    for path in paths:
-        typer.echo(path)
+    written = list(paths)
+    if wants_json():
+        give_files((), {**records(written), **(results or {})})
+    else:
+        for table in () if quiet else tables:
+            Console().print(table)
+    print_paths(written)
 
 
-def print_table(run: Run) -> None:
-    """Prints the numbers of a run, those to compare with beside them, and what follows."""
+def print_paths(paths: Iterable[Path]) -> None:
+    """Prints the paths of files that were written, a line each, or in the document of --json."""
+    written = list(paths)
+    if not give_files(written):
+        for path in written:
+            typer.echo(path)
+
+
+def numbers_of(run: Run) -> dict[str, Any]:
+    """Returns all numbers of a run, as --json prints them."""
+    from annelid.analysis import gait, summary
+
+    return summary(run).to_dict() | {"gait": gait(run).to_dict()}
+
+
+def print_run(run: Run, *, quiet: bool = False) -> None:
+    """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows."""
     from annelid.analysis import gait, summary
     from annelid.draw.table import closing_sentence, summary_table
     from annelid.terminal import Console
 
+    if wants_json():
+        give_files([run.path], {run.path.name: numbers_of(run)})
+    if quiet or wants_json():
+        return
     numbers = summary(run)
     Console().print(summary_table(numbers, run.config, gait(run)))
     for doubt in run.warnings:

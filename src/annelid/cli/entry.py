@@ -18,6 +18,7 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from annelid.cli.result import with_json
 from annelid.errors import AnnelidError, RunKilled, SimulationStopped
 from annelid.text import write_printable_only
 
@@ -125,8 +126,11 @@ experiments = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm
 
 
 def study(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that makes a function the command `annelid experiment NAME`, its parameters as Typer's."""
-    return experiments.command(name, cls=Command)
+    """Returns a decorator that makes a function the command `annelid experiment NAME`, its parameters as Typer's.
+
+    The command has the option ``--json`` beside them.
+    """
+    return lambda command: experiments.command(name, cls=Command)(with_json(command))
 
 
 app = typer.Typer(
@@ -195,7 +199,7 @@ def _start(
     annelid doctor                     is everything in place?
 
     Exit codes: 0 done, 2 refused, 3 stopped by a guard, 4 runs failed, 5 all runs failed, 130 interrupted, 1 anything
-    unexpected.
+    unexpected. With --json, a command prints its result as one JSON document.
     """
 
 

@@ -264,10 +264,14 @@ def load_frame_command(
     speed: Annotated[float, typer.Option(help="Speed of the cable, mm/s.")] = 10.0,
     cable_friction: Annotated[
         float,
-        typer.Option(min=0.0, max=20.0, help="Friction of the cable: coefficient times its wrap angle, rad."),
+        typer.Option(
+            min=0.0,
+            max=20.0,
+            help="Friction of the cable, a number without unit: coefficient times its wrap angle in rad.",
+        ),
     ] = 0.0,
     data: Annotated[
-        Path | None, typer.Option(help="Measured loop to compare with.  [default: the one of annelid]")
+        Path | None, typer.Option(help="Measured loop to compare with: CSV of mm, N.  [default: the one of annelid]")
     ] = None,
     quiet: Quiet = False,
     force: Force = False,
@@ -296,7 +300,10 @@ def load_frame_command(
     loop = frame.cable_force(tension, cable_friction)
     loops = {config.name: loop, "measured": measured}
     written = frame.write_loop(loop, tension, table), frame.draw_loops(loops, table.with_suffix(""))
-    print_results(written, frame.frame_table(loops), quiet=quiet)
+    found = {
+        name: {"peak_N": loop.force_N.max().item(), "lost_share": loop.lost_share()} for name, loop in loops.items()
+    }
+    print_results(written, frame.frame_table(loops), quiet=quiet, results={"loops": found})
 
 
 @study("weak-middle")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import shlex
 import shutil
 import subprocess
@@ -18,8 +17,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from annelid.cli.common import Jobs, Quiet, config_of, kept_runs, overrides_of
+from annelid.cli.common import Jobs, Quiet, config_of, kept_runs, overrides_of, print_paths
 from annelid.cli.entry import app
+from annelid.cli.result import give
 from annelid.errors import ConfigError, RunKilled, suggest
 
 if TYPE_CHECKING:
@@ -76,7 +76,6 @@ def gallery_command(
     kept: Annotated[Path, typer.Option(help="Folder in which runs are kept.")] = Path("build/gallery"),
     every: Annotated[bool, typer.Option("--all", help="Also the pictures that take long, up to hours.")] = False,
     as_list: Annotated[bool, typer.Option("--list", help="Only list the pictures.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
     jobs: Jobs = None,
     quiet: Quiet = False,
 ) -> None:
@@ -91,13 +90,11 @@ def gallery_command(
     annelid gallery slip.png arenas.png
     annelid gallery -o drafts
     """
-    if as_json:
-        typer.echo(json.dumps({name: asdict(one) for name, one in pictures().items()}, indent=2))
-        return
     if as_list:
         from annelid.terminal import Console
 
-        Console().print(_listing())
+        if not give({name: asdict(one) for name, one in pictures().items()}):
+            Console().print(_listing())
         return
     made_by, known = makers(), pictures()
     for name in names or []:
@@ -114,7 +111,7 @@ def gallery_command(
         for name in chosen:
             one = known[name]
             drawn = made_by[one.maker](Job(one, kept / Path(name).stem, results / one.results, store))
-            typer.echo(shutil.copyfile(drawn, output / name))
+            print_paths([shutil.copyfile(drawn, output / name)])
 
 
 def _listing() -> Table:

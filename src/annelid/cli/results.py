@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,11 +17,14 @@ from annelid.cli.common import (
     RunPath,
     Segments,
     config_of,
+    numbers_of,
     overrides_of,
-    print_table,
+    print_paths,
+    print_run,
     refuse_existing,
 )
 from annelid.cli.entry import complain, lock
+from annelid.cli.result import give, refuse_json, wants_json
 from annelid.errors import ConfigError, RunFileError, suggest
 
 if TYPE_CHECKING:
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
 
 def show(
     run: RunPath,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON, in SI units.")] = False,
     verify: Annotated[
         bool, typer.Option("--verify", help="Only say whether every byte of the file is as it was when the run ended.")
     ] = False,
@@ -49,20 +50,17 @@ def show(
     annelid show runs/riddle2023-001 --json | jq .period_s
     annelid show runs/riddle2023-001 --verify
     """
-    from annelid.analysis import gait, summary
     from annelid.simulation.runfile import open_run, verify_run
 
+    refuse_json(verify, "--verify")
     if verify:
-        if as_json:
-            raise typer.BadParameter("--verify prints one sentence: it does not go with --json")
         typer.echo(verify_run(run))
         return
     opened = open_run(run)
-    if as_json:
-        numbers = summary(opened).to_dict() | {"gait": gait(opened).to_dict()}
-        typer.echo(json.dumps(numbers, indent=2, allow_nan=False))
+    if wants_json():
+        give(numbers_of(opened))
         return
-    print_table(opened)
+    print_run(opened)
     if opened.message:
         typer.echo(opened.message)
 
@@ -82,7 +80,6 @@ def compare_command(
     from_s: Annotated[
         float, typer.Option("--from-time", help="With --map: time of the run before which nothing is compared, s.")
     ] = 0.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON, in SI units.")] = False,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Folder for the figures and comparison.json  [default: only print]"),
@@ -107,7 +104,7 @@ def compare_command(
     agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
     """
     if log_map is not None:
-        _compare_measured(runs, log_map, from_s, output, as_json=as_json, force=force)
+        _compare_measured(runs, log_map, from_s, output, force=force)
         return
     from annelid.analysis.comparison import compare
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
@@ -129,9 +126,7 @@ def compare_command(
             refuse_existing(output / name, force)
     opened = [open_run(run) for run in runs]
     comparison = compare(opened)
-    if as_json:
-        typer.echo(json.dumps(comparison.to_dict(), indent=2, allow_nan=False))
-    else:
+    if not give(comparison.to_dict()):
         Console().print(comparison_table(comparison))
         Console().print(fields_table(comparison) if comparison.fields else "the configurations are the same")
     if output is None:
@@ -142,13 +137,10 @@ def compare_command(
             written.append(draw(opened, comparison.labels, output / name))
         except RunFileError as error:
             complain(f"{name} not drawn: {error}")
-    for path in written:
-        typer.echo(path, err=as_json)
+    print_paths(written)
 
 
-def _compare_measured(
-    files: list[Path], log_map: Path, from_s: float, output: Path | None, *, as_json: bool, force: bool
-) -> None:
+def _compare_measured(files: list[Path], log_map: Path, from_s: float, output: Path | None, *, force: bool) -> None:
     from annelid.analysis.agreement import compare_with_log
     from annelid.analysis.measured import read_map, read_measured
     from annelid.draw.figures.comparison import agreement_figure
@@ -164,15 +156,13 @@ def _compare_measured(
         for name in ("agreement.json", "agreement.png"):
             refuse_existing(output / name, force)
     found = compare_with_log(open_run(files[0]), read_measured(files[1], read_map(log_map)), from_s=from_s)
-    if as_json:
-        typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
-    else:
+    if not give(found.to_dict()):
         Console().print(agreement_table(found))
     for note in found.notes:
         complain(f"note: {note}")
     if output is not None:
-        typer.echo(write_json(output / "agreement.json", found.to_dict()), err=as_json)
-        typer.echo(agreement_figure(found, output / "agreement"), err=as_json)
+        print_paths([write_json(output / "agreement.json", found.to_dict())])
+        print_paths([agreement_figure(found, output / "agreement")])
 
 
 def plot(
@@ -206,7 +196,7 @@ def plot(
     else:
         target = plot_path(output)
         refuse_existing(target, force)
-    typer.echo(draw(opened, target))
+    print_paths([draw(opened, target)])
 
 
 def render(
@@ -255,13 +245,13 @@ def render(
             refuse_existing(target, force)
     frame = opened.path.parent / "frame.png" if output is None else output
     if at is not None:
-        typer.echo(render_frame(opened, at, frame, camera=camera, background=background))
+        print_paths([render_frame(opened, at, frame, camera=camera, background=background)])
     if strip is not None:
-        typer.echo(render_strip(opened, strip, frames, camera=camera, background=background))
+        print_paths([render_strip(opened, strip, frames, camera=camera, background=background)])
     if video is not None:
         with task_bar(VIDEO_TASK) as progress:
             render_video(opened, video, fps=fps, speed=speed, camera=camera, background=background, progress=progress)
-        typer.echo(video)
+        print_paths([video])
 
 
 def view_command(
@@ -410,8 +400,7 @@ def export_command(
     part = selected(opened, Selection(names, every or 1, from_time, to_time))
     with task_bar(f"exporting to {kind.name}", quiet=quiet) as progress:
         written = kind.write(part, target, progress or (lambda done, total: None))
-    for path in written:
-        typer.echo(path)
+    print_paths(written)
 
 
 def cite(

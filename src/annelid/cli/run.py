@@ -21,10 +21,12 @@ from annelid.cli.common import (
     config_of,
     going_on,
     overrides_of,
+    print_paths,
     print_results,
-    print_table,
+    print_run,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
+from annelid.cli.result import wants_json
 from annelid.errors import ConfigError, SimulationStopped
 
 
@@ -64,7 +66,7 @@ def run_command(
         list[str] | None,
         typer.Option(
             metavar="PARAMETER=ERROR",
-            help="Relative error of a parameter, for example floor_friction=0.2; 0 leaves it out; may be repeated.",
+            help="Relative error of a parameter: floor_friction=0.2 is 20 %; 0 leaves it out; may be repeated.",
         ),
     ] = None,
     jobs: Annotated[
@@ -140,21 +142,19 @@ def run_command(
         if not (folder / FILE_NAME).exists():
             raise
         left = open_run(folder)
-        if not quiet:
-            print_table(left)
+        print_run(left, quiet=quiet)
         raise SimulationStopped(f"{stop}; what was computed is in {left.path}") from None
-    if not quiet:
-        print_table(done)
+    print_run(done, quiet=quiet)
     if done.status == "interrupted":
         complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
         raise typer.Exit(EXIT_INTERRUPTED)
-    typer.echo(done.path)
+    if not wants_json():
+        typer.echo(done.path)
     if result is not None:
         from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
 
         print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
-    for path in draw_all(done, folder, video=video, quiet=quiet, complain=complain):
-        typer.echo(path)
+    print_paths(draw_all(done, folder, video=video, quiet=quiet, complain=complain))
     if result is not None:
         stopped = sum(bool(run.message) for run in result.runs)
         end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)

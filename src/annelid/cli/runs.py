@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -10,6 +9,7 @@ from typing import Annotated
 import typer
 
 from annelid.cli.entry import complain
+from annelid.cli.result import give, refuse_json
 from annelid.errors import ConfigError, listed
 
 
@@ -20,7 +20,6 @@ def runs_command(
         typer.Option("--clean", metavar="RUN", help="Remove this run, a folder of the list; may be repeated."),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before --clean removes anything.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON: s, bytes, UTC.")] = False,
 ) -> None:
     """List the runs that are there, or remove some.
 
@@ -35,8 +34,7 @@ def runs_command(
     """
     from annelid.experiment.kept import remove, runs_below
 
-    if clean and as_json:
-        raise typer.BadParameter("--json prints the list: it does not go with --clean")
+    refuse_json(bool(clean), "--clean")
     found = list(runs_below(folder)) if folder != Path("runs") or folder.is_dir() else []
     if clean:
         # Paths to remove come from the list, never from what was typed.
@@ -54,8 +52,7 @@ def runs_command(
             if run.folder.exists():
                 complain(f"{run.folder} stays: it has other files")
         return
-    if as_json:
-        typer.echo(json.dumps([asdict(run) | {"folder": str(run.folder)} for run in found], indent=2))
+    if give([asdict(run) for run in found]):
         return
     from rich.table import Table
 

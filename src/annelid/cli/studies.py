@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, cast, get_args
 
@@ -26,10 +27,12 @@ from annelid.cli.common import (
     going_on,
     kept_runs,
     overrides_of,
+    print_paths,
     print_results,
     refuse_existing,
 )
 from annelid.cli.entry import EXIT_ALL_FAILED, complain, end_study, lock, typed_command
+from annelid.cli.result import give, refuse_json, wants_json
 from annelid.errors import RunFileError
 
 
@@ -50,9 +53,6 @@ def limit_cycle_command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the numbers and the phase response curves as JSON, in SI units.")
-    ] = False,
     force: Force = False,
 ) -> None:
     """Find a planar worm's limit cycle, and how stable it is.
@@ -84,13 +84,11 @@ def limit_cycle_command(
     config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
     wanted = cast(list["Time"], times or list(get_args(Time)))
     cycles = {time: limit_cycle(config, time=time, neuron=neuron, threshold_mV=threshold) for time in wanted}
-    if as_json:
-        typer.echo(json.dumps({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)))
-    else:
+    if not give({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)):
         Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
     if output is not None:
         named = {TIMES[time]: cycle for time, cycle in cycles.items()}
-        typer.echo(limit_cycle_figure(named, output), err=as_json)
+        print_paths([limit_cycle_figure(named, output)])
 
 
 def paper_command(
@@ -136,7 +134,10 @@ def paper_command(
     written = [html, html.with_suffix(".md")]
     if claims is not None:
         written.append(write_text(claims, claims_page(report)))
-    print_results(written, quiet=quiet)
+    numbers = [dict(zip(report.main_table.header, row, strict=True)) for row in report.main_table.rows]
+    examined = {each.examination.name: dict(each.findings.numbers) for each in report.examinations}
+    found = {"numbers": numbers, "claims": [asdict(claim) for claim in report.claims], "examinations": examined}
+    print_results(written, quiet=quiet, results=found)
 
 
 def bench_command(
@@ -228,7 +229,7 @@ def robustness_command(
             workers=store.workers,
             progress=store.progress,
         )
-    if not quiet:
+    if not (quiet or wants_json()):
         typer.echo(shares_table(shares(judged)))
     print_results((output / "robustness.json", output / "robustness.md"), quiet=quiet)
 
@@ -344,6 +345,7 @@ def sweep_command(
     annelid sweep study.toml --cluster study.toml
     annelid sweep study.toml --samples 512
     """
+    refuse_json(example, "--example")
     if example:
         from importlib.resources import files
 
@@ -378,7 +380,7 @@ def tune_command(
         list[str] | None,
         typer.Option(
             metavar="FIELD=RANGE",
-            help="A field as LOW:HIGH, LOW:HIGH:log or VALUE,VALUE,..; may be repeated."
+            help="A field as LOW:HIGH, LOW:HIGH:log or VALUE,VALUE,.., in its own unit; may be repeated."
             "  [default: timing and sensors of the preset's controller]",
         ),
     ] = None,
@@ -387,14 +389,14 @@ def tune_command(
         float | None, typer.Option(help="Simulated time of each run, s.  [default: the preset's]")
     ] = None,
     trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Runs that the search may take.")] = 100,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Of the optimiser.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the optimiser.")] = 0,
     numerics: Annotated[
         float | None,
         typer.Option(
             min=0.0,
             metavar="SHARE",
-            help="Largest share of the muscles' work that the integrator may take or add; more is no gait."
-            "  [default: any]",
+            help="Largest share of the muscles' work, 0.1 for 10 %, that the integrator may take or add; more is no"
+            " gait.  [default: any]",
         ),
     ] = None,
     jobs: Jobs = None,
@@ -432,9 +434,11 @@ def tune_command(
         for generation in tune.search(task, store):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)
-    print_results(written, tune.results_table(task, found), quiet=quiet)
+    best = tune.leader(found, objectives)
+    best_run = {"best_run": None if best is None else best.path.name}
+    print_results(written, tune.results_table(task, found), quiet=quiet, results=best_run)
     end_study(len(found), sum(trial.failed for trial in found), output / tune.HISTORY)
-    if tune.leader(found, objectives) is None:
+    if best is None:
         complain(f"no trial walked, nor does the gait it starts from: the reasons are in {output / tune.HISTORY}")
         raise typer.Exit(EXIT_ALL_FAILED)
 
@@ -447,7 +451,9 @@ def calibrate_command(
         list[str] | None,
         typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: the first three]"),
     ] = None,
-    data: Annotated[Path | None, typer.Option(help="Measured loop to fit.  [default: the one of annelid]")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Measured loop to fit: CSV of mm, N.  [default: the one of annelid]")
+    ] = None,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -19,9 +18,11 @@ from annelid.cli.common import (
     Segments,
     config_of,
     overrides_of,
+    print_paths,
     refuse_existing,
 )
 from annelid.cli.entry import EXIT_USAGE, complain
+from annelid.cli.result import give, refuse_json, wants_json
 
 
 def new(
@@ -54,7 +55,7 @@ def new(
     written = write_text(path, worm_text(radius, segments, helices, length))
     for doubt in refuse_nonsense(load_config(written)):
         complain(f"warning: {doubt}")
-    typer.echo(written)
+    print_paths([written])
 
 
 def check(
@@ -63,7 +64,6 @@ def check(
     segments: Segments = None,
     fidelity: FidelityLevel = None,
     arena: ArenaName = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
 ) -> None:
     """Compare the numbers of a 3D worm with one another, before anything is computed.
 
@@ -79,9 +79,7 @@ def check(
     from annelid.plausibility import check as findings_of
 
     found = findings_of(config_of(preset, overrides_of(assignments), segments, fidelity, arena))
-    if as_json:
-        typer.echo(json.dumps([asdict(finding) for finding in found], indent=2))
-    else:
+    if not give([asdict(finding) for finding in found]):
         typer.echo("\n".join(f"{finding.severity}: {finding}" for finding in found) or "nothing found")
     if any(finding.severity == "error" for finding in found):
         raise typer.Exit(EXIT_USAGE)
@@ -111,13 +109,12 @@ def build(
 
     refuse_existing(output, force)
     config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
-    typer.echo(write_text(output, mjcf_text(config)))
+    print_paths([write_text(output, mjcf_text(config))])
 
 
 def presets(
     name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
     """List the presets, or print one: every field with its source, and the preset that it is inherited from.
 
@@ -133,12 +130,12 @@ def presets(
     from annelid.draw.table import field_lines, presets_table
     from annelid.terminal import Console
 
-    if as_json:
-        _refuse_with_json(name is not None or fields)
+    refuse_json(name is not None or fields, "a name or --fields")
+    if wants_json():
         known = [load_config(each) for each in preset_names()]
         listing = [(c.name, c.summary, c.body.n_segments, c.duration_s) for c in known]
         keys = ("name", "summary", "n_segments", "duration_s")
-        typer.echo(json.dumps([dict(zip(keys, each, strict=True)) for each in listing], indent=2))
+        give([dict(zip(keys, each, strict=True)) for each in listing])
         return
     if name is not None and not fields:
         typer.echo(preset_text(name), nl=False)
@@ -151,7 +148,6 @@ def presets(
 
 def arenas(
     name: Annotated[str | None, typer.Argument(help="Print this arena's commented TOML.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
     """List the arenas that a 3D worm can be put into, or print one.
 
@@ -166,22 +162,19 @@ def arenas(
     from annelid.draw.table import arenas_table
     from annelid.terminal import Console
 
-    if as_json:
-        _refuse_with_json(name is not None)
-        listing = [{"name": each, "summary": arena_summary(each)} for each in arena_names()]
-        typer.echo(json.dumps(listing, indent=2))
-        return
+    refuse_json(name is not None, "a name")
     if name is not None:
         typer.echo(arena_text(name), nl=False)
         return
-    Console().print(arenas_table({each: arena_summary(each) for each in arena_names()}))
+    summaries = {each: arena_summary(each) for each in arena_names()}
+    if not give([{"name": each, "summary": summary} for each, summary in summaries.items()]):
+        Console().print(arenas_table(summaries))
 
 
 def doctor(
     report: Annotated[
         bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
 ) -> None:
     """Say what is missing and how to install it.
 
@@ -193,18 +186,12 @@ def doctor(
     """
     from annelid.draw.doctor import examine
 
-    if as_json:
-        _refuse_with_json(report)
-        typer.echo(json.dumps([asdict(finding) for finding in examine()], indent=2))
-        return
+    refuse_json(report, "--report")
     if report:
         from annelid.draw.doctor import bug_report
 
         typer.echo(bug_report(list(examine())))
-    else:
-        typer.echo("\n".join(finding.line() for finding in examine()))
-
-
-def _refuse_with_json(given: bool) -> None:
-    if given:
-        raise typer.BadParameter("--json prints the list: it goes with nothing else")
+        return
+    found = list(examine())
+    if not give([asdict(finding) for finding in found]):
+        typer.echo("\n".join(finding.line() for finding in found))

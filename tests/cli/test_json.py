@@ -1,0 +1,261 @@
+"""Every command prints its result as strict JSON on stdout and nothing else, or is listed here with the reason."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from inspect import isfunction
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from outcome import Command, Outcome
+from typer.main import get_command
+
+from annelid.cli import app, entry
+from annelid.output import write_csv, write_json
+from annelid_studies.riddle2023.contents import Claim, Report, Table
+
+pytestmark = pytest.mark.usefixtures("runs_in_this_process", "undrawn")
+
+PAGE = Path(__file__).parents[2] / "docs" / "data_out.md"
+NO_RESULT = {
+    "view": "a view goes on until it is closed",
+    "cite": "BibTeX is a format for programs already",
+}
+STUDY = """
+preset = "riddle2022-planar"
+set.duration_s = 0.1
+[[vary]]
+field = "body.gain"
+values = [{values}]
+"""
+ROWS = [{"run": "007", "speed_m_per_s": 0.5, "slip": None, "ordered": True, "problem": "silent"}]
+"""What the tables of the studies hold here that need minutes in earnest."""
+NUMBERS = Table(["quantity", "ours"], [["period", "2.629 s"]])
+CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")
+REPORT = Report("full", ["It walks."], NUMBERS, NUMBERS, [], [CLAIM], [], {"annelid": "0"})
+
+
+def write_rows(*arguments: Any) -> Path:
+    path = next(argument for argument in arguments if isinstance(argument, Path))
+    path.parent.mkdir(exist_ok=True)
+    return write_csv(path, [*ROWS[0], "drift"], [["007", "0.5", float("nan"), True, "silent", "-inf"]])
+
+
+def picture(*_: object, **__: object) -> Path:
+    return Path("picture.png")
+
+
+def fake(monkeypatch: pytest.MonkeyPatch, module: str, **found: object) -> None:
+    """Puts these results in the place of what a study computes; its tables are `ROWS`, its pictures are not drawn."""
+    study = import_module(module)
+    for name, function in vars(study).items():
+        if not isfunction(function):
+            continue
+        if name in found:
+            monkeypatch.setattr(study, name, lambda *_, _found=found[name], **__: _found)
+        elif name.startswith("write_"):
+            monkeypatch.setattr(study, name, write_rows)
+        elif name.endswith(("figure", "picture")) or name.startswith("draw_"):
+            monkeypatch.setattr(study, name, picture)
+        elif name.endswith("_table"):
+            monkeypatch.setattr(study, name, lambda *_: None)
+
+
+Fakes = dict[str, dict[str, object]]
+STUDIES: dict[str, Fakes] = {
+    "challenge": {
+        "annelid_studies.challenge.scores": {"challenge": []},
+        "annelid_studies.challenge.ranking": {"standings": []},
+        "annelid_studies.challenge.report": {},
+    },
+    "experiment speed": {"annelid_studies.crawling": {"crawl": []}},
+    "experiment gaits": {"annelid_studies.crawling": {"headlines": [None]}},
+    "experiment slip": {"annelid_studies.slip": {"slip_feedback": []}},
+    "experiment slip-detector": {"annelid_studies.slip": {"slip_detection": {}, "scores": {}}},
+    "experiment turning": {"annelid_studies.turning": {"turning": ([], [])}, "annelid_studies.tables": {}},
+    "experiment pipes": {"annelid_studies.pipes": {"pass_pipes": ([], [])}, "annelid_studies.tables": {}},
+    "experiment riddle2025": {"annelid_studies.riddle2025": {"compare": []}, "annelid_studies.tables": {}},
+    "experiment weak-middle": {
+        "annelid_studies.weak_middle.sweeps": {"weak_middle": ({}, [])},
+        "annelid_studies.weak_middle.results": {},
+    },
+}
+"""Commands whose runs take minutes or more, with what stands in their place."""
+
+
+def paper(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", lambda *_, **__: REPORT)
+    return annelid("paper", "--json")
+
+
+def bench(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    content = {"cases": [], "speed": 2.0}
+    written = lambda folder, *_, **__: write_json(folder / "bench.json", content)  # noqa: E731
+    monkeypatch.setattr("annelid_studies.bench.benchmark.bench", written)
+    fake(monkeypatch, "annelid_studies.bench.report")
+    return annelid("bench", "--json")
+
+
+def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    def walked(folder: Path, *_: object, **__: object) -> list[object]:
+        (folder / "robustness.json").write_text('{"shares": {}, "judged": [{"score": NaN}]}')
+        return []
+
+    monkeypatch.setattr("annelid_studies.robustness.robustness", walked)
+    return annelid("robustness", "--json")
+
+
+def calibrate(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    fit = SimpleNamespace(simulated=None)
+    written = lambda *words: (write_json(words[-1], {"n_loops": 3}), Path("calibrated.toml"))  # noqa: E731
+    found = {"calibrate": fit, "fit_tables": [], "write_calibration": None}
+    fake(monkeypatch, "annelid.experiment.calibration", **found)
+    fake(monkeypatch, "annelid.experiment.load_frame")
+    monkeypatch.setattr("annelid.experiment.calibration.write_calibration", written)
+    return annelid("calibrate", "--json")
+
+
+def sweep(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    monkeypatch.setattr("annelid.experiment.sweep.sweep_figure", picture)
+    Path("study.toml").write_text(STUDY.format(values="1.0, 0.9"))
+    return annelid("sweep", "study.toml", "--json", "--jobs", "1")
+
+
+def tune(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    monkeypatch.setattr("annelid.experiment.tune._figure", picture)
+    words = ("--duration", "0.1", "--vary", "controller.gate_time_constant_ms=100:600", "--trials", "1", "--jobs", "1")
+    return annelid("tune", "riddle2022-planar", *words, "--json")
+
+
+def typed(*words: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
+    """Runs a command as it is, on a finished run where RUN stands."""
+    return lambda annelid, finished, _: annelid(*(finished if word == "RUN" else word for word in words), "--json")
+
+
+def faked(name: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
+    """Runs a study whose computing is replaced."""
+
+    def run(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+        for module, found in STUDIES[name].items():
+            fake(monkeypatch, module, **found)
+        return annelid(*name.split(), "--quick", "--json")
+
+    return run
+
+
+DONE = {
+    "run": typed("run", "riddle2022-planar", "--duration", "0.1", "--no-video"),
+    "check": typed("check", "riddle2022-planar"),
+    "build": typed("build", "riddle2023-rods"),
+    "new": typed("new", "mine.toml", "--radius", "0.1"),
+    "gallery": typed("gallery", "--list"),
+    "runs": typed("runs"),
+    "show": typed("show", "RUN"),
+    "compare": typed("compare", "RUN", "RUN", "-o", "both"),
+    "plot": typed("plot", "RUN", "-o", "figure7.svg"),
+    "render": typed("render", "RUN", "--time", "0.5", "-o", "frame.png"),
+    "export": typed("export", "RUN", "--to", "csv", "-o", "tables"),
+    "limit-cycle": typed("limit-cycle", "--time", "located", "-o", "cycle.svg"),
+    "presets": typed("presets"),
+    "arenas": typed("arenas"),
+    "doctor": typed("doctor"),
+    "experiment load-frame": typed("experiment", "load-frame", "--displacement", "90"),
+    "paper": paper,
+    "bench": bench,
+    "robustness": robustness,
+    "calibrate": calibrate,
+    "sweep": sweep,
+    "tune": tune,
+} | {name: faked(name) for name in STUDIES}
+LISTS = {"check", "runs", "presets", "arenas", "doctor"}
+"""What prints a list; all others print an object."""
+
+
+def commands(group: Any, *above: str) -> Iterator[str]:
+    """The names of all commands below a group."""
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands(command, *above, name)
+        else:
+            yield " ".join((*above, name))
+
+
+def strict(text: str) -> Any:
+    """Reads one document in which every number is finite."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(name)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.mark.parametrize("name", [*commands(get_command(app))])
+def test_a_command_prints_its_result_as_json_and_nothing_else(
+    annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    if name in NO_RESULT:
+        assert "No such option: --json" in annelid(*name.split(), "--json").err
+        return
+    done = DONE[name](annelid, finished, monkeypatch)
+    assert done.exit_code == (entry.EXIT_ALL_FAILED if name == "tune" else 0), done.err
+    document = strict(done.out)
+    assert isinstance(document, list) == (name in LISTS)
+    if name in STUDIES:
+        assert all(rows == [{**ROWS[0], "drift": None}] for rows in document["results"].values())
+    if name not in {*LISTS, "show", "gallery"}:
+        assert document["files"]
+        assert document["versions"].keys() == {"annelid", "mujoco-core", "numpy", "python"}
+
+
+def test_the_page_says_what_every_command_prints() -> None:
+    section = PAGE.read_text(encoding="utf-8").split("\n## JSON\n")[1].split("\n## ")[0]
+    named = set(re.findall(r"`([a-z-]+)", section))
+    assert {name.split()[0] for name in commands(get_command(app))} <= named
+    assert {key for key in ("files", "results", "versions") if f"| `{key}` |" in section} == {
+        "files",
+        "results",
+        "versions",
+    }
+
+
+def test_runs_that_fail_are_in_the_document(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.experiment.sweep.sweep_figure", picture)
+    Path("study.toml").write_text(STUDY.format(values="1.0, 1e4"))
+    done = annelid("sweep", "study.toml", "--json", "--jobs", "1")
+    assert done.exit_code == entry.EXIT_SOME_FAILED
+    assert "of 2 runs 1 failed" in done.err
+    rows = strict(done.out)["results"]["sweep.csv"]
+    assert [row["status"] for row in rows] == ["complete", "failed"]
+    assert [row["body.gain"] for row in rows] == [1, 10000]
+    assert rows[0]["ring_length_min_m"] > 0
+    assert rows[1]["ring_length_min_m"] is None
+
+
+def test_a_run_that_a_guard_stops_has_its_document(annelid: Command) -> None:
+    done = annelid("run", "riddle2023-rods", "--set", "guard.kinetic_energy_J=1e-9", "--json", "-o", "here")
+    assert done.exit_code == entry.EXIT_STOPPED, done.err
+    document = strict(done.out)
+    assert document["files"] == [str(Path("here/run.nc"))]
+    assert document["results"]["run.nc"]["status"] == "stopped_by_guard"
+
+
+@pytest.mark.parametrize("words", ["run nosuch", "sweep nosuch.toml", "show nosuch", "experiment speed nosuch"])
+def test_an_error_is_one_sentence_on_stderr_and_no_document(annelid: Command, words: str) -> None:
+    done = annelid(*words.split(), "--json")
+    assert (done.exit_code, done.out) == (entry.EXIT_USAGE, "")
+    assert "nosuch" in done.sentence()
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["show RUN --verify", "runs --clean RUN", "presets wang", "arenas floor", "doctor --report", "sweep --example"],
+)
+def test_json_is_refused_beside_what_prints_something_else(annelid: Command, words: str) -> None:
+    done = annelid(*words.split(), "--json")
+    assert (done.exit_code, done.out) == (entry.EXIT_USAGE, "")
+    assert "does not go with" in " ".join(done.err.split())

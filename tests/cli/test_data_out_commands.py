@@ -10,6 +10,7 @@ import pytest
 from outcome import Command
 
 from annelid.draw import doctor
+from annelid.simulation.runfile import open_run
 
 
 @pytest.fixture
@@ -81,6 +82,25 @@ def test_compare_json_is_json_and_nothing_else(annelid: Command, run: Path, fini
     read = json.loads(annelid("compare", run, finished, "--json").out)
     assert read["numbers"]["ring_length_min_m"]["differences"] == [None, 0.0]
     assert read["configuration"] == {}
+
+
+def test_compare_with_a_measured_log(annelid: Command, run: Path) -> None:
+    data = open_run(run).data
+    columns = {"t_s": data["time"].values + 7.0, "ring_mm": 1e3 * data["ring_length"].values[:, 0]}
+    rows = zip(*columns.values(), strict=True)
+    Path("log.csv").write_text("t_s,ring_mm\n" + "".join(f"{t},{length}\n" for t, length in rows))
+    Path("map.toml").write_text(
+        f'time = "t_s"\nlag_s = -7.0\n[map]\nring_mm = "ring_length[{data["muscle"].values[0]}]"\n'
+    )
+    done = annelid("compare", run, "log.csv", "--map", "map.toml", "-o", "robot")
+    assert done.exit_code == 0, done.err
+    assert done.out.split()[-2:] == ["robot/agreement.json", "robot/agreement.png"]
+    read = json.loads(annelid("compare", run, "log.csv", "--map", "map.toml", "--json").out)
+    assert read == json.loads(Path("robot/agreement.json").read_text())
+    assert read["lag_s"] == pytest.approx(-7.0)
+    assert read["signals"]["ring_mm"]["rms"] < 1e-4
+    assert "--force" in annelid("compare", run, "log.csv", "--map", "map.toml", "-o", "robot").sentence()
+    assert "name both" in annelid("compare", run, "--map", "map.toml").err
 
 
 def test_compare_needs_two_runs(annelid: Command, run: Path) -> None:

@@ -59,15 +59,16 @@ class Track:
     @cached_property
     def front_m(self) -> Array:
         """Centre of the foremost ring, ``(n, 2)``."""
-        return self._ring_centre(0)
+        return self.ring_centre(0)
 
     @cached_property
     def heading_rad(self) -> Array:
         """Direction from the last ring to the foremost, unwrapped, ``(n,)``: 0 towards -x, positive to the left."""
-        ahead = self.front_m - self._ring_centre(-1)
+        ahead = self.front_m - self.ring_centre(-1)
         return np.unwrap(np.arctan2(-ahead[:, 1], -ahead[:, 0]))
 
-    def _ring_centre(self, segment: int) -> Array:
+    def ring_centre(self, segment: int) -> Array:
+        """Centre of a segment's ring, seen from above, ``(n, 2)``; segments from 0, negative ones from the rear."""
         return self._planes[:, self.ring_planes[segment]].mean(axis=1)
 
     @cached_property

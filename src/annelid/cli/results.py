@@ -70,8 +70,18 @@ def show(
 def compare_command(
     runs: Annotated[
         list[Path],
-        typer.Argument(metavar="RUN RUN..", help="Folders of runs, or their run.nc; differences are to the first."),
+        typer.Argument(
+            metavar="RUN RUN..",
+            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a table.",
+        ),
     ],
+    log_map: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="MAP.toml", help="Compare with measured data: what the table's columns are."),
+    ] = None,
+    from_s: Annotated[
+        float, typer.Option("--from-time", help="With --map: time of the run before which nothing is compared, s.")
+    ] = 0.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON, in SI units.")] = False,
     output: Annotated[
         Path | None,
@@ -90,7 +100,15 @@ def compare_command(
     annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
     annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
     annelid compare runs/* --json | jq .numbers.period_s
+    annelid compare runs/wang-001 robot.csv --map robot.toml -o robot
+
+    With --map the second file is a measured log: CSV, Parquet, MATLAB, netCDF, or the points of a video tracker.
+    Both are aligned in time, and every signal's error, amplitude, phase and duty are printed; -o adds
+    agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
     """
+    if log_map is not None:
+        _compare_measured(runs, log_map, from_s, output, as_json=as_json, force=force)
+        return
     from annelid.analysis.comparison import compare
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
     from annelid.draw.table import comparison_table, fields_table
@@ -126,6 +144,35 @@ def compare_command(
             complain(f"{name} not drawn: {error}")
     for path in written:
         typer.echo(path, err=as_json)
+
+
+def _compare_measured(
+    files: list[Path], log_map: Path, from_s: float, output: Path | None, *, as_json: bool, force: bool
+) -> None:
+    from annelid.analysis.agreement import compare_with_log
+    from annelid.analysis.measured import read_map, read_measured
+    from annelid.draw.figures.comparison import agreement_figure
+    from annelid.draw.table import agreement_table
+    from annelid.output import write_json
+    from annelid.simulation.runfile import open_run
+    from annelid.terminal import Console
+
+    if len(files) != 2:
+        raise typer.BadParameter("--map compares one run with one measured table: name both")
+    if output is not None:
+        lock(output)
+        for name in ("agreement.json", "agreement.png"):
+            refuse_existing(output / name, force)
+    found = compare_with_log(open_run(files[0]), read_measured(files[1], read_map(log_map)), from_s=from_s)
+    if as_json:
+        typer.echo(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+    else:
+        Console().print(agreement_table(found))
+    for note in found.notes:
+        complain(f"note: {note}")
+    if output is not None:
+        typer.echo(write_json(output / "agreement.json", found.to_dict()), err=as_json)
+        typer.echo(agreement_figure(found, output / "agreement"), err=as_json)
 
 
 def plot(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
@@ -27,6 +28,7 @@ from annelid.errors import listed
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from annelid.analysis.agreement import Agreement
     from annelid.analysis.limit_cycle import LimitCycle
     from annelid.config import RunConfig
 
@@ -191,6 +193,27 @@ def fields_table(comparison: Comparison) -> Table:
     for field, values in comparison.fields.items():
         if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values):
             table.add_row(field, *(UNKNOWN if value is LACKING else _setting(value) for value in values))
+    return table
+
+
+def agreement_table(found: Agreement) -> Table:
+    """Returns a run's agreement with a measured log, two lines for each signal: measured and simulated."""
+    periods = [UNKNOWN if isnan(one) else f"{one:.3f} s" for one in found.period_s]
+    caption = f"lag {found.lag_s:.3f} s, clock drift {100 * found.clock_drift:.2f} %"
+    table = framed_table("signal", "amplitude", "duty", "period", "rms error", "phase", "waveform", caption=caption)
+    table.columns[0].no_wrap = True
+    for name, one in found.signals.items():
+        scale, unit = (1e3, "mm") if one.unit == "m" else (1.0, one.unit)
+        share = UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %"
+        table.add_row(
+            f"{name}\n{one.signal}",
+            "\n".join(f"{scale * size:.3g} {unit}" for size in one.amplitude),
+            "\n".join(f"{100 * high:.0f} %" for high in one.duty),
+            "\n".join(periods),
+            f"{scale * one.rms:.3g} {unit}\n{share}",
+            UNKNOWN if isnan(one.phase) else f"{one.phase:+.2f}",
+            UNKNOWN if isnan(one.waveform) else f"{one.waveform:.2f}",
+        )
     return table
 
 

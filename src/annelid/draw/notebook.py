@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass
 from html import escape
+from mimetypes import guess_type
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -23,15 +24,6 @@ HEADLINES = ("order", "wave", "period_s", "elongation_first_helix_pp_m", "elonga
 """Fields of the summary that are shown; speed and stride follow."""
 MOST_BYTES = 12_000_000
 """Largest file that is put into a page."""
-_TYPES = {
-    ".png": "image/png",
-    ".jpg": "image/jpeg",
-    ".jpeg": "image/jpeg",
-    ".svg": "image/svg+xml",
-    ".gif": "image/gif",
-    ".mp4": "video/mp4",
-}
-"""What browsers show, by suffix."""
 _LEFT = 'style="text-align:left"'
 
 
@@ -52,8 +44,9 @@ class Picture:
         return str(self.path)
 
     def _repr_html_(self) -> str:
-        kind = _TYPES.get(self.path.suffix.lower())
-        if kind is None or self.path.stat().st_size > MOST_BYTES:
+        kind = guess_type(self.path.name)[0] or ""
+        # Other videos are played by some browsers only.
+        if not kind.startswith(("image/", "video/mp4")) or self.path.stat().st_size > MOST_BYTES:
             return f"<p>In the file <code>{_words(self.path)}</code></p>"
         source = f'src="data:{kind};base64,{base64.b64encode(self.path.read_bytes()).decode()}" style="max-width:100%"'
         if kind.startswith("video"):

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from annelid.analysis import gait, summary
     from annelid.body.estimates import Finding
     from annelid.config import RunConfig, load_config, preset_names
+    from annelid.draw.notebook import plot, video
     from annelid.experiment.sweep import sweep
     from annelid.nervous import Network
     from annelid.plausibility import check
@@ -44,11 +45,13 @@ __all__ = [
     "gait",
     "load_config",
     "open_run",
+    "plot",
     "preset_names",
     "simulate",
     "simulate_batch",
     "summary",
     "sweep",
+    "video",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

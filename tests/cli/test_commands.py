@@ -102,6 +102,8 @@ def test_show_prints_the_published_period_beside_ours(annelid: Command, finished
 def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: Path) -> None:
     assert annelid("plot", finished, "-o", "f.svg").exit_code == 0
     assert Path("f.svg").read_text().lstrip().startswith("<?xml")
+    assert annelid("plot", finished, "--figure", "network", "-o", "n.svg").out.split() == ["n.svg"]
+    assert 'id="neuron-contraction_1"' in Path("n.svg").read_text()
     done = annelid("render", finished, "--time", "0.5", "-o", "frame.jpg", "--video", "v.mp4", "--fps", "5")
     assert done.exit_code == 0, done.err
     assert done.out.split() == ["frame.jpg", "v.mp4"]

@@ -331,7 +331,7 @@ def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:
 
 @pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2025-adaptive"])
 def test_the_live_diagram_is_of_the_network_that_is_stepped(preset: str) -> None:
-    from annelid.live.network import network_of
+    from annelid.draw.figures.network_diagram import network_of
     from annelid.live.panel import neurons_of
 
     worm = LivingWorm(load_config(preset))

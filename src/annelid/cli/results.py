@@ -172,31 +172,30 @@ def plot(
         typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: FIGURE.png in the run]"),
     ] = None,
     figure: Annotated[
-        str, typer.Option(metavar="FIGURE", help="figure7: potentials and lengths; track: the path, seen from above.")
+        str,
+        typer.Option(
+            metavar="FIGURE",
+            help="figure7: potentials and lengths; track: the path, seen from above; network: neurons and synapses.",
+        ),
     ] = "figure7",
     force: Force = False,
 ) -> None:
-    """Draw potentials and lengths over time, or the track.
+    """Draw potentials and lengths over time, the track, or the network.
 
-    The counterpart of the paper's figure 7, or where the worm crawled: the paths of its middle and of its front, its
-    outline at several times, and what stood in the way.
+    The counterpart of the paper's figure 7; or where the worm crawled: the paths of its middle and of its front, its
+    outline at several times, and what stood in the way; or the network of its controller, with a key.
 
     \b
     annelid plot runs/riddle2023-001 -o figure7.pdf
     annelid plot runs/riddle2025-001 --figure track
+    annelid plot runs/riddle2023-001 --figure network -o network.svg
     """
-    from annelid.draw.figures import RUN_FIGURES
+    from annelid.draw.notebook import plot as drawn
     from annelid.draw.plots import plot_path
-    from annelid.simulation.runfile import open_run
 
-    draw = RUN_FIGURES.find(figure)
-    opened = open_run(run)
-    if output is None:
-        target = opened.path.parent / f"{figure}.png"
-    else:
-        target = plot_path(output)
-        refuse_existing(target, force)
-    print_paths([draw(opened, target)])
+    if output is not None:
+        refuse_existing(plot_path(output), force)
+    print_paths([drawn(run, output, figure=figure).path])
 
 
 def render(

@@ -23,10 +23,7 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
 
     At the end ``complain`` is called with one sentence for each reason for which pictures could not be drawn.
     """
-    times = run.data["time"].values
-    frame_time = FRAME_TIME_S
-    if times.size and not times[0] <= frame_time <= times[-1]:
-        frame_time = float(times[0] + times[-1]) / 2
+    frame_time = frame_time_s(run)
     frame_remedy = f"annelid render {folder} --time {frame_time:g}"
     video_path = folder / "video.mp4"
 
@@ -52,6 +49,14 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
         names = " and ".join(name for name, _ in failed)
         remedies = " and ".join(remedy for _, remedy in failed)
         complain(f"{names} not drawn: {reason} (the run is whole; then draw with: {remedies})")
+
+
+def frame_time_s(run: Run) -> float:
+    """Returns the time of a run's one frame, s."""
+    times = run.data["time"].values
+    if times.size and not times[0] <= FRAME_TIME_S <= times[-1]:
+        return float(times[0] + times[-1]) / 2
+    return FRAME_TIME_S
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
@@ -250,7 +250,9 @@ def cycle_numbers(cycles: Mapping[str, LimitCycle]) -> dict[str, Any]:
     }
 
 
-def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, str, str]]:
+def summary_rows(
+    numbers: Summary, config: RunConfig, only: Collection[str] = ("order", "wave", *SUMMARY_ROWS)
+) -> list[tuple[str, str, str, str]]:
     """Returns label, our number, the one to compare with and the deviation of every row in which there is a number."""
     beside = references(config)
     pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
@@ -270,6 +272,7 @@ def summary_rows(numbers: Summary, config: RunConfig) -> list[tuple[str, str, st
     rows = [
         (label, ours, _theirs(field, beside.get(field)), _deviation(field, numbers, beside.get(field)))
         for label, ours, field in cells
+        if field in only
     ]
     return [row for row in rows if row[1] != UNKNOWN or row[2]]
 

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.config import RunConfig
 from annelid.nervous import Network
 from annelid.nervous.drawing import meanings_of
-from annelid.simulation.worm import WormPlant
 
 FULL_MV = 20.0
 """Potential above or below rest at which a colour is full."""
 BELOW, AT_REST, ABOVE = (0.48, 0.62, 0.95), (1.0, 1.0, 1.0), (0.96, 0.58, 0.25)
-
-
-def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
-    """Returns the network of these neurons that the controller of a configuration steps, or None without one."""
-    network = getattr(config.controller.build(config, WormPlant(config)), "network", None)
-    return network if isinstance(network, Network) and list(network.neurons) == list(neurons) else None
 
 
 def network_html(network: Network) -> str:

@@ -11,8 +11,9 @@ import numpy as np
 
 from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
+from annelid.draw.figures.network_diagram import network_of
 from annelid.live.living import knobs_of
-from annelid.live.network import colors_html, network_html, network_of
+from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from annelid.config import RunConfig, field_value, fields_of
 from annelid.errors import ConfigError, RunFileError, UnreadableText, listed
+from annelid.registry import Registry
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
 from annelid.simulation.digest import Finding, examine
 from annelid.simulation.lock import LOCK_NAME
@@ -70,6 +71,9 @@ class Run:
         reached = f"{float(time[-1]):g} s" if time.size else "nothing"
         return f"<Run {str(self.path)!r}: {self.config.name}, {self.status}, {reached}>"
 
+    def _repr_html_(self) -> str:
+        return VIEWS.find("html")(self)
+
     @property
     def start_s(self) -> float:
         """Simulated time at which this run started, s: 0 unless it continues another."""
@@ -88,6 +92,10 @@ class Run:
         time = self.data["time"].values
         simulated_s = float(time[-1]) - self.start_s if time.size else 0.0
         return simulated_s / wall_s if simulated_s > 0 and wall_s > 0 else float("nan")
+
+
+VIEWS: Registry[Callable[[Run], str]] = Registry("view of a run", "annelid.draw.notebook")
+"""What shows a run in a notebook; it is loaded on first use, so that a simulation needs no matplotlib."""
 
 
 def open_run(path: str | Path) -> Run:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from annelid.config import RunConfig
 from annelid.draw.canvas import WIDTH_IN, canvas, plain, save
+from annelid.draw.figures import RUN_FIGURES
+from annelid.errors import RunFileError
 from annelid.nervous import Network
 from annelid.nervous.drawing import Shape, Words, frame_of, network_shapes
 from annelid.nervous.key import key_shapes
 from annelid.output import with_suffix
+from annelid.simulation import Run, build_plant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,6 +54,28 @@ def network_figure(network: Network, path: str | Path, *, conductances: bool = F
         figure.set_layout_engine("none")
         _paint(figure.add_axes((0.0, 0.0, 1.0, 1.0)), shapes, frame)
         return save(figure, path)
+
+
+def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
+    """Returns the network of these neurons that the controller of a configuration steps, or None without one."""
+    network = getattr(config.controller.build(config, build_plant(config)), "network", None)
+    return network if isinstance(network, Network) and list(network.neurons) == list(neurons) else None
+
+
+def run_network_figure(run: Run, path: str | Path) -> Path:
+    """Draws the network that a run's controller stepped, as `network_figure`.
+
+    Raises:
+        RunFileError: As of `network_figure`, or the run holds the potentials of no network.
+    """
+    neurons = [str(name) for name in run.data["neuron"].values] if "potential" in run.data else []
+    network = network_of(run.config, neurons) if neurons else None
+    if network is None:
+        raise RunFileError(f"{run.path} holds no network to draw: its controller is {run.config.controller.kind}")
+    return network_figure(network, path)
+
+
+RUN_FIGURES.add("network", run_network_figure)
 
 
 def _paint(axes: Axes, shapes: Iterable[Shape], frame: tuple[float, float, float, float]) -> None:

@@ -60,7 +60,7 @@ def test_draws_lie_in_their_range_and_differ_by_seed(name: str) -> None:
 @pytest.mark.parametrize("name", all_tasks().tasks)
 def test_a_task_makes_blind_runs_whose_step_can_be_halved(name: str) -> None:
     reference = {REFERENCE: find_entrants([])[REFERENCE]}
-    [whole], [half] = (entries(reference, [name], [1000], half_step=half_step) for half_step in (False, True))
+    [whole], [half] = (entries(reference, [name], [1000], finer=finer) for finer in (1, 2))
     config = whole.case.config
     assert config.trial is not None
     assert config.trial.blind
@@ -267,7 +267,7 @@ def test_runs_of_another_call_are_taken_where_they_are_of_the_same_setup(tmp_pat
     assert [one.seed for one in both] == [1000, 1001]
     assert both[0].speed_m_per_s == 0.123
     assert len(list(tmp_path.glob("here/*/run.nc"))) == 1
-    others = entries(entrants, ["push"], [1000], duration_s=0.07), entries(entrants, ["push"], [1000], half_step=True)
+    others = entries(entrants, ["push"], [1000], duration_s=0.07), entries(entrants, ["push"], [1000], finer=2)
     assert len({entry.setup for entry in (wanted[0], *others[0], *others[1])}) == 3, "another setup is another run"
 
 

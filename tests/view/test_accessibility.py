@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+import threading
 from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import pytest
 from live_page import CHROMIUM, open_show
@@ -21,6 +25,13 @@ if TYPE_CHECKING:
 
 SIZES = ((1280, "light"), (400, "dark"))
 PAGES = ("index.html", "gait.html", "explanation/equations.html", "live_view.html", "reference/api/control.html")
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    """Serves files without a word."""
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Says nothing."""
 
 
 @pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}-{size[1]}")
@@ -72,3 +83,44 @@ def test_the_live_view(page: Page) -> None:
         assert serious(page) == []
         page.get_by_role("button", name="Keys").click()
         assert serious(page) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 400])
+def test_every_page_of_the_site(browser: Browser, site: Path, width: int, scheme: Literal["light", "dark"]) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    wrong = []
+    for path in sorted(site.rglob("*.html")):
+        page.goto(path.as_uri())
+        page.wait_for_timeout(200)
+        wrong += [f"{path.relative_to(site)}: {one}" for one in serious(page)]
+        if (wide := page.evaluate("document.documentElement.scrollWidth")) > width:
+            wrong.append(f"{path.relative_to(site)}: {wide} px wide")
+    page.close()
+    assert wrong == []
+
+
+def test_search_copy_and_mathematics(browser: Browser, site: Path) -> None:
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(QuietHandler, directory=str(site)))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f"http://127.0.0.1:{server.server_port}"
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"], origin=address)
+    try:
+        page.goto(f"{address}/start.html")
+        page.locator(".highlight, pre").first.hover()
+        page.locator("button.md-clipboard, button[data-clipboard-target], .md-code__button").first.click()
+        assert "annelid" in page.evaluate("navigator.clipboard.readText()")
+        found = page.locator("a", has_text=re.compile("eytelwein", re.IGNORECASE))
+        assert found.count() == 0
+        page.keyboard.press("/")
+        page.keyboard.type("eytelwein")
+        found.first.wait_for()
+        page.goto(f"{address}/explanation/equations.html")
+        sizes = page.evaluate("[...document.querySelectorAll('math')].map(one => one.getBoundingClientRect().height)")
+        assert len(sizes) > 20
+        assert min(sizes) > 5
+    finally:
+        page.close()
+        server.shutdown()

@@ -253,7 +253,9 @@ def challenge_command(
     quick: Annotated[
         bool, typer.Option("--quick", help="Three tasks, three entrants, two draws, short runs: under five minutes.")
     ] = False,
-    half_step: Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")] = False,
+    finer: Annotated[
+        int, typer.Option(min=1, max=10, metavar="N", help="Bodies move in steps N times as short: 2, or 5 of 10 ms.")
+    ] = 1,
     against: Annotated[
         list[Path] | None,
         typer.Option(
@@ -284,7 +286,7 @@ def challenge_command(
     annelid challenge                                           all entrants, all tasks
     annelid challenge mine:Controller --task slope --draws 4    your own, against the reference
     annelid challenge mine.toml --with published/runs.csv       only yours is computed
-    annelid challenge --half-step -o half
+    annelid challenge --finer 2 -o half
     annelid challenge --against half/runs.csv                   is the ranking the same?
     """
     from annelid_studies.challenge import report, tasks
@@ -299,7 +301,7 @@ def challenge_command(
     earlier = [one for path in known or [] for one in read_scores(path)]
     duration_s = tasks.QUICK_DURATION_S if quick else None
     found = tasks.find_entrants(entrants or [])
-    wanted = tasks.entries(found, task or [], seeds, half_step=half_step, duration_s=duration_s)
+    wanted = tasks.entries(found, task or [], seeds, finer=finer, duration_s=duration_s)
     with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
         scores = challenge(store, wanted, earlier)
     ranked = standings(scores)

@@ -182,7 +182,7 @@ def entries(
     names: Sequence[str],
     seeds: Sequence[int],
     *,
-    half_step: bool = False,
+    finer: int = 1,
     duration_s: float | None = None,
 ) -> list[Entry]:
     """Lays out the runs of entrants at tasks.
@@ -191,7 +191,7 @@ def entries(
         entrants: By their names.
         names: Of the tasks; none for all.
         seeds: Of the draws.
-        half_step: Whether bodies move in steps half as long.
+        finer: How many times as short the bodies' steps are.
         duration_s: How long every run lasts; None for each task's own time.
 
     Raises:
@@ -204,8 +204,8 @@ def entries(
     made = []
     for name in names or found.tasks:
         shared = {**found.set, **found.tasks[name].set}
-        if half_step:
-            shared["clock.physics_timestep_s"] = round(shared["clock.physics_timestep_s"] / 2, 9)
+        if finer != 1:
+            shared["clock.physics_timestep_s"] = round(shared["clock.physics_timestep_s"] / finer, 9)
         if duration_s is not None:
             shared["duration_s"] = duration_s
         segments = int(shared.get("body.mesh.n_segments", 3))

@@ -58,7 +58,7 @@ TASKS = {
         gives=("first/run.nc", "lengths.png", "contracted.png"),
         prints="period",
     ),
-    "the paper": Task("README.md", ("annelid paper --quick",), gives=("report/index.html",)),
+    "the paper": Task("README.md", ("annelid paper --quick",), gives=("report/report.html",)),
     "change N and friction": Task(
         "docs/start.md",
         ("annelid run riddle2023-rods --segments 4 --set arena.friction=0.3 --duration 6 -o slippery",),

@@ -367,6 +367,19 @@ def test_a_damaged_file_is_refused_in_a_sentence(tmp_path: Path, name: str, cont
         read_measured(tmp_path / "none.csv", LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
 
 
+def test_a_small_file_that_holds_terabytes_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    log_map = LogMap.model_validate({"time": "t_ms", "map": SIGNALS})
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.create_dataset("tracks", shape=(1, 2, 1000, 10**9), dtype="f8", chunks=(1, 2, 10, 1000))
+        file["node_names"] = [b"head"]
+    with h5py.File(tmp_path / "log.nc", "w") as file:
+        file.create_dataset("t_ms", shape=(10**12,), dtype="f8", chunks=(1000,))
+    for name in ("log.h5", "log.nc"):
+        assert (tmp_path / name).stat().st_size < 100_000
+        with pytest.raises(UnreadableText, match="MB, more than 300"):
+            read_measured(tmp_path / name, log_map)
+
+
 def test_a_table_without_a_header_is_refused(run: Run, tmp_path: Path) -> None:
     log_of(run).to_csv(tmp_path / "log.csv", index=False, header=False)
     with pytest.raises(UnreadableText, match="has no header"):

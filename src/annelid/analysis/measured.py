@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 MOST_BYTES = 300_000_000
-"""Of a log that is read."""
+"""Of a log that is read, and of each of its parts in memory: a compressed file may be small and hold terabytes."""
 UNITS = {
     "s": ("s", 1.0), "ms": ("s", 1e-3), "us": ("s", 1e-6), "min": ("s", 60.0),
     "m": ("m", 1.0), "cm": ("m", 1e-2), "mm": ("m", 1e-3), "um": ("m", 1e-6), "in": ("m", 0.0254),
@@ -359,8 +360,7 @@ def _table(path: Path) -> DataFrame:
         raise UnreadableText(f"cannot read {path}: {error.strerror}") from None
     if size < 0:
         raise UnreadableText(f"cannot read {path}: there is no such file")
-    if size > MOST_BYTES:
-        raise UnreadableText(f"cannot read {path}: it has {size / 1e6:.0f} MB, more than {MOST_BYTES / 1e6:.0f}")
+    _refuse_large(size, path)
     read = _READERS.get(path.suffix.lower(), _text_table)
     try:
         table = read(path)
@@ -391,7 +391,14 @@ def _text_table(path: Path) -> DataFrame:
     first, body = lines[0], lines[1:] or lines
     separator = next((one for one in (";", "\t", ",") if one in first), r"\s+")
     decimal = "," if separator != "," and sum(bool(re.search(r"\d,\d", line)) for line in body) > len(body) / 2 else "."
-    options = {"sep": separator, "decimal": decimal, "comment": "#", "encoding": "utf-8-sig", "skipinitialspace": True}
+    options = {
+        "sep": separator,
+        "decimal": decimal,
+        "comment": "#",
+        "encoding": "utf-8-sig",
+        "skipinitialspace": True,
+        "compression": None,
+    }
     cells = [cell.strip().lower() for cell in first.split(separator)] if separator != r"\s+" else []
     if cells[:1] == ["scorer"]:
         # DeepLabCut: rows of scorer, body part and coordinate above the numbers.
@@ -419,15 +426,19 @@ def _text_table(path: Path) -> DataFrame:
 
 def _parquet(path: Path) -> DataFrame:
     import pandas
+    from pyarrow.parquet import read_metadata
 
+    about = read_metadata(path)
+    _refuse_large(8 * about.num_rows * about.num_columns, path)
     return pandas.read_parquet(path, engine="pyarrow")
 
 
 def _matlab(path: Path) -> DataFrame:
     import pandas
-    from scipy.io import loadmat
+    from scipy.io import loadmat, whosmat
 
     try:
+        _refuse_large(sum(8 * prod(shape) for _, shape, _ in whosmat(path)), path)
         found = loadmat(path, squeeze_me=True)
     except NotImplementedError:
         raise UnreadableText(f"cannot read {path}: it is of MATLAB's version 7.3, save it with -v7") from None
@@ -438,7 +449,8 @@ def _netcdf(path: Path) -> DataFrame:
     import pandas
     import xarray
 
-    with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as opened:
+    with xarray.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="sort") as opened:
+        _refuse_large(opened.nbytes, path)
         return pandas.DataFrame(_equally_long({str(name): v.values for name, v in opened.variables.items()}, path))
 
 
@@ -450,6 +462,7 @@ def _sleap(path: Path) -> DataFrame:
     with h5py.File(path, "r") as file:
         if "tracks" not in file or "node_names" not in file:
             raise UnreadableText(f"{path} is no analysis file of SLEAP; export a DeepLabCut file as CSV")
+        _refuse_large(sum(getattr(file[name], "nbytes", 0) for name in ("tracks", "node_names")), path)
         places, names = np.asarray(file["tracks"], dtype=float), np.asarray(file["node_names"])
     if places.ndim != 4 or len(places) != 1:
         raise UnreadableText(f"{path} has {len(places)} tracks: export one")
@@ -457,6 +470,11 @@ def _sleap(path: Path) -> DataFrame:
     return pandas.DataFrame(
         {f"{node}.{axis}": places[0, j, i] for i, node in enumerate(nodes) for j, axis in enumerate("xy")}
     )
+
+
+def _refuse_large(n_bytes: int, path: Path) -> None:
+    if n_bytes > MOST_BYTES:
+        raise UnreadableText(f"cannot read {path}: it holds {n_bytes / 1e6:.0f} MB, more than {MOST_BYTES / 1e6:.0f}")
 
 
 def _equally_long(found: Mapping[str, object], path: Path) -> dict[str, Array]:

@@ -92,6 +92,7 @@ ELSEWHERE = {
     ("python", "docs/site/"): "tests/docs calls these",
     ("python", "-c"): "arithmetic",
     ("annelid", "sweep"): "minutes, and workers; the command has tests of its own",
+    ("annelid", "compare", "--map"): "test_newcomer.py executes it on a log of its own",
     ("annelid", "--install-completion"): "it changes the settings of the shell",
     ("annelid", "--show-completion"): "tests/cli/test_commands.py asks for completions",
     ("annelid", "gallery"): "tests/docs/test_gallery.py calls it",

@@ -30,6 +30,8 @@ QUICK = {
     ("annelid", "run", "--resume"): ("--duration", "0.06", "--quiet", "--no-video"),
     # The chain takes fourteen seconds for one of simulated time.
     ("annelid", "run", "riddle2023"): ("--duration", "0.02", "--quiet", "--no-video"),
+    # Four of its own steps.
+    ("annelid", "run", "small.toml"): ("--duration", "0.0448", "--quiet", "--no-video"),
     ("annelid", "run"): ("--duration", "0.04", "--quiet", "--no-video"),
     ("annelid", "render"): (),
     ("annelid", "plot"): (),

@@ -81,6 +81,7 @@ def test_the_written_worm_is_the_computed_one(tmp_path: Path) -> None:
     ("geometry", "words"),
     [
         ((0.05, 3, 12, 3.0), "length_m = 3 does not fit 3 segments of radius 0.05 m"),
+        ((0.05, 3, 12, -1.0), "length_m must be positive, not -1"),
         ((0.05, 3, 7), "n_helices = 7: .*even"),
         ((0.05, 2), "n_segments = 2"),
         ((-1.0,), "radius_m = -1"),

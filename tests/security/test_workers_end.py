@@ -135,6 +135,7 @@ COMMANDS = {
     "tune": ["tune", "riddle2025-muscles", "--duration", "100", "--jobs", "2"],
     "robustness": ["robustness", "--points", "6", "--jobs", "2"],
     "challenge": ["challenge", "--quick", "--jobs", "2"],
+    "gallery": ["gallery", "arenas.png", "-o", "out", "--jobs", "2"],
     "bench": ["bench", "--quick", "--cases", "levels"],
     "uncertainty": ["run", "--uncertainty", "4", "--duration", "100", "--jobs", "2", "--out", "out"],
     "speed": ["experiment", "speed", "--jobs", "2"],

@@ -77,8 +77,8 @@ def compare_command(
         Path | None,
         typer.Option("--map", metavar="MAP.toml", help="Compare with measured data: what the table's columns are."),
     ] = None,
-    from_s: Annotated[
-        float, typer.Option("--from-time", help="With --map: time of the run before which nothing is compared, s.")
+    from_time: Annotated[
+        float, typer.Option(help="With --map: time of the run before which nothing is compared, s.")
     ] = 0.0,
     output: Annotated[
         Path | None,
@@ -104,7 +104,7 @@ def compare_command(
     agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
     """
     if log_map is not None:
-        _compare_measured(runs, log_map, from_s, output, force=force)
+        _compare_measured(runs, log_map, from_time, output, force=force)
         return
     from annelid.analysis.comparison import compare
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure

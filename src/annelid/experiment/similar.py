@@ -15,7 +15,7 @@ from annelid.body.assemble import build_spec, compile_spec
 from annelid.body.estimates import bearable_force_N, rhombus_of
 from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig, check_section, load_config, toml_value
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus
 from annelid.plausibility import tolerance_window_m
 
@@ -52,6 +52,9 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
         "body.mesh.n_helices": (n_helices, "as asked"),
         "body.mesh.radius_m": (radius_m, "as asked"),
     }
+    if length_m is not None:
+        require_finite(length_m=length_m)
+        require_positive(length_m=length_m)
     base = load_config(BASE)
     known, arena = base.body, base.arena
     assert isinstance(known, WormBody)

@@ -216,7 +216,14 @@ def test_a_sensor_that_never_changes_is_noted_and_the_others_are_compared(run: R
 def test_another_period_is_noted_and_not_taken_for_drift(run: Run, tmp_path: Path) -> None:
     found = agreement_of(run, log_of(run, drift=0.04), tmp_path)
     assert found.clock_drift == 0.0
-    assert any("the measured period is +4" in note for note in found.notes)
+    assert any("a difference of +4" in note for note in found.notes)
+
+
+def test_a_wrong_last_time_is_refused_before_memory_is_filled(run: Run, tmp_path: Path) -> None:
+    log = log_of(run)
+    log.loc[log.index[-1], "t_ms"] = 1e18
+    with pytest.raises(ConfigError, match=r"too long to compare.*is a time in it wrong"):
+        agreement_of(run, log, tmp_path)
 
 
 def semicolons(log: pd.DataFrame, folder: Path) -> Path:
@@ -378,6 +385,42 @@ def test_a_small_file_that_holds_terabytes_is_refused_before_it_is_read(tmp_path
         assert (tmp_path / name).stat().st_size < 100_000
         with pytest.raises(UnreadableText, match="MB, more than 300"):
             read_measured(tmp_path / name, log_map)
+
+
+def elsewhere_by_link(file: h5py.File, secret: Path) -> None:
+    file["t_ms"] = h5py.ExternalLink(str(secret), "numbers")
+
+
+def elsewhere_by_storage(file: h5py.File, secret: Path) -> None:
+    file.create_dataset("t_ms", shape=(8,), dtype="u1", external=[(str(secret), 0, 8)])
+
+
+def elsewhere_by_layout(file: h5py.File, secret: Path) -> None:
+    layout = h5py.VirtualLayout(shape=(8,), dtype="f8")
+    layout[:] = h5py.VirtualSource(str(secret), "numbers", shape=(8,))
+    file.create_virtual_dataset("t_ms", layout)
+
+
+@pytest.mark.parametrize("name", ["log.h5", "log.nc"])
+@pytest.mark.parametrize("point", [elsewhere_by_link, elsewhere_by_storage, elsewhere_by_layout])
+def test_a_file_that_points_to_others_is_refused(
+    tmp_path: Path, name: str, point: Callable[[h5py.File, Path], None]
+) -> None:
+    with h5py.File(tmp_path / "secret.h5", "w") as file:
+        file["numbers"] = np.arange(8.0)
+    with h5py.File(tmp_path / name, "w") as file:
+        point(file, tmp_path / "secret.h5")
+    with pytest.raises(UnreadableText, match="elsewhere"):
+        read_measured(tmp_path / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
+
+
+def test_a_tracked_frame_far_away_is_refused(run: Run, tmp_path: Path) -> None:
+    path = sleap_table(run, tmp_path)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:-1], lines[-1].replace(",424,", ",999999999999,")]))
+    assert "999999999999" in path.read_text()
+    with pytest.raises(UnreadableText, match="MB, more than 300"):
+        read_measured(path, LogMap.model_validate({"rate_Hz": 25.0, "m_per_px": 1e-3, "map": {"front": "travel"}}))
 
 
 def test_a_table_without_a_header_is_refused(run: Run, tmp_path: Path) -> None:

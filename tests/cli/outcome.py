@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+STUDY = """
+preset = "riddle2022-planar"
+set.duration_s = 0.1
+[[vary]]
+field = "body.gain"
+values = [{values}]
+"""
+"""A sweep of a planar worm, to be filled with values of one field; 1e4 makes a run fail."""
+
 
 class Outcome:
     """What a command printed and how it ended."""

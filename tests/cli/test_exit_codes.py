@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from outcome import Command
+from outcome import STUDY, Command
 
 from annelid.cli import entry
 from annelid.errors import ConfigError, RunKilled
@@ -22,13 +22,6 @@ from annelid.experiment.workers import Result, Workers
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 PAGE = Path(__file__).parents[2] / "docs" / "troubleshooting.md"
-STUDY = """
-preset = "riddle2022-planar"
-set.duration_s = 0.1
-[[vary]]
-field = "body.gain"
-values = [{values}]
-"""
 GOOD, BAD = "1.0", "1e4"
 
 

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from outcome import Command, Outcome
+from outcome import STUDY, Command, Outcome
 from typer.main import get_command
 
 from annelid.cli import app, entry
@@ -26,13 +26,6 @@ NO_RESULT = {
     "view": "a view goes on until it is closed",
     "cite": "BibTeX is a format for programs already",
 }
-STUDY = """
-preset = "riddle2022-planar"
-set.duration_s = 0.1
-[[vary]]
-field = "body.gain"
-values = [{values}]
-"""
 ROWS = [{"run": "007", "speed_m_per_s": 0.5, "slip": None, "ordered": True, "problem": "silent"}]
 """What the tables of the studies hold here that need minutes in earnest."""
 NUMBERS = Table(["quantity", "ours"], [["period", "2.629 s"]])

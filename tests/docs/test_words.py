@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from doc_commands import PAGES
+from doc_commands import PAGES as MARKDOWN
+from doc_commands import ROOT
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from typer.main import get_command
 
 from annelid.cli import app
 
+NOTEBOOK = "docs/tutorials/quick_start.ipynb"
+
+
+def words_of_notebook() -> str:
+    """Returns the cells of the notebook that are no code, one below the other."""
+    cells = json.loads((ROOT / NOTEBOOK).read_text(encoding="utf-8"))["cells"]
+    return "\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+
+
+PAGES = MARKDOWN | {NOTEBOOK: words_of_notebook()}
 WORDS = {
     r"pins? that (hold|give)s?": "rigid crossings, soft crossings",
     r"slip per way": "slip ratio",

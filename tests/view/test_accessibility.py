@@ -53,11 +53,18 @@ def serious(page: Page) -> list[str]:
     ]
 
 
+def too_wide(page: Page) -> list[str]:
+    """Says where a page is wider than its window."""
+    wide, window = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+    return [f"{wide} px wide in a window of {window} px"] if wide > window else []
+
+
 def test_the_site(page: Page, site: Path) -> None:
     for name in PAGES:
         page.goto((site / name).as_uri())
         page.wait_for_timeout(300)
         assert serious(page) == [], name
+        assert too_wide(page) == [], name
 
 
 def test_a_report(page: Page, tmp_path: Path) -> None:
@@ -94,9 +101,7 @@ def test_every_page_of_the_site(browser: Browser, site: Path, width: int, scheme
     for path in sorted(site.rglob("*.html")):
         page.goto(path.as_uri())
         page.wait_for_timeout(200)
-        wrong += [f"{path.relative_to(site)}: {one}" for one in serious(page)]
-        if (wide := page.evaluate("document.documentElement.scrollWidth")) > width:
-            wrong.append(f"{path.relative_to(site)}: {wide} px wide")
+        wrong += [f"{path.relative_to(site)}: {one}" for one in serious(page) + too_wide(page)]
     page.close()
     assert wrong == []
 
@@ -109,9 +114,12 @@ def test_search_copy_and_mathematics(browser: Browser, site: Path) -> None:
     page.context.grant_permissions(["clipboard-read", "clipboard-write"], origin=address)
     try:
         page.goto(f"{address}/start.html")
-        page.locator(".highlight, pre").first.hover()
-        page.locator("button.md-clipboard, button[data-clipboard-target], .md-code__button").first.click()
-        assert "annelid" in page.evaluate("navigator.clipboard.readText()")
+        block = page.locator("pre").first
+        block.hover()
+        page.locator("button[data-md-type=copy], button.md-clipboard, .md-code__button").first.click()
+        copied = page.evaluate("navigator.clipboard.readText()")
+        assert "annelid" in copied
+        assert copied.strip() == block.inner_text().strip()
         found = page.locator("a", has_text=re.compile("eytelwein", re.IGNORECASE))
         assert found.count() == 0
         page.keyboard.press("/")

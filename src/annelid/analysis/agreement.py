@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import find_peaks
+from scipy.signal import correlate, find_peaks
 
 from annelid.analysis.measured import OFF_SCALE, Measured, run_series
 from annelid.errors import ConfigError, shown
@@ -23,6 +23,8 @@ NEARLY = 0.001
 """Lags whose correlation is so close to the best one's count as equally good: the smallest is taken."""
 LEAST_PERIODIC = 0.3
 """Smallest autocorrelation one period later of a signal that counts as periodic."""
+MOST_SAMPLES = 2_000_000
+"""Of either record, as compared."""
 MOST_DRIFT = 0.05
 """Largest drift of the log's clock that is looked for."""
 
@@ -120,6 +122,11 @@ def compare_with_log(run: Run, log: Measured, *, from_s: float = 0.0) -> Agreeme
         raise ConfigError(
             f"too short to compare: the run has {span_s:.3g} s from {from_s:g} s on, the log {log_span_s:.3g} s"
         )
+    if max(span_s, log_span_s) > MOST_SAMPLES * step_s:
+        raise ConfigError(
+            f"too long to compare in steps of {step_s:.3g} s: the run has {span_s:.3g} s, the log {log_span_s:.3g} s; "
+            "is a time in it wrong?"
+        )
     start_s = max(time_s[0] for time_s, _ in simulated.values())
     end_s = min(time_s[-1] for time_s, _ in simulated.values())
     grid = np.arange(start_s, end_s + 0.5 * step_s, step_s)
@@ -148,21 +155,23 @@ def compare_with_log(run: Run, log: Measured, *, from_s: float = 0.0) -> Agreeme
     ratio = periods[0] / periods[1]
     if np.isfinite(ratio) and abs(ratio - 1.0) > 0.005 and given != "free":
         notes.append(
-            f"the measured period is {100 * (ratio - 1.0):+.1f} % of the simulated one longer, so that both run apart; "
-            f'clock_drift = "free" in the map takes it for the log\'s clock'
+            f"the measured period is {periods[0]:.4g} s, the simulated one {periods[1]:.4g} s, a difference of "
+            f"{100 * (ratio - 1):+.1f} %, so that both run apart; "
+            'clock_drift = "free" in the map takes it for the log\'s clock'
         )
     rows = dict(zip(log.columns, zip(measured, simulated_here, strict=True), strict=True))
-    first: list[float] = []
     signals = {}
     for (name, (theirs_here, ours_here)), column in zip(rows.items(), log.columns.values(), strict=True):
-        signals[name] = _compared(column.signal, units[name], theirs_here, ours_here, periods, step_s, first)
+        signals[name] = _compared(column.signal, units[name], theirs_here, ours_here, periods, step_s)
+    first = next((one.phase for one in signals.values() if np.isfinite(one.phase)), 0.0)
+    signals = {name: replace(one, phase=(one.phase - first + 0.5) % 1.0 - 0.5) for name, one in signals.items()}
     if not any(np.isfinite(one.waveform) for one in signals.values()):
         notes.append("no common period was found: phases are not compared")
-    correlation = float(np.nanmean([_correlated(a, b) for a, b in rows.values()]))
+    known = [one for one in (_correlated(a, b) for a, b in rows.values()) if np.isfinite(one)]
     return Agreement(
         lag_s=float(grid[0] + exact * step_s - log.time_s[0]),
         clock_drift=float(drift),
-        correlation=correlation,
+        correlation=float(np.mean(known)) if known else np.nan,
         period_s=periods,
         signals=signals,
         time_s=time_s,
@@ -222,8 +231,6 @@ def _resampled(log: Measured, drift: float, step_s: float, from_s: float = 0.0) 
 
 def _correlations(theirs: Array, ours: Array) -> tuple[np.ndarray, Array]:
     """Mean correlation of all signals at every lag in samples at which enough overlaps; gaps do not count."""
-    from scipy.signal import correlate
-
     n, m = ours.shape[1], theirs.shape[1]
     lags = np.arange(-m + 1, n)
     total = np.zeros(len(lags))
@@ -247,8 +254,9 @@ def _correlations(theirs: Array, ours: Array) -> tuple[np.ndarray, Array]:
 
 def _best(lags: np.ndarray, scores: Array) -> float:
     """The smallest of the lags that are local maxima and nearly as good as the best, between samples."""
-    peaks = [i for i in range(len(lags)) if scores[i] == scores[max(i - 1, 0) : i + 2].max()]
-    best = min((i for i in peaks if scores[i] >= scores.max() - NEARLY), key=lambda i: abs(lags[i]))
+    higher = np.maximum(np.append(scores[1:], -np.inf), np.insert(scores[:-1], 0, -np.inf))
+    good = np.flatnonzero((scores >= higher) & (scores >= scores.max() - NEARLY))
+    best = int(good[np.abs(lags[good]).argmin()])
     inside = 0 < best < len(lags) - 1 and lags[best + 1] - lags[best - 1] == 2
     return float(lags[best] + (_vertex(*scores[best - 1 : best + 2]) if inside else 0.0))
 
@@ -267,8 +275,9 @@ def _drift(log: Measured, ours: Array, step_s: float) -> float:
 
 
 def _compared(
-    signal: str, unit: str, theirs: Array, ours: Array, periods: tuple[float, float], step_s: float, first: list[float]
+    signal: str, unit: str, theirs: Array, ours: Array, periods: tuple[float, float], step_s: float
 ) -> SignalAgreement:
+    """Compares one signal; its phase is not yet relative to the first signal's."""
     seen = np.isfinite(theirs)
     off = ours[seen] - theirs[seen]
     rms = float(np.sqrt((off**2).mean())) if off.size else np.nan
@@ -278,16 +287,11 @@ def _compared(
     phase = waveform = np.nan
     if np.isfinite(periods).all() and min(amplitude) > 0:
         times: Array = step_s * np.arange(len(ours), dtype=float)
-        turns = [
-            _fundamental(one[seen], times[seen], length) for one, length in zip((theirs, ours), periods, strict=True)
-        ]
-        here = float(np.angle(turns[1] / turns[0]) / (2.0 * np.pi))
-        first.append(here)
-        phase = (here - first[0] + 0.5) % 1.0 - 0.5
-        cycles = [
-            _mean_cycle(one[seen], times[seen], length) for one, length in zip((theirs, ours), periods, strict=True)
-        ]
-        waveform = max(_correlated(cycles[0], np.roll(cycles[1], shift)) for shift in range(len(cycles[1])))
+        pairs = [(one[seen], times[seen], length) for one, length in zip((theirs, ours), periods, strict=True)]
+        turns = [_fundamental(*pair) for pair in pairs]
+        phase = float(np.angle(turns[1] / turns[0]) / (2.0 * np.pi))
+        measured, simulated = (_mean_cycle(*pair) for pair in pairs)
+        waveform = max(_correlated(measured, np.roll(simulated, shift)) for shift in range(len(simulated)))
     relative = rms / amplitude[0] if amplitude[0] > 0 else np.nan
     return SignalAgreement(
         signal, unit, int(seen.sum()), rms, float(off.mean()) if off.size else np.nan, relative,
@@ -297,7 +301,7 @@ def _compared(
 
 def _fundamental(values: Array, time_s: Array, period_s: float) -> np.complex128:
     """The Fourier coefficient at one over the period."""
-    return np.mean((values - values.mean()) * np.exp(-2j * np.pi * time_s / period_s)) or np.complex128(1.0)
+    return np.mean((values - values.mean()) * np.exp(-2j * np.pi * time_s / period_s))
 
 
 def _mean_cycle(values: Array, time_s: Array, period_s: float, bins: int = 40) -> Array:

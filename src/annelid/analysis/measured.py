@@ -28,6 +28,7 @@ from annelid.simulation.runfile import Run
 from annelid.textfiles import read_toml
 
 if TYPE_CHECKING:
+    import h5py
     from pandas import DataFrame
 
 MOST_BYTES = 300_000_000
@@ -48,6 +49,8 @@ MOST_REPEATED = 0.05
 """Largest share of the instants that may be in a log twice."""
 
 Drift = Annotated[float, Field(ge=-0.2, le=0.2)]
+_NUMERIC = ("double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)))
+_FILTERS = {1, 2, 3}  # deflate, shuffle and checksums, which HDF5 has itself
 _UNIT = re.compile(r"[_ (\[]+([A-Za-z/%1]+)[)\]]?$")
 _REFERENCE = re.compile(r"^\s*(\w+)\s*(?:\[([^\[\]]*)\])?\s*$")
 
@@ -148,15 +151,15 @@ def read_measured(path: str | Path, log_map: LogMap) -> Measured:
     if (jitter := float(np.std(steps) / np.median(steps))) > 0.05:
         notes.append(f"samples are not evenly spaced ({100 * jitter:.0f} % of {np.median(steps):.3g} s)")
     for name, series in values.items():
-        spikes = outliers(series)
-        series[spikes] = np.nan
-        if spikes.any():
-            notes.append(f"{name}: {spikes.sum()} outliers left out")
         missing = float(np.isnan(series).mean())
         if missing > 0.5:
             raise UnreadableText(f"{name} in {path} has no number in {100 * missing:.0f} % of its rows")
         if missing:
             notes.append(f"{name}: {100 * missing:.1f} % missing")
+        spikes = outliers(series)
+        series[spikes] = np.nan
+        if spikes.any():
+            notes.append(f"{name}: {spikes.sum()} outliers left out")
         if np.ptp(series[~np.isnan(series)]) == 0.0:
             notes.append(f"{name} never changes: a sensor that was not connected?")
     kinds = {name: kind for name, (_, kind) in read.items()}
@@ -217,11 +220,7 @@ def run_series(run: Run, reference: str) -> tuple[Array, Array, str]:
             signal = signal.isel({dimension: sides[label][int(segment) - 1]})
         else:
             signal = signal.isel({dimension: known.index(label)})
-    return (
-        run.data["time"].values,
-        signal.values.astype(float),
-        str(signal.attrs.get("units", run.data[name].attrs["units"])),
-    )
+    return run.data["time"].values, signal.values.astype(float), str(run.data[name].attrs["units"])
 
 
 def _label(given: str, known: list[str], reference: str, what: str) -> str:
@@ -381,7 +380,7 @@ def _table(path: Path) -> DataFrame:
 
 
 def _text_table(path: Path) -> DataFrame:
-    """A table in text: the separator is the one that its lines have most evenly; a comma may stand for the point."""
+    """A table in text, separated by semicolons, tabs, commas or spaces; where it is no comma, one may be the point."""
     import pandas
 
     with path.open(encoding="utf-8-sig") as file:
@@ -409,18 +408,18 @@ def _text_table(path: Path) -> DataFrame:
         re.fullmatch(r"[-+\d.,eE]+", cell.strip()) for cell in first.split(None if separator == r"\s+" else separator)
     ):
         raise UnreadableText(f"{path} has no header: write the names of its columns into the first line")
-    header = first.rstrip("\r\n").split(separator) if separator != r"\s+" else first.split()
-    names = [name.strip().strip('"') for name in header]
-    table = pandas.read_csv(
-        path, header=0, names=names if len(names) == len(set(names)) else None, index_col=False, **options
-    )
-    if len(names) != len(set(names)):
+    table = pandas.read_csv(path, header=0, index_col=False, **options)
+    names = [name.strip().strip('"') for name in first.split(None if separator == r"\s+" else separator)]
+    if len(names) == len(table.columns):
+        # As they stand: pandas gives the second of two equal names a number.
         table.columns = names
     if "frame_idx" in table and "track" in table:
         # SLEAP: one row an instance and frame; frames without one are gaps.
         if table["track"].nunique(dropna=False) > 1:
             raise UnreadableText(f"{path} has {table['track'].nunique(dropna=False)} tracks: export one")
-        return table.set_index("frame_idx").reindex(range(int(table["frame_idx"].max()) + 1)).drop(columns="track")
+        last = int(table["frame_idx"].max())
+        _refuse_large(8 * (last + 1) * len(table.columns), path)
+        return table.set_index("frame_idx").reindex(range(last + 1)).drop(columns="track")
     return table
 
 
@@ -438,19 +437,22 @@ def _matlab(path: Path) -> DataFrame:
     from scipy.io import loadmat, whosmat
 
     try:
-        _refuse_large(sum(8 * prod(shape) for _, shape, _ in whosmat(path)), path)
-        found = loadmat(path, squeeze_me=True)
-    except NotImplementedError:
+        vectors = {name: shape for name, shape, kind in whosmat(path) if kind in _NUMERIC and max(shape) == prod(shape)}
+        _refuse_large(8 * sum(map(prod, vectors.values())), path)
+        found = loadmat(path, squeeze_me=True, variable_names=[*vectors])
+    except NotImplementedError:  # what SciPy says of version 7.3
         raise UnreadableText(f"cannot read {path}: it is of MATLAB's version 7.3, save it with -v7") from None
-    return pandas.DataFrame(_equally_long({name: v for name, v in found.items() if name[0] != "_"}, path))
+    return pandas.DataFrame(_equally_long({name: found[name] for name in vectors}, path))
 
 
 def _netcdf(path: Path) -> DataFrame:
+    import h5py
     import pandas
     import xarray
 
+    with h5py.File(path, "r") as file:
+        _check_hdf5(file, path)
     with xarray.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="sort") as opened:
-        _refuse_large(opened.nbytes, path)
         return pandas.DataFrame(_equally_long({str(name): v.values for name, v in opened.variables.items()}, path))
 
 
@@ -460,9 +462,9 @@ def _sleap(path: Path) -> DataFrame:
     import pandas
 
     with h5py.File(path, "r") as file:
+        _check_hdf5(file, path)
         if "tracks" not in file or "node_names" not in file:
             raise UnreadableText(f"{path} is no analysis file of SLEAP; export a DeepLabCut file as CSV")
-        _refuse_large(sum(getattr(file[name], "nbytes", 0) for name in ("tracks", "node_names")), path)
         places, names = np.asarray(file["tracks"], dtype=float), np.asarray(file["node_names"])
     if places.ndim != 4 or len(places) != 1:
         raise UnreadableText(f"{path} has {len(places)} tracks: export one")
@@ -470,6 +472,24 @@ def _sleap(path: Path) -> DataFrame:
     return pandas.DataFrame(
         {f"{node}.{axis}": places[0, j, i] for i, node in enumerate(nodes) for j, axis in enumerate("xy")}
     )
+
+
+def _check_hdf5(file: h5py.File, path: Path) -> None:
+    """Refuses variables that lie in other files, need code of others to unpack, or are too large in memory."""
+    from h5py import Dataset, HardLink
+    from h5py.h5d import VIRTUAL
+
+    n_bytes = 0
+    for name in file:
+        if type(file.get(name, getlink=True)) is not HardLink:
+            raise UnreadableText(f"cannot read {path}: {shown(name)} is a link to elsewhere")
+        if isinstance(part := file[name], Dataset):
+            made = part.id.get_create_plist()
+            filters = {made.get_filter(index)[0] for index in range(made.get_nfilters())}
+            if made.get_external_count() or made.get_layout() == VIRTUAL or not filters <= _FILTERS:
+                raise UnreadableText(f"cannot read {path}: {shown(name)} lies elsewhere, or is packed in a rare way")
+            n_bytes += part.nbytes
+    _refuse_large(n_bytes, path)
 
 
 def _refuse_large(n_bytes: int, path: Path) -> None:

@@ -145,11 +145,12 @@ def config_of(
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Raises `RunFileError` where an output file that an option names exists without --force, or cannot be written."""
+    """Raises `RunFileError` where an output file exists without --force, or cannot be written; an option names it."""
     if path.is_dir():
         raise RunFileError(f"{path} is a folder: name a file")
     if path.exists() and not force:
-        raise RunFileError(f"{path} exists: name another file with {option}, or replace it with --force")
+        named = f" with {option}" if option else ""
+        raise RunFileError(f"{path} exists: name another file{named}, or replace it with --force")
     # A device or a pipe is written as it is, a file by way of a draft beside it.
     written = path if path.exists() and not path.is_file() else path.parent
     if not written.exists():

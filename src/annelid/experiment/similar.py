@@ -17,19 +17,17 @@ from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig, check_section, load_config, toml_value
 from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus
-from annelid.plausibility import tolerance_window_m
+from annelid.plausibility import refuse_nonsense, tolerance_window_m
 
 BASE = "riddle2023-rods"
 """The preset that new worms are similar to."""
 LARGEST_ANGLE_RAD = pi / 6
 """Largest angle by which a strand may turn in one element."""
 LEAST_SHAPE, MOST_SHAPE = 1.2, 4.0
-"""Turn of a strand along one radius of the axis, rad, within which meshes are known to walk; the base's is 2.24."""
+"""Turn of a strand along one radius of the axis, rad, within which a length is accepted; the base's is 2.24."""
 CYCLES = 4
 """Cycles of the paper's network, 0.875 s a segment at the base's size, that a run lasts."""
 TURN_S = 0.875
-
-CLOCK = "steps of the clock, times: radius^0.5"
 
 Fields = dict[str, tuple[Any, str]]
 """Values by dotted path, each with the rule that it follows."""
@@ -47,22 +45,16 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     Raises:
         ConfigError: A number is out of its range, or with this length strands would lie along the body or the rings.
     """
-    asked: Fields = {
-        "body.mesh.n_segments": (n_segments, "as asked"),
-        "body.mesh.n_helices": (n_helices, "as asked"),
-        "body.mesh.radius_m": (radius_m, "as asked"),
-    }
     if length_m is not None:
         require_finite(length_m=length_m)
         require_positive(length_m=length_m)
     base = load_config(BASE)
     known, arena = base.body, base.arena
     assert isinstance(known, WormBody)
-    # Checked before anything is computed from them.
-    check_section(
-        Mesh, known.mesh.model_dump() | {path.rpartition(".")[2]: value for path, (value, _) in asked.items()}
-    )
     assert arena is not None
+    # Checked before anything is computed from them.
+    geometry = {"n_segments": n_segments, "n_helices": n_helices, "radius_m": radius_m}
+    check_section(Mesh, known.mesh.model_dump() | geometry)
     scale = radius_m / known.mesh.radius_m
     slower = sqrt(scale)
     planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m)
@@ -77,7 +69,7 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     impedance = [*arena.contact_impedance[:2], arena.contact_impedance[2] * scale]
     young_Pa, shear_Pa = strands.young_modulus_Pa * longer, strands.shear_modulus_Pa * longer
     of_length = "the length asked for" if length_m else "rhombi of the base's shape"
-    fields: Fields = asked | {
+    fields: Fields = {f"body.mesh.{name}": (value, "as asked") for name, value in geometry.items()} | {
         "body.mesh.angular_rate_rad_per_m": (rate, of_length),
         "body.mesh.elements_per_side": (elements, "a strand turns by 30 degrees in an element at most"),
         "body.mesh.planes_between_rings": (planes, "rhombi close to the base's shape"),
@@ -108,7 +100,11 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
         "arena.floor_gap_m": (arena.model_dump()["floor_gap_m"] * scale, "a length"),
     }
     weight = longer**3 * n_helices / known.mesh.n_helices * n_segments / known.mesh.n_segments
-    fields |= _times(base, n_segments, slower) | {
+    network, steps = base.controller.model_dump(), _steps(base, n_segments, slower)
+    fields |= steps | {
+        "controller.capacitance_nF": (network["capacitance_nF"] * slower, "a time constant: radius^0.5"),
+        "controller.gate_time_constant_ms": (network["gate_time_constant_ms"] * slower, "a time: radius^0.5"),
+        "sensor.startup_hold_s": (base.sensor.startup_hold_s * slower, "a time: radius^0.5"),
         "guard.kinetic_energy_J": (base.guard.kinetic_energy_J * weight * scale, "weight times length"),
         "guard.height_m": (base.guard.height_m * scale, "a length"),
         "guard.depth_m": (base.guard.depth_m * scale, "a length"),
@@ -125,17 +121,20 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
         raise ConfigError(f"n_helices = {n_helices}: neighbours lift a segment further than it lengthens; take more")
     fields["body.rings.peak_force_N"] = (force, "the base's share of what the mesh bears")
     fields["sensor.tolerance_m"] = ((low + high) / 2.0, f"middle of the window {1e3 * low:.2g} to {1e3 * high:.2g} mm")
-    return {path: (value if rule == CLOCK else _rounded(value), rule) for path, (value, rule) in fields.items()}
+    # Steps stay whole multiples of one another.
+    return {path: (_rounded(value), rule) for path, (value, rule) in fields.items()} | steps
 
 
 def worm_text(radius_m: float, n_segments: int = 3, n_helices: int = 12, length_m: float | None = None) -> str:
     """Returns `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
 
     Raises:
-        ConfigError: As `similar_worm`, or the engine refuses the body.
+        ConfigError: As `similar_worm`, or its run would be refused, by the checks or by the engine.
     """
     fields = similar_worm(radius_m, n_segments, n_helices, length_m)
-    compile_spec(build_spec(load_config(BASE, _values(fields))))
+    config = load_config(BASE, _values(fields))
+    refuse_nonsense(config)
+    compile_spec(build_spec(config))
     tables: dict[str, list[str]] = {"": []}
     for path, (value, rule) in fields.items():
         table, _, name = path.rpartition(".")
@@ -150,25 +149,19 @@ def worm_text(radius_m: float, n_segments: int = 3, n_helices: int = 12, length_
     return "\n\n".join(parts) + "\n"
 
 
-def _times(base: RunConfig, n_segments: int, slower: float) -> Fields:
-    """The network's, the clock's and the records' times."""
-    network, control_s = base.controller.model_dump(), float(f"{base.clock.control_timestep_s * slower:.2g}")
-    steps = round(base.clock.physics_timestep_s / base.clock.control_timestep_s)
-    physics_s, rule = steps * control_s, "a time constant: radius^0.5"
-    n_steps = ceil(CYCLES * n_segments * TURN_S * slower / physics_s)
-    times: Fields = {
-        "controller.capacitance_nF": (network["capacitance_nF"] * slower, rule),
-        "controller.gate_time_constant_ms": (network["gate_time_constant_ms"] * slower, rule),
-        "sensor.startup_hold_s": (base.sensor.startup_hold_s * slower, "a time: radius^0.5"),
+def _steps(base: RunConfig, n_segments: int, slower: float) -> Fields:
+    """The clock's steps, times as all others, and what is a multiple of them."""
+    control_s = float(f"{base.clock.control_timestep_s * slower:.2g}")
+    n_control = round(base.clock.physics_timestep_s / base.clock.control_timestep_s)
+    physics_s = n_control * control_s
+    n_physics = ceil(CYCLES * n_segments * TURN_S * slower / physics_s)
+    return {
+        "duration_s": (round(n_physics * physics_s, 9), f"{CYCLES} cycles"),
+        "clock.control_timestep_s": (control_s, "a time: radius^0.5"),
+        "clock.physics_timestep_s": (round(physics_s, 9), f"{n_control} steps of the network"),
+        "record.signals_interval_s": (round(physics_s, 9), "every step of the body"),
+        "record.frames_interval_s": (round(2 * physics_s, 9), "every other step of the body"),
     }
-    whole = {
-        "duration_s": n_steps * physics_s,
-        "clock.control_timestep_s": control_s,
-        "clock.physics_timestep_s": physics_s,
-        "record.signals_interval_s": physics_s,
-        "record.frames_interval_s": 2 * physics_s,
-    }
-    return times | {path: (round(value, 9), CLOCK) for path, value in whole.items()}
 
 
 def _planes_and_rate(

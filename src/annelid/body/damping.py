@@ -41,7 +41,7 @@ INERTANCE = 1e-3
 IMPEDANCE = 0.01
 STRAIGHT = 1e-9
 """Sine of the bend below which a vertex is straight; there the engine itself damps every direction."""
-_DAMPER = "_damper_"
+_DAMPER, _STIFFNESS = "_damper_", "_stiffness"
 _PER_ROW = 10
 _PER_RECORD = 10
 
@@ -58,7 +58,7 @@ def twist_name(rod: str, edge: int, n_edges: int) -> str:
 
 def shares_name(rod: str) -> str:
     """Name of the numbers in a model that say how stiff a rod is along itself."""
-    return f"{rod}_stiffness"
+    return f"{rod}{_STIFFNESS}"
 
 
 def rod_shares(model: mujoco.MjModel) -> Array:
@@ -70,9 +70,9 @@ def rod_shares(model: mujoco.MjModel) -> Array:
     shares = np.ones((2, model.nflex, int(model.flex_edgenum[0]) - 1))
     for number in range(model.nnumeric):
         one = model.numeric(number)
-        for rod in range(model.nflex):
-            if one.name == shares_name(model.flex(rod).name):
-                shares[:, rod] = one.data.reshape(2, -1)
+        rod = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX.value, one.name.removesuffix(_STIFFNESS))
+        if rod >= 0 and one.name.endswith(_STIFFNESS):
+            shares[:, rod] = one.data.reshape(2, -1)
     return shares
 
 

@@ -55,7 +55,7 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     # Checked before anything is computed from them.
     geometry = {"n_segments": n_segments, "n_helices": n_helices, "radius_m": radius_m}
     check_section(Mesh, known.mesh.model_dump() | geometry)
-    scale = radius_m / known.mesh.radius_m
+    scale = radius_m / known.mesh.one_number("radius_m")
     slower = sqrt(scale)
     planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m)
     turn = pi / (n_helices // 2)
@@ -67,7 +67,10 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     strands, pins, springs, rings = known.strands, known.pins, known.springs, known.rings
     ranges = [length * own.ring_length_m / shape.ring_length_m for length in rings.length_ranges(1)[0]]
     impedance = [*arena.contact_impedance[:2], arena.contact_impedance[2] * scale]
-    young_Pa, shear_Pa = strands.young_modulus_Pa * longer, strands.shear_modulus_Pa * longer
+    young_Pa, shear_Pa = (
+        strands.one_number("young_modulus_Pa") * longer,
+        strands.one_number("shear_modulus_Pa") * longer,
+    )
     of_length = "the length asked for" if length_m else "rhombi of the base's shape"
     fields: Fields = {f"body.mesh.{name}": (value, "as asked") for name, value in geometry.items()} | {
         "body.mesh.angular_rate_rad_per_m": (rate, of_length),
@@ -78,12 +81,15 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
         "body.strands.radius_m": (strands.radius_m * longer, "in proportion to the side of a rhombus"),
         "body.strands.young_modulus_Pa": (young_Pa, "side of a rhombus: as stiff for its weight as the base"),
         "body.strands.shear_modulus_Pa": (shear_Pa, "the base's ratio to Young's modulus"),
-        "body.strands.linear_density_kg_per_m": (strands.linear_density_kg_per_m * longer**2, "the base's density"),
+        "body.strands.linear_density_kg_per_m": (
+            strands.one_number("linear_density_kg_per_m") * longer**2,
+            "the base's density",
+        ),
         "body.strands.damping_time_s": ((strands.material_damping_s or 0.0) * slower, "a time: radius^0.5"),
-        "body.pins.mass_kg": (pins.mass_kg * longer**3, "the base's share of the weight"),
+        "body.pins.mass_kg": (pins.one_number("mass_kg") * longer**3, "the base's share of the weight"),
         "body.pins.radius_m": (pins.radius_m * scale, "a length"),
         "body.springs.stiffness_N_per_m": (
-            springs.stiffness_N_per_m * longer**2,
+            springs.one_number("stiffness_N_per_m") * longer**2,
             "strands' bending stiffness over side^3",
         ),
         "body.rings.length_range_m": (ranges, "the base's share of the ring at rest"),
@@ -169,7 +175,7 @@ def _planes_and_rate(
 ) -> tuple[int, float]:
     """Planes between rings, and turn of a strand along the axis, rad/m, that give a length."""
     mesh = known.mesh
-    shape, half = mesh.angular_rate_rad_per_m * mesh.radius_m, n_helices // 2
+    shape, half = mesh.angular_rate_rad_per_m * mesh.one_number("radius_m"), n_helices // 2
     if length_m is None:
         return mesh.planes_between_rings, shape / radius_m
 

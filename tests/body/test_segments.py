@@ -38,6 +38,8 @@ FIELDS = (
 )
 EVEN = {"body.mesh.rear_overhang_m": None, "body.mesh.elements_per_end": 1, "body.mesh.elements_per_side": 2}
 """A mesh whose rear is the image of its front."""
+WEAK = [0.0, 0.01, 0.0]
+"""Activation of the middle muscle by which it lengthens its segment by a third."""
 
 
 def body_of(config: RunConfig) -> WormBody:
@@ -57,7 +59,7 @@ def compiled(config: RunConfig) -> mujoco.MjModel:
 @pytest.mark.parametrize(("given", "problem"), [(2, "has 2 numbers for 3 segments: give a number, or 3"), (0, "list")])
 def test_a_list_of_another_length_is_refused_by_name(path: str, given: int, problem: str) -> None:
     with pytest.raises(ConfigError, match=f"{path} = .*{problem} numbers, one per segment|{path} = .*{problem}"):
-        load_config(RODS, {path: [0.1] * given})
+        load_config(RODS, {path: [1.0] * given})
 
 
 def test_a_bad_number_of_a_list_is_told_with_its_place() -> None:
@@ -187,32 +189,23 @@ def weightless() -> dict[str, Any]:
 
 
 def elongation(changes: dict[str, Any], activation: list[float]) -> np.ndarray:
-    """By how much every segment is longer after a second under a constant activation, m."""
+    """By how much every segment is longer after 0.6 s under a constant activation, m."""
     plant = WormPlant(load_config(RODS, changes))
     rest = plant.posture.stretch.mean(axis=1)
-    for _ in range(1000):
+    for _ in range(600):
         plant.step(np.array(activation))
     return plant.posture.stretch.mean(axis=1) - rest
 
 
 @pytest.mark.parametrize(
-    "path_and_numbers",
-    [
-        ("body.springs.stiffness_N_per_m", [20.0, 60.0, 20.0]),
-        ("body.strands.young_modulus_Pa", [3e8, 9e8, 3e8]),
-        ("body.rings.peak_force_N", [117.57, 20.0, 117.57]),
-    ],
+    ("path", "numbers"),
+    [("body.springs.stiffness_N_per_m", [19.9, 60.0, 19.9]), ("body.strands.young_modulus_Pa", [3e8, 9e8, 3e8])],
 )
-def test_a_stiffer_or_weaker_segment_elongates_less(
-    weightless: dict[str, Any], path_and_numbers: tuple[str, list[float]]
-) -> None:
-    path, numbers = path_and_numbers
-    alone = [0.0, 1.0, 0.0]
-    even, odd = elongation(weightless, alone), elongation({**weightless, path: numbers}, alone)
-    assert 0.0 < odd[1] < 0.97 * even[1]
-    # The same in front, where the segment is as it was, hardly matters.
-    front = [1.0, 0.0, 0.0]
-    assert elongation({**weightless, path: numbers}, front)[0] > 0.9 * elongation(weightless, front)[0]
+def test_a_stiffer_segment_elongates_less(weightless: dict[str, Any], path: str, numbers: list[float]) -> None:
+    """Under a weak muscle: one that closes its ring whatever it takes draws more of a stiffer mesh along."""
+    even = elongation(weightless, WEAK)
+    odd = elongation({**weightless, path: numbers}, WEAK)
+    assert 0.0 < odd[1] < 0.8 * even[1]
 
 
 def test_a_reversed_worm_moves_as_the_mirror_image(weightless: dict[str, Any]) -> None:
@@ -227,17 +220,16 @@ def test_a_reversed_worm_moves_as_the_mirror_image(weightless: dict[str, Any]) -
     there = elongation({**weightless, **lists}, [0.7, 0.2, 0.0])
     back = elongation({**weightless, **{path: value[::-1] for path, value in lists.items()}}, [0.0, 0.2, 0.7])
     assert np.abs(there).max() > 0.02
-    assert back[::-1] == pytest.approx(there, rel=1e-3, abs=1e-5)
+    assert back[::-1] == pytest.approx(there, abs=1e-3 * there.max())
 
 
-def test_a_stiffer_left_side_bends_the_worm(weightless: dict[str, Any]) -> None:
-    """Strands one by one: all alike is the worm without the list, and twice the number is twice the modulus."""
-    activation = [1.0, 0.0, 0.0]
-    doubled = elongation({**weightless, "body.strands.relative_stiffness": [2.0] * 12}, activation)
+def test_strands_are_stiffened_one_by_one(weightless: dict[str, Any]) -> None:
+    """Twice the number for all is twice the modulus; one strand of twelve counts for less."""
+    doubled = elongation({**weightless, "body.strands.relative_stiffness": [2.0] * 12}, WEAK)
     moduli = {"body.strands.young_modulus_Pa": 6e8, "body.strands.shear_modulus_Pa": 4e8}
-    assert doubled == pytest.approx(elongation({**weightless, **moduli}, activation), rel=1e-6)
-    one = elongation({**weightless, "body.strands.relative_stiffness": [5.0] + [1.0] * 11}, activation)
-    assert doubled[0] < one[0] < elongation(weightless, activation)[0]
+    assert doubled == pytest.approx(elongation({**weightless, **moduli}, WEAK), rel=1e-6)
+    one = elongation({**weightless, "body.strands.relative_stiffness": [2.0] + [1.0] * 11}, WEAK)
+    assert doubled[1] < one[1] < elongation(weightless, WEAK)[1]
 
 
 def test_a_batch_of_tapering_worms_is_their_single_runs(tmp_path: Path) -> None:

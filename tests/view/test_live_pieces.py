@@ -340,3 +340,10 @@ def test_the_live_diagram_is_of_the_network_that_is_stepped(preset: str) -> None
     assert network is not None
     assert list(network.neurons) == neurons
     assert network_of(worm.config, ["another"]) is None
+
+
+def test_a_field_with_a_number_per_segment_has_no_slider() -> None:
+    lists = {"body.strands.young_modulus_Pa": [3e8, 6e8, 3e8], "body.springs.stiffness_N_per_m": [20.0, 30.0, 20.0]}
+    fields = {knob.field for knob in knobs_of(load_config("riddle2023-rods", lists))}
+    assert "arena.friction" in fields
+    assert not fields & lists.keys()

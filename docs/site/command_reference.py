@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-WIDTH = 100
+WIDTH = 92
 
 
 def page() -> str:

@@ -86,7 +86,7 @@ def _draw_marks(axes: Axes, config: RunConfig) -> None:
                 axes.axhline(side * rail_gap_m, color=WALL, linewidth=2.0)
     goals = _goals(config)
     for number, point in enumerate(goals.points_m, start=1):
-        label = "_" * (number > 1) + "waypoint, reached within"
+        label = "_" * (number > 1) + "waypoint, reached within the circle"
         axes.add_patch(Circle(point, goals.reach_m, fill=False, color="0.6", linestyle=":", label=label))
         axes.annotate(str(number), point, fontsize=8, color="0.3", ha="center", va="center")
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-WIDTH = 100
+WIDTH = 92
 
 
 def page() -> str:
@@ -15,7 +15,7 @@ def page() -> str:
 
     from annelid.cli import app
 
-    lines = ["# Commands", "", "What `annelid COMMAND --help` prints, for every command."]
+    lines = ["# Commands", "", "This page lists all commands, as `annelid COMMAND --help` describes them."]
     for words, text in _helps(get_command(app), ("annelid",)):
         depth = 2 if len(words) < 3 else 3
         lines += ["", f"{'#' * depth} {' '.join(words)}", "", "```text", text.rstrip(), "```"]

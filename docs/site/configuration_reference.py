@@ -17,13 +17,13 @@ from annelid.config.checking import sections_in
 
 INTRODUCTION = """# Configuration
 
-Every field of a configuration. Its path is the section's and its name, as `--set body.mesh.radius_m=0.14`, a TOML file
-and `annelid.load_config(preset, {"body.mesh.radius_m": 0.14})` take it. The unit at the end of a name may be left out
-(`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
+This page lists every field of a configuration. Set a field by its path, which is the section and the name of the field:
+`--set body.mesh.radius_m=0.14`, or `annelid.load_config(preset, {"body.mesh.radius_m": 0.14})`, or in a TOML file. You
+may leave out the unit at the end of a name (`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
 
-The defaults are those of the models. A preset, with those that it extends, states every field; its values are others:
+The defaults below are those of a configuration without a preset. A preset has its own values:
 `annelid presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
-fields it has, and a section whose kind changes starts from that kind's defaults.
+fields it has. If you change the kind, the section starts from the defaults of the new kind.
 """
 LARGEST = 1e15
 """Bound of numbers that have none by their nature; not worth telling."""
@@ -105,7 +105,8 @@ def _limit(mark: Any) -> str:
     for kind, words, name in ((Gt, ">", "gt"), (Ge, "≥", "ge"), (Lt, "<", "lt"), (Le, "≤", "le")):
         if isinstance(mark, kind):
             value = getattr(mark, name)
-            return "" if value == LARGEST else f"{words} {value:g}"
+            # Neither a sign nor an exponent stands on a line of its own.
+            return "" if value == LARGEST else f"{words}\u00a0{value:g}".replace("-", "\u2011")
     assert not isinstance(mark, MinLen) or mark.min_length
     return ""
 

@@ -17,8 +17,8 @@ def page(folder: Path) -> str:
     lines = [
         "# Examples",
         "",
-        "Short programs in the folder `examples` of the repository, each under 60 lines and run by the tests. Copy one",
-        "and change it.",
+        "This page shows short programs that you can copy and change. They are in the folder `examples` of the",
+        "repository, each under 60 lines, and the tests run them.",
         "",
         "| example | what it is for |",
         "|---|---|",

@@ -27,13 +27,13 @@ WITH_ALL_SIGNALS = {
 """What kinds of controllers must be told before they record all that they can."""
 INTRODUCTION = """# The run file
 
-`run.nc` is netCDF-4. `annelid.open_run(path)` opens it, cut to what was written and with its configuration; any
-program that reads netCDF opens it too. [How to read a run](../how_to/read_a_run.md) shows both;
+This page lists all variables of a run file, `run.nc`, which is netCDF-4. [How to read a run](../how_to/read_a_run.md)
+shows how to open it, with `annelid.open_run` or with any program that reads netCDF.
 [Data out](../data_out.md#the-run-file) says at which instant each value is taken.
 
-Every variable carries `units` and `long_name`, from which these tables are made. Signals are recorded every
-`record.signals_interval_s` at the times `time` (s), whole postures every `record.frames_interval_s` at `frame_time`
-(s). `stretch_rest_length` (segment, sensor; m) has the stretch sensors' lengths at rest.
+Every variable has the attributes `units` and `long_name`. Signals are recorded at the times `time` (s), every
+`record.signals_interval_s`; postures at `frame_time` (s), every `record.frames_interval_s`. `stretch_rest_length`
+(segment, sensor; m) has the lengths of the stretch sensors at rest.
 """
 
 
@@ -49,14 +49,14 @@ def page() -> str:
         signals.setdefault(signal.name, signal)
         controllers.setdefault(signal.name, []).append(who)
     loop = {signal.name: signal for signal in loop_signals(3).signals}
-    lines = [INTRODUCTION, "## Every run", *_table(loop, {})]
-    lines += ["", "## Of bodies", *_table({name: signals[name] for name in bodies}, bodies, len(BODIES))]
-    lines += ["", "## Of controllers", *_table({name: signals[name] for name in controllers}, controllers)]
+    lines = [INTRODUCTION, "## In every run", *_table(loop, {})]
+    lines += ["", "## Recorded by the body", *_table({name: signals[name] for name in bodies}, bodies, len(BODIES))]
+    lines += ["", "## Recorded by the controller", *_table({name: signals[name] for name in controllers}, controllers)]
     return "\n".join(lines) + "\n"
 
 
 def _table(signals: dict[str, Signal], who: dict[str, list[str]], everyone: int = 0) -> list[str]:
-    last = " of |" if who else ""
+    last = " recorded by |" if who else ""
     lines = ["", f"| variable | dimensions | unit | what it is |{last}", f"|---|---|---|---|{'---|' if who else ''}"]
     for name, signal in signals.items():
         dims = ", ".join(("frame" if signal.every_frame else "time", *signal.dims))

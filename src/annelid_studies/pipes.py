@@ -192,7 +192,7 @@ def _draw_pipe(rows: Sequence[Axes], pipe: str, courses: Mapping[str, Course]) -
     speed, drive, ring = rows
     panel_title(speed, f"{pipe}: speed of the middle (cm/s)")
     panel_title(drive, "drive of the descending neuron")
-    panel_title(ring, "foremost ring (cm); grey: the bore")
+    panel_title(ring, "perimeter of the foremost ring (cm); grey: bore")
     for look, (name, one) in zip(line_looks(3), courses.items(), strict=False):
         lines = (CM * one.speed_m_per_s, one.drive, CM * one.first_ring_m)
         for axes, values in zip(rows, lines, strict=True):
@@ -202,7 +202,7 @@ def _draw_pipe(rows: Sequence[Axes], pipe: str, courses: Mapping[str, Course]) -
     # The ring is the hexagon of six crossings that lie in the bore.
     bore_cm = CM * 6.0 * farthest.bore_m[order]
     ring.plot(farthest.front_m[order], bore_cm, color="0.65", linewidth=2.2, zorder=1)
-    ring.set_xlabel("foremost ring along the pipe (m)")
+    ring.set_xlabel("place of the foremost ring along the pipe (m)")
     drive.set_ylim(-0.05, 1.05)
 
 

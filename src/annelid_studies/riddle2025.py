@@ -239,13 +239,15 @@ def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:
         _draw(bends, [one for one in whole if one.ground == "bend"], "radius_m")
         for one in [one for one in whole if one.ground == "straight pipe" and one.gait == "3x1"]:
             bends.axhline(CM * one.speed_m_per_s, color="0.3", linestyle=(0, (4, 3)), label="3x1, straight pipe")
-        bends.axhspan(*(CM * speed for speed in AXIS_M_PER_S), color="0.9", zorder=0, label="the authors' axis")
-        bends.axhline(CM * STRAIGHT_LABEL_M_PER_S, color="0.6", linestyle="dotted", label="their label: straight pipe")
+        bends.axhspan(*(CM * speed for speed in AXIS_M_PER_S), color="0.9", zorder=0, label="range of published axis")
+        bends.axhline(CM * STRAIGHT_LABEL_M_PER_S, color="0.6", linestyle="dotted", label="published: straight pipe")
         for height, gait in ((0.97, "3x1"), (0.92, "3x1, touch")):
             least = SMALLEST_DRAWN_M[gait]
             line = bends.get_xaxis_transform()
             bends.plot([least, 1.3], [height, height], color="0.4", linewidth=2.0, transform=line)
-            bends.text(least - 0.02, height, f"they draw {gait}", transform=line, ha="right", va="center", fontsize=6.0)
+            bends.text(
+                least - 0.02, height, f"published: {gait}", transform=line, ha="right", va="center", fontsize=6.0
+            )
         flat.set_xlabel("friction of the ground")
         bends.set_xlabel("radius of the centre line (m)")
         # Room for the legend.

@@ -221,7 +221,7 @@ def detector_figure(detections: Mapping[str, Detection], stem: Path) -> Path:
         curves = {name: (recall[known := np.isfinite(of)], of[known]) for name, (recall, of) in found.items()}
         draw_lines(axes, curves, markers=False, linewidth=1.1)
         chosen: dict[str, Any] = {"marker": "o", "markersize": 7, "color": "black", "linestyle": "none"}
-        axes.plot(together.recall, together.precision, label="all runs, as it is set", **chosen)
+        axes.plot(together.recall, together.precision, label="all runs, default threshold", **chosen)
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="recall", ylabel="precision")
         axes.legend(loc="lower left")
         return save_both(figure, stem)

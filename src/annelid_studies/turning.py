@@ -12,7 +12,7 @@ import numpy as np
 from rich.table import Table as TerminalTable
 
 from annelid.analysis import Track, track_of, turn_of
-from annelid.draw import canvas, draw_lines, panel_title, save_both, segment_colors
+from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
@@ -142,15 +142,14 @@ def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: 
         radius.set(ylabel="radius (m)", xlabel="modulation", yscale="log")
         radius.set_ylim(top=LARGEST_RADIUS_M)
         from_above = figure.add_subplot(grid[:, 1])
-        for (modulation, track), color in zip(sorted(of_shown.items()), segment_colors(len(of_shown)), strict=True):
+        for (modulation, track), look in zip(sorted(of_shown.items()), line_looks(len(of_shown)), strict=True):
             start = track.middle_m[0]
-            from_above.plot(*(track.middle_m - start).T, color=color, linewidth=1.4)
-            from_above.plot(*(track.outline_m(-1) - start).T, color=color, linewidth=0.6)
-            x, y = track.front_m[-1] - start
-            from_above.annotate(f"{modulation:g}", (x, y), color=color, fontsize=7, ha="center", va="center")
+            from_above.plot(*(track.middle_m - start).T, **look, linewidth=1.4, label=f"{modulation:g}")
+            from_above.plot(*(track.outline_m(-1) - start).T, **look, linewidth=0.6)
         from_above.set_aspect("equal")
         from_above.set(xlabel="x (m)", ylabel="y (m)")
-        panel_title(from_above, f"Tracks: {shown}")
+        from_above.legend(title="modulation", loc="upper left", ncols=2)
+        panel_title(from_above, f"Tracks, outlines at the end: {shown}")
         handles, labels = curvature.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         return save_both(figure, stem)

@@ -18,7 +18,7 @@ from annelid.cli.gallery import cases, makers, pictures
 from fill_tables import MARKED
 
 GALLERY = "docs/gallery.md"
-SHOWN = re.compile(r"!\[[^\]]*\]\((?:docs/)?images/([^)]+)\)")
+SHOWN = re.compile(r"""(?:!\[[^\]]*\]\(|(?:src|poster)=")(?:docs/)?images/([^)"]+)[)"]""")
 
 
 def words_of(command: str) -> Command:

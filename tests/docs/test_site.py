@@ -88,7 +88,7 @@ def test_the_reference_has_every_variable_of_a_run(tmp_path: Path) -> None:
     data = annelid.simulate(config, tmp_path, progress=False).data
     page = run_file_reference.page()
     assert [name for name in data.data_vars if f"`{name}`" not in page] == []
-    of_bodies = re.findall(r"^\| `(\w+)` \|", page.split("## Of bodies")[1].split("\n## ")[0], re.MULTILINE)
+    of_bodies = re.findall(r"^\| `(\w+)` \|", page.split("## Recorded by the body")[1].split("\n## ")[0], re.MULTILINE)
     assert "pin_gap" in of_bodies
 
 

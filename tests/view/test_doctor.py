@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import ctypes
 import sys
 
 import pytest
@@ -26,3 +27,16 @@ def test_a_back_end_of_the_users_that_fails_is_to_be_unset(monkeypatch: pytest.M
     monkeypatch.setattr(gl, "works", lambda backend: False)
     monkeypatch.setattr(doctor, "works", lambda backend: False)
     assert "unset MUJOCO_GL" in finding("frames and videos")
+
+
+def test_an_engine_that_cannot_be_imported_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Broken:
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == "mujoco":
+                raise ctypes.ArgumentError("argument 1: no attribute 'glGetError'")
+
+    monkeypatch.delitem(sys.modules, "mujoco", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
+    line = finding("mujoco")
+    assert line.startswith("missing")
+    assert line.endswith("no attribute 'glGetError': unset MUJOCO_GL")

@@ -34,7 +34,7 @@ def test_without_a_back_end_the_sentence_names_the_install_line(
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.setattr(gl, "works", lambda backend: False)
     monkeypatch.setattr(gl.platform, "system", lambda: "Linux")
-    with pytest.raises(RenderingUnavailable, match="apt install libosmesa6"):
+    with pytest.raises(RenderingUnavailable, match="apt install libegl1"):
         render_frame(rods_run, 0.1, picture)
     assert not picture.exists()
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 QUICK_MINUTES = 3.0
 """Pictures that take longer are made only if they are named, or with --all."""
 TILE_PX, TILE_COLUMNS = (560, 350), 4
+PAGE_VIDEO_PX = (640, 400)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +128,7 @@ def _listing() -> Table:
 
 def cases(picture: Picture) -> Mapping[str, Case]:
     """Returns the runs that a picture is drawn from: one, or that in every arena by the arena's name."""
-    if picture.maker not in ("frame", "figure7", "track", "arenas"):
+    if picture.maker not in ("frame", "figure7", "track", "video", "arenas"):
         return {}
     from typer.main import get_command
 
@@ -145,13 +146,15 @@ def cases(picture: Picture) -> Mapping[str, Case]:
 
 def _of_run(job: Job) -> Path:
     from annelid.draw import RUN_FIGURES
-    from annelid.draw.render import render_frame
+    from annelid.draw.render import render_frame, render_video
 
     one, path = job.picture, job.stem.with_suffix(".png")
     (case,) = cases(one).values()
     run = job.store.run(case)
     if one.maker == "frame":
         return render_frame(run, one.time_s, path, camera=one.camera)
+    if one.maker == "video":
+        return render_video(run, path.with_suffix(".mp4"), fps=15.0, size=PAGE_VIDEO_PX)
     return RUN_FIGURES.find(one.maker)(run, path)
 
 
@@ -258,7 +261,7 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
     from annelid_studies.challenge import ranking, report
 
     return {
-        **dict.fromkeys(("frame", "figure7", "track"), _of_run),
+        **dict.fromkeys(("frame", "figure7", "track", "video"), _of_run),
         "arenas": _arenas,
         "sweep": _sweep,
         "command": _command,

@@ -180,7 +180,7 @@ def plot(
     ] = "figure7",
     force: Force = False,
 ) -> None:
-    """Draw potentials and lengths over time, the track, or the network.
+    """Draw potentials and lengths, the track, or the network.
 
     The counterpart of the paper's figure 7; or where the worm crawled: the paths of its middle and of its front, its
     outline at several times, and what stood in the way; or the network of its controller, with a key.
@@ -279,7 +279,7 @@ def view_command(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Watch a worm in the browser while it runs, turn its knobs and poke it; or play a run.
+    """Watch a worm in the browser as it runs, or play a run.
 
     Shows the mesh, ring muscles coloured by activation, springs by strain, the forces of the ground, and the neurons
     of the last five seconds. Sliders change friction, stiffness, sensors and drive of the running worm; a click

@@ -203,10 +203,10 @@ def robustness_command(
     cluster: ClusterName = None,
     quiet: OnlyPaths = False,
 ) -> None:
-    """Compare how often controllers walk over a designed sample of worms.
+    """Compare how often controllers make different worms walk.
 
-    The sample varies sensor noise, friction, physics step, number of segments and stiffness. Every point is walked
-    by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
+    The designed sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is
+    driven by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
     tolerance that its body needs), sns-robust, and timed (a wave without sensing). Writes robustness.json and
     robustness.md after every run, and keeps runs, so that a second call goes on where the first was stopped. All 300
     points take about 25 hours of one core for each controller.
@@ -273,7 +273,7 @@ def challenge_command(
     cluster: ClusterName = None,
     quiet: Quiet = False,
 ) -> None:
-    """Rank controllers in the benchmark of soft peristaltic locomotion.
+    """Rank controllers in a benchmark of crawling.
 
     Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
     always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 % intervals by
@@ -329,7 +329,9 @@ def sweep_command(
     example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Vary fields over a grid or in samples, on this machine or on a cluster.
+    """Vary fields over a grid or in samples.
+
+    Runs are computed on this machine or on a cluster.
 
     A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
     ranges, in every combination or as random, Latin hypercube or Sobol samples.

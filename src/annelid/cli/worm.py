@@ -38,10 +38,11 @@ def new(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Write a worm of your own size, every coupled number with its rule.
+    """Write the configuration of a worm of your own size.
 
     Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as the paper's
-    robot of rods does. Replace what you can measure. A geometry that cannot work is refused here.
+    robot of rods does; the file states the rule of each. Replace what you can measure. A geometry that cannot work is
+    refused here.
 
     \b
     annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4
@@ -64,7 +65,7 @@ def check(
     fidelity: FidelityLevel = None,
     arena: ArenaName = None,
 ) -> None:
-    """Compare the numbers of a 3D worm with one another, before anything is computed.
+    """Check, before a run, whether the numbers of a 3D worm fit.
 
     Lengths against the ring at rest, forces against what the mesh bears, the step against stiffness, the sensors'
     tolerance against the mesh. A finding says what is wrong and what to set instead. With an error a run can mean
@@ -115,9 +116,10 @@ def presets(
     name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
 ) -> None:
-    """List the presets, or print one: every field with its source, and the preset that it is inherited from.
+    """List the presets, or print one with all its fields.
 
-    What it prints is a start for a file of your own. Of a file that extends a preset it prints the whole worm, too.
+    Each field has its source, and the preset that it is inherited from. What the command prints is a start for a file
+    of your own. Of a file that extends a preset it prints the whole worm, too.
 
     \b
     annelid presets
@@ -148,7 +150,7 @@ def presets(
 def arenas(
     name: Annotated[str | None, typer.Argument(help="Print this arena's commented TOML.")] = None,
 ) -> None:
-    """List the arenas that a 3D worm can be put into, or print one.
+    """List the arenas for a 3D worm, or print one.
 
     What it prints is a start for a file of your own; any field can be set with --set.
 

@@ -68,7 +68,7 @@ def _engine() -> Finding:
         return Finding("mujoco", False, mixed, REMEDY)
     try:
         import mujoco
-    except (ImportError, RuntimeError) as error:
+    except Exception as error:  # A back-end that MUJOCO_GL names fails in as many ways as there are libraries.
         remedy = remedy if isinstance(error, ImportError) else UNSET
         return Finding("mujoco", False, str(error).splitlines()[0], remedy)
     found = tuple(int(part) for part in mujoco.__version__.split(".")[:3] if part.isdigit())

@@ -25,8 +25,8 @@ from annelid.errors import RenderingUnavailable
 if TYPE_CHECKING:
     import mujoco
 
-INSTALL_LINE = "apt install libosmesa6"
-"""What installs a back-end that needs neither a graphics card nor a screen (Debian, Ubuntu)."""
+INSTALL_LINE = "apt install libegl1 libgl1 libgl1-mesa-dri"
+"""What installs a back-end that needs neither a graphics card nor a screen; newer Debian has no OSMesa."""
 UNSET = "unset MUJOCO_GL"
 _OFF = {"disable", "disabled", "off", "false", "0"}
 _DEFAULT = {"", "enable", "enabled", "on", "true", "1"}

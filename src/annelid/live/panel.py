@@ -217,7 +217,7 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
     """Returns the legend; the arrow of this contact force is as long as the worm's radius at rest."""
     percent = f"{100 * SPRING_RANGE:.0f}&thinsp;%"
     rows = (
-        (_bar(STRAND_COLORS, smooth=False), "strands, one colour for either handedness"),
+        (_bar(STRAND_COLORS, smooth=False), "strands: dark and light blue wind in opposite directions"),
         (_bar((RELAXED, CONTRACTED)), "ring muscles, activation 0 to 1"),
         (_bar(SPRING_COLORS), f"axial springs, {percent} shorter to {percent} longer than at rest"),
         (

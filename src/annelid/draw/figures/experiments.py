@@ -104,7 +104,7 @@ class Panel:
     """One panel of values side by side, ``(k,)``; None where there is none or where an error is not known."""
 
     title: str  # what they are, with their unit
-    ticks: Sequence[str]  # what stands below each
+    ticks: Sequence[str]  # the segment of each, empty if it is of the whole worm
     values: Sequence[float | None]
     errors: Mapping[str, Sequence[float | None]]  # by kind, innermost first, at most three
 
@@ -138,7 +138,7 @@ def _draw(axes: Axes, panel: Panel) -> None:
         below = end
     axes.plot(places, values, "_", color="0.1", markersize=16.0, markeredgewidth=1.6, label="this run")
     panel_title(axes, panel.title)
-    axes.set_xticks(places, panel.ticks)
+    axes.set_xticks(places, [f"segment {tick}" if tick else "" for tick in panel.ticks])
     axes.set_xlim(-0.6, len(values) - 0.4)
     axes.grid(axis="x", visible=False)
     # Differences far below the values stay small.

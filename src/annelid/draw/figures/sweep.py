@@ -54,6 +54,8 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
                     axes.set_ylabel("")
         for axes in panels[len(numbers) :]:
             axes.set_visible(False)
+        if any(data[name].isnull().any() for name in numbers):
+            figure.supxlabel("×: the run has no such number", fontsize=7.5)
         return save_both(figure, stem)
 
 

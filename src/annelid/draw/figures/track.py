@@ -49,7 +49,7 @@ def track_figure(run: Run, path: str | Path) -> Path:
         _draw_track(axes, track)
         _draw_marks(axes, run.config)
         panel_title(axes, f"{run.config.name}: track of {track.time_s[-1]:g} s, seen from above")
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=4)
         return save(figure, path)
 
 
@@ -79,14 +79,15 @@ def _draw_marks(axes: Axes, config: RunConfig) -> None:
 
     if config.arena is not None:
         rail_gap_m, posts = config.arena.walls
-        for x, y, radius in posts:
-            axes.add_patch(Circle((x, y), radius, facecolor=WALL, edgecolor="none"))
+        for number, (x, y, radius) in enumerate(posts):
+            axes.add_patch(Circle((x, y), radius, facecolor=WALL, edgecolor="none", label="_" * (number > 0) + "post"))
         if rail_gap_m is not None:
             for side in (-0.5, 0.5):
                 axes.axhline(side * rail_gap_m, color=WALL, linewidth=2.0)
     goals = _goals(config)
     for number, point in enumerate(goals.points_m, start=1):
-        axes.add_patch(Circle(point, goals.reach_m, fill=False, color="0.6", linestyle=":"))
+        label = "_" * (number > 1) + "waypoint, reached within the circle"
+        axes.add_patch(Circle(point, goals.reach_m, fill=False, color="0.6", linestyle=":", label=label))
         axes.annotate(str(number), point, fontsize=8, color="0.3", ha="center", va="center")
 
 

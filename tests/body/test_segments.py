@@ -80,6 +80,7 @@ def test_equal_numbers_make_the_model_of_the_one_number_bit_for_bit(preset: str)
     one = load_config(preset)
     n = one.body.n_segments
     lists = {path: [value] * n for path in FIELDS if (value := field_value(one, path)) is not None}
+    lists["body.relative_friction"] = [1.0] * n
     first, second = compiled(one), compiled(load_config(preset, lists))
     for name in dir(first):
         if isinstance(array := getattr(first, name), np.ndarray):

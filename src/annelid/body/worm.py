@@ -340,8 +340,8 @@ class WormBody(BodyKind):
         of_strands, n_strands = self.strands.relative_stiffness, mesh.n_helices
         if of_strands is not None and len(of_strands) != n_strands:
             raise ValueError(
-                f"body.strands.relative_stiffness has {len(of_strands)} numbers for {n_strands} strands: give "
-                f"{n_strands} numbers, one per strand, or 'none'"
+                f"body.strands.relative_stiffness = {shown(list(of_strands))} has {len(of_strands)} numbers for "
+                f"{n_strands} strands: give {n_strands} numbers, one per strand, or 'none'"
             )
         self.formulation.check_body(self)
         if self.strands.radius_m >= min(mesh.radii_m):

@@ -137,7 +137,7 @@ def _steps(config: RunConfig, body: WormBody) -> Iterator[Finding]:
     rise = arena.slope_rad * cos(radians(body.heading_deg))
     backward = rise > 1e-9 and arena.backward_friction is not None
     field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-    steepness, relative = tan(abs(arena.slope_rad)), fmean(body.of_each("relative_friction", body.n_segments))
+    steepness, relative = tan(abs(arena.slope_rad)), fmean(body.relative_frictions)
     if steepness >= relative * (friction or 0.0):
         problem = f"with arena.{field} = {friction:g} the worm slides down"
         slope_deg = round(degrees(arena.slope_rad), 9)
@@ -162,7 +162,7 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         return None
-    if len(body.groups()) > 1 or body.strands.relative_stiffness is not None or body.relative_friction != 1.0:
+    if len(body.groups()) > 1 or body.strands.relative_stiffness is not None or body.relative_friction is not None:
         return None
     damping_s, rings, rate = body.strands.material_damping_s, body.rings, body.springs.one_number("stiffness_N_per_m")
     whole = body.formulation.has_rigid_crossings and rings.muscle is not None and rings.layout == "whole"

@@ -71,7 +71,10 @@ class Looked:
             {"ring_length_m": np.array([0.96, 0.023, 0.96])},
             "ring 2 is 0.023 m long, below the limit guard.ring_closure",
         ),
-        ({"spring_length_m": np.array([0.0748, 0.25])}, "spring is 0.25 m long, above the limit guard.stretch"),
+        (
+            {"spring_length_m": np.append(np.full(41, 0.0748), 0.25)},
+            "spring is 0.25 m long, above the limit guard.stretch",
+        ),
         ({"depth_m": 0.06}, "0.06 m deep in the ground, above the limit guard.depth_m = 0.05"),
     ],
 )
@@ -84,7 +87,7 @@ def test_what_strands_cannot_do_stops_a_run(shown: dict[str, Any], words: str) -
 def test_a_limit_is_the_users() -> None:
     assert Looked(changes={"guard.depth_m": 0.1}).at(0.1, depth_m=0.06) is None
     assert Looked(changes={"guard.ring_closure": 0.0}).at(0.1, ring_length_m=np.full(3, 1e-4)) is None
-    assert Looked(changes={"guard.stretch": 2.0}).at(0.1, spring_length_m=np.full(3, 0.25)) is None
+    assert Looked(changes={"guard.stretch": 2.0}).at(0.1, spring_length_m=np.full(42, 0.25)) is None
 
 
 @pytest.mark.parametrize(

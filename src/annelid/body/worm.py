@@ -227,10 +227,10 @@ class WormBody(BodyKind):
         description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
         "(90: towards -y)",
     )
-    relative_friction: PerSegmentOf[RelativeFriction] = Field(
-        default=1.0,
+    relative_friction: PerSegmentOf[RelativeFriction] | None = Field(
+        default=None,
         description="friction of the skin over that of the arena, one number for all or one per segment: for the skin "
-        "nearest to its ring, midway between two rings the mean",
+        "nearest to its ring, midway between two rings the mean (not set: 1)",
     )
     mesh: Mesh = Mesh()
     strands: Strands = Strands()
@@ -258,6 +258,12 @@ class WormBody(BodyKind):
     def n_segments(self) -> int:
         """Number of actuated segments."""
         return self.mesh.n_segments
+
+    @property
+    def relative_frictions(self) -> list[float]:
+        """Friction of every segment's skin over that of the arena."""
+        given = self.relative_friction is not None
+        return self.of_each("relative_friction", self.n_segments) if given else [1.0] * self.n_segments
 
     def groups(self) -> list[tuple[list[int], Self]]:
         """Groups the segments whose mesh, strands, pins and springs are alike.
@@ -334,8 +340,8 @@ class WormBody(BodyKind):
         of_strands, n_strands = self.strands.relative_stiffness, mesh.n_helices
         if of_strands is not None and len(of_strands) != n_strands:
             raise ValueError(
-                f"body.strands.relative_stiffness has {len(of_strands)} numbers for {n_strands} strands: give "
-                f"{n_strands} numbers, one per strand, or 'none'"
+                f"body.strands.relative_stiffness = {shown(list(of_strands))} has {len(of_strands)} numbers for "
+                f"{n_strands} strands: give {n_strands} numbers, one per strand, or 'none'"
             )
         self.formulation.check_body(self)
         if self.strands.radius_m >= min(mesh.radii_m):

@@ -38,7 +38,7 @@ def add_chains(
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
     places = x if spheres else (x[:-1] + x[1:]) / 2
-    contact = skin_options(arena, geometry, body.of_each("relative_friction", n), places)
+    contact = skin_options(arena, geometry, body.relative_frictions, places)
     material, shares = body.strands.of_segment(0), stiffness_shares(geometry, body.strands)
     density = densities_kg_per_m(geometry, body.strands)
     for strand, vertices_m in enumerate(geometry.vertices_m):

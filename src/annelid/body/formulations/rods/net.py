@@ -79,7 +79,7 @@ def _add_vertices(
     n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
     masses = lumped_masses(geometry.vertices_m[0], density_kg_per_m).tolist()
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
-    contact = skin_options(arena, geometry, body.of_each("relative_friction", n), x)
+    contact = skin_options(arena, geometry, body.relative_frictions, x)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
     shared = formulation.pins == "shared"
     for crossing in range(geometry.n_crossings):

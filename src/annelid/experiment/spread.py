@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
+from annelid.body.actuators.servo import wrap_factors
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.experiment.calibration import PARAMETERS
-from annelid.experiment.load_frame import wrap_factors
 from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text

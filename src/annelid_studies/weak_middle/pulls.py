@@ -22,11 +22,17 @@ AUTHORS_MESH: dict[str, Any] = {
     "body.strands.shear_modulus_Pa": 1.33e9,
     "body.springs.stiffness_N_per_m": 24.5,
     "body.springs.rest_length_m": 0.065,
+    "body.joints": None,
+    "body.rings.length_range_m": [0.62, 0.96],
     "body.rings.force_limit_N": 13.2,
     "body.rings.speed_limit_m_per_s": 0.2,
+    "body.rings.stiffness_N_per_m": 1000.0,
+    "body.rings.damping_Ns_per_m": 10.0,
+    "arena.friction": 0.7,
 }
 """The preset with these is the base worm, which all others change in one quantity: rods and springs of the authors'
-models, none of them tuned to the robot's elongations, and servos of which a single one moves an end as the robot's."""
+models, none of them tuned to the robot's elongations, crossings without friction, and servos of which a single one
+moves an end as the robot's. Of the preset are its mesh, its weight and the damping of its rods."""
 RESOLUTION: dict[str, Any] = {
     "clock.control_timestep_s": 0.02,
     "clock.physics_timestep_s": 0.02,

@@ -239,8 +239,7 @@ def test_the_robots_have_the_authors_size_density_and_weight(
     assert strands.linear_density_kg_per_m == pytest.approx(571.6 * pi * strands.radius_m**2, rel=1e-3)
     mass = strands.linear_density_kg_per_m * geometry.strand_length_m * geometry.n_strands
     mass += config.body.pins.mass_kg * geometry.n_crossings
-    # 1.981 kg for six segments of 0.75 m, by length.
-    assert mass == pytest.approx(1.981 * length_m / 0.75, rel=0.005)
+    assert mass == pytest.approx(1.981, rel=0.005)
 
 
 def test_the_four_segment_robot_has_equal_servos() -> None:

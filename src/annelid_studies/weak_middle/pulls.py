@@ -23,6 +23,7 @@ AUTHORS_MESH: dict[str, Any] = {
     "body.springs.stiffness_N_per_m": 24.5,
     "body.springs.rest_length_m": 0.065,
     "body.joints": None,
+    "body.pins.mass_kg": 0.0135,
     "body.rings.length_range_m": [0.62, 0.96],
     "body.rings.force_limit_N": 13.2,
     "body.rings.speed_limit_m_per_s": 0.2,
@@ -32,7 +33,7 @@ AUTHORS_MESH: dict[str, Any] = {
 }
 """The preset with these is the base worm, which all others change in one quantity: rods and springs of the authors'
 models, none of them tuned to the robot's elongations, crossings without friction, and servos of which a single one
-moves an end as the robot's. Of the preset are its mesh, its weight and the damping of its rods."""
+moves an end as the robot's. Of the preset are its mesh and the damping of its rods."""
 RESOLUTION: dict[str, Any] = {
     "clock.control_timestep_s": 0.02,
     "clock.physics_timestep_s": 0.02,

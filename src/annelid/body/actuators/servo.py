@@ -155,7 +155,9 @@ def wrap_factors(friction: float) -> tuple[float, float]:
     return friction / -expm1(-friction), friction / expm1(friction)
 
 
-def motor_power_W(force_N: Array, speed_m_per_s: Array, stall_force_N: ArrayLike, no_load_speed_m_per_s: float) -> Array:
+def motor_power_W(
+    force_N: Array, speed_m_per_s: Array, stall_force_N: ArrayLike, no_load_speed_m_per_s: float
+) -> Array:
     """Computes the electrical power of direct-current motors, W: ``max(0, F v + F^2 v0 / F0)``.
 
     It is the mechanical power and the heat of the current; nothing is given back.

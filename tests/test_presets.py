@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -138,35 +140,33 @@ ROBOTS = {
     "body.springs.sensors": "sides",
     "body.rings.kind": "servo",
     "body.rings.layout": "halves",
+    "body.springs.stiffness_N_per_m": 24.5,
+    "body.springs.rest_length_m": 0.065,
+}
+AUTHORS_SERVOS_AND_RODS = {
+    "body.strands.young_modulus_Pa": 2.0e9,
+    "body.strands.shear_modulus_Pa": 1.33e9,
     "body.rings.length_range_m": (0.62, 0.96),
     "body.rings.stiffness_N_per_m": 1000.0,
     "body.rings.damping_Ns_per_m": 10.0,
 }
 
 
-OWN_SPRINGS_AND_RODS = {
-    "riddle2025": {
-        "body.strands.young_modulus_Pa": 2.0e9,
-        "body.strands.shear_modulus_Pa": 1.33e9,
-        "body.springs.stiffness_N_per_m": 24.5,
-        "body.springs.rest_length_m": 0.065,
-    },
-    "wang": {"body.springs.stiffness_N_per_m": 19.9, "body.springs.rest_length_m": None},
-}
+@pytest.mark.parametrize("path", AUTHORS_SERVOS_AND_RODS)
+def test_the_six_segment_robot_has_the_authors_servos_and_rods(path: str) -> None:
+    assert value_at("riddle2025", path) == AUTHORS_SERVOS_AND_RODS[path]
 
 
-@pytest.mark.parametrize("preset", OWN_SPRINGS_AND_RODS)
-def test_the_robots_have_their_own_springs(preset: str) -> None:
-    own = OWN_SPRINGS_AND_RODS[preset]
-    assert {path: value_at(preset, path) for path in own} == own
-
-
-def test_the_four_segment_robot_s_modulus_lies_between_the_two_fits() -> None:
-    """With friction (docs/calibration.md), and the authors' without."""
+def test_the_four_segment_robot_is_of_the_material_that_was_fitted_to_the_load_frame() -> None:
+    """With the springs of its preset and with friction (docs/calibration.md)."""
+    fit = json.loads((Path(__file__).parents[1] / "docs/results/calibration_authors_springs.json").read_text())
+    parameters = fit["parameters"]
     young, shear = (value_at("wang", f"body.strands.{name}_modulus_Pa") for name in ("young", "shear"))
-    assert isinstance(young, float)
-    assert 0.437e9 < young < 2.0e9
-    assert shear == pytest.approx(young * 2.0 / 3.0)
+    assert young == pytest.approx(parameters["young_modulus"]["value"], rel=0.01)
+    assert shear == pytest.approx(parameters["young_modulus"]["value"] / 1.5, rel=0.01)
+    friction = value_at("wang", "body.joints.dry_friction_Nm")
+    assert friction == pytest.approx(parameters["dry_friction"]["value"], rel=0.01)
+    assert value_at("wang", "body.rings.speed_limit_m_per_s") == 0.064
 
 
 def test_the_robot_with_muscles_differs_in_its_rings_and_timing_only() -> None:
@@ -241,8 +241,7 @@ def test_the_robots_have_the_authors_size_density_and_weight(
     assert strands.one_number("linear_density_kg_per_m") == pytest.approx(571.6 * pi * strands.radius_m**2, rel=1e-3)
     mass = strands.one_number("linear_density_kg_per_m") * geometry.strand_length_m * geometry.n_strands
     mass += config.body.pins.one_number("mass_kg") * geometry.n_crossings
-    # 1.981 kg for six segments of 0.75 m, by length.
-    assert mass == pytest.approx(1.981 * length_m / 0.75, rel=0.005)
+    assert mass == pytest.approx(1.981, rel=0.005)
 
 
 def test_the_four_segment_robot_has_equal_servos() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import expm1
 from types import SimpleNamespace
 from typing import Any
 
@@ -147,6 +148,48 @@ def test_a_servo_never_pushes_nor_pulls_above_its_limit(formulation: dict[str, A
             assert force.max() <= LIMIT_N * (1.0 + 1e-12)
             most = max(most, force.max())
     assert most > 0.9 * LIMIT_N
+
+
+MOTOR_M = 1.19
+MOTOR = {"body.rings.no_load_speed_m_per_s": 0.04, "body.rings.cable_friction": MOTOR_M}
+FELT = -expm1(-MOTOR_M) / MOTOR_M
+"""Mean tension round a cable over that at its motor (Euler and Eytelwein)."""
+
+
+def test_a_motor_at_a_fixed_length_pulls_as_its_line_says_and_takes_what_its_heat_is() -> None:
+    """With v = v0 (1 - T / T0), tension rises as T0 (1 - exp(-k v0 t / T0)); stalled, a motor takes F0 v0."""
+    changes = STIFF | {"body.rings.length_range_m": [0.62, 0.959], "body.springs.stiffness_N_per_m": 0.0}
+    plant = worm(**changes, **MOTOR, **{f"clock.{name}_timestep_s": 0.0025 for name in ("control", "physics")})
+    most_N, times = FELT * LIMIT_N, 0.0025 * np.arange(1, 601)
+    tension, taken = [], []
+    for _ in times:
+        tension.append(plant.step(np.ones(plant.n_muscles)).muscle_force_N.mean())
+        taken.append(plant.energies.motor_energy.mean())
+    expected = most_N * -np.expm1(-STIFFNESS_N_PER_M * 0.04 / most_N * times)
+    assert np.abs(tension - expected).max() < 0.06 * most_N
+    assert tension[-1] == pytest.approx(most_N, rel=0.01)
+    assert (taken[-1] - taken[-101]) / (100 * 0.0025) == pytest.approx(LIMIT_N * 0.04, rel=0.02)
+
+
+@given(load=st.floats(0.0, 1.0))
+def test_a_motor_winds_the_slower_the_more_it_pulls_and_lets_go_at_the_limit(load: float) -> None:
+    rings = ServoRings(
+        stiffness_N_per_m=STIFFNESS_N_PER_M, speed_limit_m_per_s=SPEED_M_PER_S, no_load_speed_m_per_s=0.04
+    )
+    length = 0.4 + load * LIMIT_N / STIFFNESS_N_PER_M
+    assert speed(1.0, 0.4, length, 1e-4, rings) == pytest.approx(-0.04 * (1.0 - load), abs=1e-9)
+    assert speed(0.0, 0.4, length, 1e-4, rings) == SPEED_M_PER_S
+
+
+def test_only_motors_record_what_they_take_and_nothing_changes_without_the_fields() -> None:
+    def signals(**changes: Any) -> set[str]:
+        return {signal.name for signal in worm(**changes).recordable().signals}
+
+    assert signals(**MOTOR) - signals() == {"motor_energy"}
+    plain, none = worm(), worm(**{"body.rings.cable_friction": 0.0})
+    for _ in range(20):
+        felt, other = (plant.step(np.ones(plant.n_muscles)) for plant in (plain, none))
+        assert np.array_equal(felt.stretch_m, other.stretch_m)
 
 
 def test_servos_may_differ_from_segment_to_segment() -> None:

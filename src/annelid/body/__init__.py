@@ -16,7 +16,7 @@ from annelid.lazy import lazy
 if TYPE_CHECKING:
     from annelid.body.actuators import ActuatorKind
     from annelid.body.actuators.muscle import Rings, muscle_force
-    from annelid.body.actuators.servo import ServoRings
+    from annelid.body.actuators.servo import ServoRings, motor_power_W
     from annelid.body.assemble import build_spec, compile_spec, mesh_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
@@ -35,6 +35,7 @@ __all__ = [
     "build_spec",
     "compile_spec",
     "mesh_of",
+    "motor_power_W",
     "muscle_force",
 ]
 

@@ -2,7 +2,7 @@
 
 What a load frame sees of them: Young's modulus E (with the shear modulus at a fixed ratio) and the axial springs' rate
 and rest length give the part that is the same on both branches; dry friction of the crossings a difference that does
-not grow with the load; friction of the cable round the ring (`load_frame.wrap_factors`) a difference in proportion to
+not grow with the load; friction of the cable round the ring (`wrap_factors`) a difference in proportion to
 the load. Pins pressed harder by a greater load would do the same: one loop cannot distinguish them from the cable,
 which is taken because it needs no law of its own. Viscous and dry friction differ in how they grow with speed, of which
 one loop has just one: viscous friction is fitted only where it is asked for.

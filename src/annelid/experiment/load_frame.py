@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import resources
-from math import expm1, inf
+from math import inf
 from pathlib import Path
 
 import mujoco
@@ -24,6 +24,7 @@ from rich.table import Table
 from annelid.arena.kinds.floor import Floor
 from annelid.body import build_spec, compile_spec, mesh_of
 from annelid.body.actuation import crossing_site, ring_names
+from annelid.body.actuators.servo import wrap_factors
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.figures.experiments import load_frame_figure
@@ -115,19 +116,6 @@ def read_loop(path: str | Path | None = None) -> Loop:
     if not 0 < loop.turn < len(table) - 1:
         raise AnnelidError(f"{source} does not go there and back: its displacement is greatest at an end")
     return loop
-
-
-def wrap_factors(friction: float) -> tuple[float, float]:
-    """Force at the pulled end of a cable over its mean tension, while it is wound in and while it is let out.
-
-    The tension of a cable that slides round a body falls as ``exp(-mu angle)`` from the end that moves first
-    (Euler and Eytelwein). With ``m = mu * wrap angle`` its mean is ``(1 - exp(-m)) / m`` of the force at that end
-    when wound in and ``(exp(m) - 1) / m`` when let out, so that the two forces differ by ``exp(m)``; m = 0 is a cable
-    that slides freely.
-    """
-    if friction == 0.0:
-        return 1.0, 1.0
-    return friction / -expm1(-friction), friction / expm1(friction)
 
 
 def cable_force(loop: Loop, friction: float) -> Loop:

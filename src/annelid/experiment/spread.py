@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
+from annelid.body.actuators.servo import wrap_factors
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.experiment.calibration import PARAMETERS
-from annelid.experiment.load_frame import wrap_factors
 from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text
@@ -34,8 +34,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "floor_friction": ("arena.friction",),
 }
 """What can be varied, and the fields that it scales: what a fit may change, and the floor. The shear modulus keeps its
-ratio to Young's. The cable's friction is no field of a body: it scales the rings' force by the mean tension of a cable,
-``(1 - exp(-m)) / m`` of that at its pulled end. By default what the load frame can distinguish is varied: the first
+ratio to Young's. The cable's friction scales the rings' force by the mean tension of a cable, ``(1 - exp(-m)) / m`` of
+that at its pulled end. By default what the load frame can distinguish is varied: the first
 three. The others have no error that anyone has measured."""
 CALIBRATION = "calibration.json"
 LEAST_EIGENVALUE = -1e-6

@@ -50,11 +50,12 @@ class EnergyTotals(NamedTuple):
     positive_work: Array  # what each did in the physics steps in which its work was positive, likewise
     damping_loss: Array  # what dampers have taken, ()
     constraint_loss: Array  # what contacts, their friction included, and other constraints have taken, ()
+    motor_energy: Array  # what motors have taken from their battery, (n_muscles,); zero for actuators that are none
 
     @classmethod
     def zero(cls, n_muscles: int) -> EnergyTotals:
         """Returns the totals before the first step."""
-        return cls(np.zeros(n_muscles), np.zeros(n_muscles), np.zeros(()), np.zeros(()))
+        return cls(np.zeros(n_muscles), np.zeros(n_muscles), np.zeros(()), np.zeros(()), np.zeros(n_muscles))
 
     def plus(self, step: EnergyTotals) -> EnergyTotals:
         """Returns the totals after one more step."""
@@ -81,6 +82,7 @@ class EnergyMeter:
         # Other integrators take the actuators' forces as they are at the start of a step.
         implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
         self.slopes = rings.slopes(model) if implicit else None
+        self.motor_power = rings.motor_power(model)
 
     def step(self, engine: Engine, drive: Array) -> tuple[Array, EnergyTotals]:
         """Returns the tension of every ring actuator over one step, N, ``(n_muscles,)``, and what the step did.
@@ -99,7 +101,8 @@ class EnergyMeter:
             tension = tension + per_length * (h * rate) + per_rate * (rate - earlier)
         work = -h * tension * rate
         damped, constrained = (-h * (engine[force] @ velocity) for force in ("qfrc_damper", "qfrc_constraint"))
-        return tension, EnergyTotals(work, np.maximum(work, 0.0), damped, constrained)
+        taken = np.zeros_like(work) if self.motor_power is None else h * self.motor_power(tension, -rate)
+        return tension, EnergyTotals(work, np.maximum(work, 0.0), damped, constrained, taken)
 
 
 class Elasticity:

@@ -69,6 +69,7 @@ _SIGNALS = {
         "J",
         "positive work of a ring muscle so far, none regained",
     ),
+    "motor_energy": ("energies.motor_energy", ("muscle",), "J", "electrical energy that a motor has taken so far"),
     "damping_loss": ("energies.damping_loss", (), "J", "energy lost to dampers so far"),
     "constraint_loss": (
         "energies.constraint_loss",
@@ -335,12 +336,18 @@ class Worm(ABC):
 
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
+        anatomy = self.anatomy
+        present = {
+            "edge_strain": anatomy.has_edges,
+            "pin_gap": anatomy.pins_can_part,
+            "motor_energy": anatomy.energy_meter.motor_power is not None,
+        }
         signals = (
             Signal(name, dims, np.shape(self._value(path)), units, words, name in _FRAME_SIGNALS)
             for name, (path, dims, units, words) in (_SIGNALS | _FRAME_SIGNALS).items()
-            if (name != "edge_strain" or self.anatomy.has_edges) and (name != "pin_gap" or self.anatomy.pins_can_part)
+            if present.get(name, True)
         )
-        coords = {"muscle": self.anatomy.muscle_names, "axis": ("x", "y", "z"), "side": SIDES}
+        coords = {"muscle": anatomy.muscle_names, "axis": ("x", "y", "z"), "side": SIDES}
         attrs = {"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m}
         return Recordable(tuple(signals), coords, attrs)
 

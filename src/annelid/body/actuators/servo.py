@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import expm1
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
-from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
+from annelid.body.actuators import ActuatorKind, MotorPower, PerSegment, Slopes
 from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, strongest, weak
 from annelid.config.sections import NonNegative, Positive, Range
 from annelid.morphology import Array
@@ -25,7 +27,12 @@ class ServoRings(ActuatorKind):
     Activation commands the cable's slack length, from the longest at 0 to the shortest at 1, and the servo winds or
     pays out towards it at no more than its speed limit. The cable's tension is ``stiffness (length - slack length) +
     damping rate``, kept between 0 and the force limit; at the limit the servo stalls, and winds on only as its ring
-    gives way.
+    gives way. A longest cable beyond the ring at rest is slack that is wound first. Play of a gear is nothing else: a
+    cable that only pulls keeps the gear on one flank (`trial.backlash` is play of the commands).
+
+    A direct-current motor (``no_load_speed_m_per_s``) winds the more slowly the more it pulls, and what it takes from
+    its battery is recorded. With ``cable_friction``, force limits are those at the motor, and a ring feels the mean
+    tension round it; that friction also holds a cable that is pulled out, which this leaves away.
     """
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "the position servos"),)
@@ -40,13 +47,27 @@ class ServoRings(ActuatorKind):
         default=13.0, description="tension at which a servo stalls, one number for all or one per segment"
     )
     speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
+    no_load_speed_m_per_s: Positive | None = Field(
+        default=None,
+        description="speed of winding without tension, which falls in proportion to tension to 0 at the force limit; "
+        "records motor_energy (not set: the speed limit up to the force limit)",
+    )
+    cable_friction: NonNegative | None = Field(
+        default=None,
+        description="friction of a cable times the angle that it wraps, m: a ring feels (1 - exp(-m)) / m of the force "
+        "limit (not set: none)",
+    )
     stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
     damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
         """Checks the cables' range against the ring at rest, and their force against the mesh."""
         for low, high, force_N in strongest(self, body.n_segments):
-            yield from _findings(body, self, low, high, force_N)
+            yield from _findings(body, self, low, high, force_N / self._wrap_factors[0])
+
+    @property
+    def _wrap_factors(self) -> tuple[float, float]:
+        return wrap_factors(self.cable_friction or 0.0)
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
         """Adds a cable whose slack length is the engine's state: its rate is the control, `drive`."""
@@ -68,7 +89,7 @@ class ServoRings(ActuatorKind):
             actlimited=True,
             actrange=span_m,
             forcelimited=True,
-            forcerange=[-force_N, 0.0],
+            forcerange=[-force_N / self._wrap_factors[0], 0.0],
         )
 
     def slopes(self, model: mujoco.MjModel) -> Slopes:
@@ -80,6 +101,20 @@ class ServoRings(ActuatorKind):
             return self.stiffness_N_per_m * pulls, self.damping_Ns_per_m * pulls
 
         return slopes
+
+    def motor_power(self, model: mujoco.MjModel) -> MotorPower | None:
+        """Returns what motors with a speed without load take, by `motor_power_W` at the motor's end of the cable."""
+        speed = self.no_load_speed_m_per_s
+        if speed is None:
+            return None
+        inwards, outwards = self._wrap_factors
+        stall_N = -inwards * model.actuator_forcerange[:, 0]
+
+        def power_W(tension_N: Array, shortening_m_per_s: Array) -> Array:
+            force_N = tension_N * np.where(shortening_m_per_s < 0.0, outwards, inwards)
+            return motor_power_W(force_N, shortening_m_per_s, stall_N, speed)
+
+        return power_W
 
     def first_act(self, model: mujoco.MjModel) -> Array:
         """Returns the slack lengths of cables that are paid out, m."""
@@ -100,8 +135,40 @@ class ServoRings(ActuatorKind):
         commanded = longest + activation * (shortest - longest)
         stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
         rate = (np.maximum(commanded, stalled) - state) / time_s
-        speed = self.speed_limit_m_per_s
-        return np.minimum(np.maximum(rate, -speed), speed)
+        speed = winding = self.speed_limit_m_per_s
+        if self.no_load_speed_m_per_s is not None:
+            share = (self.stiffness_N_per_m * (length_m - state) / limits_N).clip(0.0, 1.0)
+            winding = np.minimum(speed, self.no_load_speed_m_per_s * (1.0 - share))
+        return np.minimum(np.maximum(rate, -winding), speed)
+
+
+def wrap_factors(friction: float) -> tuple[float, float]:
+    """Force at the pulled end of a cable over its mean tension, while it is wound in and while it is let out.
+
+    The tension of a cable that slides round a body falls as ``exp(-mu angle)`` from the end that moves first
+    (Euler and Eytelwein). With ``m = mu * wrap angle`` its mean is ``(1 - exp(-m)) / m`` of the force at that end
+    when wound in and ``(exp(m) - 1) / m`` when let out, so that the two forces differ by ``exp(m)``; m = 0 is a cable
+    that slides freely.
+    """
+    if friction == 0.0:
+        return 1.0, 1.0
+    return friction / -expm1(-friction), friction / expm1(friction)
+
+
+def motor_power_W(
+    force_N: Array, speed_m_per_s: Array, stall_force_N: ArrayLike, no_load_speed_m_per_s: float
+) -> Array:
+    """Computes the electrical power of direct-current motors, W: ``max(0, F v + F^2 v0 / F0)``.
+
+    It is the mechanical power and the heat of the current; nothing is given back.
+
+    Args:
+        force_N: Force of every cable at its motor, F, in any shape.
+        speed_m_per_s: Speed v at which it shortens, likewise.
+        stall_force_N: Force F0 at which a motor stands still, one for all or in that shape.
+        no_load_speed_m_per_s: Speed v0 without load.
+    """
+    return (force_N * speed_m_per_s + force_N**2 * no_load_speed_m_per_s / stall_force_N).clip(0.0)
 
 
 def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:

@@ -323,7 +323,7 @@ class Skeleton:
     def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
         """Returns vertices of the strands from front to rear, m, ``(n_strands, n_vertices, 3)``, and the crossings."""
         self._data.qpos[:] = qpos
-        crossing, _, _ = self.anatomy.locate(self._data)
+        crossing, *_ = self.anatomy.locate(self._data)
         turn = self._data.xmat[self._body].reshape(-1, 3, 3)
         vertices = self._data.xpos[self._body] + np.einsum("vij,vj->vi", turn, self._place)
         return vertices.reshape(self._shape), crossing

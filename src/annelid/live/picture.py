@@ -57,7 +57,7 @@ class Painter:
         self._ring_pairs = np.stack([path[:, :-1], path[:, 1:]], axis=-1).reshape(-1, 2)
         self._corners = path.shape[1] - 1
         assert config.arena is not None
-        share = float(anatomy.model.body_mass.sum()) * config.arena.gravity_m_per_s2 / anatomy.n_segments
+        share = anatomy.total_mass_kg * config.arena.gravity_m_per_s2 / anatomy.n_segments
         self.arrow_N = float(f"{2.0 * share:.1g}") if share > 0 else 1.0
 
     def strand_colors(self) -> Colors:

@@ -27,7 +27,7 @@ MOST_FILE_BYTES = 4_000_000
 """Of a mesh or a picture that it takes from a file."""
 MOST_ELEMENTS, MOST_LEVELS = 2_000, 24
 MOST_VERTICES, MOST_SAMPLES, MOST_PIXELS = 20_000, 250_000, 1024
-"""Of all meshes together, of all height fields together, and along the side of a texture."""
+"""Of all meshes together, of all height fields together, and along the side of a texture, or of all as one square."""
 MOST_OBJECTS = 16
 """Things that move: the force of the worm on each is measured at every part of its skin."""
 LARGEST = 1e6
@@ -121,16 +121,16 @@ def read_scene(path: Path) -> str:
     Raises:
         ConfigError: A file cannot be read, lies elsewhere or is too large, or the scene is not what `checked` allows.
     """
+    content = read_bytes(path, "the scene", MOST_BYTES)
     try:
-        root = _parsed(read_bytes(path, "the scene", MOST_BYTES))
+        root = _parsed(content)
         folder = _take_folder(root)
         for element in root.iterfind("asset/*"):
             if element.tag in _FILES and "file" in element.attrib:
                 _write_in(element, path.parent, folder)
         return checked(ET.tostring(root, encoding="unicode"))
     except ConfigError as error:
-        text = str(error)
-        raise ConfigError(text if str(path) in text else f"{path} {text}") from None
+        raise ConfigError(f"{path}: {error}") from None
 
 
 def checked(text: str) -> str:
@@ -248,12 +248,16 @@ def _check_sizes(root: ET.Element) -> None:
         samples += rows * columns
     if samples > MOST_SAMPLES:
         raise ConfigError(f"has height fields of {samples:,.0f} samples: at most {MOST_SAMPLES:,} are read")
+    pixels = 0.0
     for texture in root.iter("texture"):
         if not texture.get("builtin"):
             raise ConfigError(f"<texture name={shown(texture.get('name', ''))}>: needs builtin; pictures are not read")
-        for side in ("width", "height"):
-            if not 1 <= float(texture.get(side, "1")) <= MOST_PIXELS:
-                raise ConfigError(f"<texture {side}={shown(texture.get(side))}>: must be in 1 .. {MOST_PIXELS}")
+        sides = [float(texture.get(side, "1")) for side in ("width", "height")]
+        if not all(1 <= side <= MOST_PIXELS for side in sides):
+            raise ConfigError(f"<texture width=.. height=..>: must be in 1 .. {MOST_PIXELS}, not {sides[0]:g}, {sides[1]:g}")
+        pixels += sides[0] * sides[1]
+    if pixels > MOST_PIXELS**2:
+        raise ConfigError(f"has textures of {pixels:,.0f} pixels: at most {MOST_PIXELS**2:,} are drawn")
 
 
 def _check_motion(element: ET.Element, *, moving: bool) -> None:
@@ -357,7 +361,7 @@ def _stl(content: bytes, path: Path) -> tuple[Array, NDArray[np.int64]]:
 
 
 def _mesh(points: Array, triangles: NDArray[np.int64], path: Path) -> tuple[Array, NDArray[np.int64]]:
-    if points.ndim != 2 or len(points) < 4 or not len(triangles) or not np.isfinite(points).all():
+    if points.shape != (len(points), 3) or len(points) < 4 or not len(triangles) or not np.isfinite(points).all():
         raise ConfigError(f"{path} is no mesh: it needs four vertices and one face at least, and finite numbers")
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise ConfigError(f"{path} is no mesh: a face has a corner that is no vertex")

@@ -22,6 +22,7 @@ from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, Overlay, backgr
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.objects import in_scene
 from annelid.simulation.runfile import Run
 
 ROOM = 1.3
@@ -64,6 +65,7 @@ class DrawnWorm:
         ball_m = model.geom_size[self._balls, 0]
         ball_m = np.minimum(ball_m, LARGEST_BALL * config.body.mesh.radius_m)
         model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * config.body.strands.radius_m)
+        self._in_scene = in_scene(model)
         bodies = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
         self._links = np.flatnonzero(bodies & (model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value))
         self.posture = mujoco.MjData(self.model)
@@ -117,7 +119,7 @@ class DrawnWorm:
         The strands' free ends reach beyond the crossings, so these would not do.
         """
         model, posture = self.model, self.posture
-        parts = np.flatnonzero(model.geom_bodyid > 0)
+        parts = np.flatnonzero((model.geom_bodyid > 0) & ~self._in_scene[model.geom_bodyid])
         capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
         half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
         posture.qpos[:] = qpos

@@ -158,16 +158,20 @@ def add_scene(spec: mujoco.MjSpec, text: str, depth_m: float) -> None:
     free = alone.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)
     if alone.jnt_stiffness[free].any():
         raise ConfigError("the scene has a free joint with a stiffness: springs are for slides, hinges and ball joints")
+    floors: list[str] = []
     for geom in scene.geoms:
-        if not geom.material and np.allclose(geom.rgba, PLAIN_RGBA):
-            moves = alone.body_weldid[alone.geom_bodyid[alone.geom(geom.name).id]] > 0
-            geom.rgba = POST_RGBA if moves else GROUND_RGBA
+        if geom.material or not np.allclose(geom.rgba, PLAIN_RGBA):
+            continue
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            floors.append(f"{SCENE}{geom.name}")
+            continue
+        moves = alone.body_weldid[alone.geom_bodyid[alone.geom(geom.name).id]] > 0
+        geom.rgba = POST_RGBA if moves else GROUND_RGBA
     for geom in touching(spec):
         geom.priority = -1
     spec.attach(scene, prefix=SCENE, frame=spec.worldbody.add_frame(pos=[0.0, 0.0, -depth_m]))
-    for geom in spec.geoms:
-        if geom.name.startswith(SCENE) and geom.type == mujoco.mjtGeom.mjGEOM_PLANE and not geom.material:
-            geom.material = "floor"
+    for name in floors:
+        spec.geom(name).material = "floor"
 
 
 def add_walls(spec: mujoco.MjSpec, arena: ArenaKind) -> None:

@@ -1,4 +1,4 @@
-"""Scenes from strangers: what an MJCF file could do beyond ground and things is refused in a sentence, before it is done."""
+"""Scenes from strangers: what an MJCF file could do beyond ground and things is refused in a sentence."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from annelid.errors import AnnelidError, ConfigError
 
 GEOM = '<geom type="sphere" size="0.1"/>'
 TEXTURE = '<texture type="cube" builtin="flat" width="1024" height="1024"/>'
-BOMB = "".join(f'<!ENTITY l{i + 1} "{"&l%d;" % i * 10}">' for i in range(9))
+BOMB = "".join(f'<!ENTITY l{i + 1} "{f"&l{i};" * 10}">' for i in range(9))
 
 
 def scene(world: str = GEOM, before: str = "") -> str:
@@ -43,7 +43,10 @@ HOSTILE = {
     "folder of textures": (scene(before='<compiler texturedir="/etc"/>'), "cannot have this attribute"),
     "actuator": (scene(before='<actuator><motor joint="x"/></actuator>'), "nothing drives"),
     "keyframe": (scene(before='<keyframe><key qpos="1"/></keyframe>'), "starts as it is written"),
-    "actuator of the worm's": (scene(before='<tendon><fixed><joint joint="x" coef="1"/></fixed></tendon>'), "stiffness"),
+    "actuator of the worm's": (
+        scene(before='<tendon><fixed><joint joint="x" coef="1"/></fixed></tendon>'),
+        "stiffness",
+    ),
     "default of a motor": (scene(before='<default><motor gear="5"/></default>'), "<default> has <motor>"),
     "model in a model": (scene(before='<asset><model file="m.xml"/></asset>'), "<asset> has <model>"),
     "texture from a file": (scene(before='<asset><texture file="t.png"/></asset>'), "cannot have this attribute"),

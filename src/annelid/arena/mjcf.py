@@ -10,6 +10,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from io import BytesIO
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path, PurePosixPath
 
@@ -65,11 +66,10 @@ _ALLOWED = {
 """Elements, each with those that may be in it and its attributes."""
 _FILES = {"mesh": ("file", (".obj", ".stl")), "hfield": ("file", (".png",))}
 _FOLDERS = ("meshdir", "assetdir")
-_NAMES = frozenset("name class childclass mesh hfield material texture model".split())
-_CHOICES = frozenset(
-    "type builtin mark inertia angle eulerseq autolimits limited smoothnormal texuniform shellinertia".split()
-)
-_SINGLE = frozenset("stiffness mass density nrow ncol width height maxhullvert".split())
+_NAMES = frozenset(["name", "class", "childclass", "mesh", "hfield", "material", "texture", "model"])
+_WORDS = ["type", "builtin", "mark", "inertia", "angle", "eulerseq"]
+_CHOICES = frozenset([*_WORDS, "autolimits", "limited", "smoothnormal", "texuniform", "shellinertia"])
+_SINGLE = frozenset(["stiffness", "mass", "density", "nrow", "ncol", "width", "height", "maxhullvert"])
 _INSTEAD = {
     "include": "write its content into the file",
     "option": "gravity, step and friction cone are fields of the configuration (arena.gravity_m_per_s2, "
@@ -254,7 +254,9 @@ def _check_sizes(root: ET.Element) -> None:
             raise ConfigError(f"<texture name={shown(texture.get('name', ''))}>: needs builtin; pictures are not read")
         sides = [float(texture.get(side, "1")) for side in ("width", "height")]
         if not all(1 <= side <= MOST_PIXELS for side in sides):
-            raise ConfigError(f"<texture width=.. height=..>: must be in 1 .. {MOST_PIXELS}, not {sides[0]:g}, {sides[1]:g}")
+            raise ConfigError(
+                f"<texture width=.. height=..>: must be in 1 .. {MOST_PIXELS}, not {sides[0]:g}, {sides[1]:g}"
+            )
         pixels += sides[0] * sides[1]
     if pixels > MOST_PIXELS**2:
         raise ConfigError(f"has textures of {pixels:,.0f} pixels: at most {MOST_PIXELS**2:,} are drawn")
@@ -342,7 +344,7 @@ def _obj(content: bytes, path: Path) -> tuple[Array, NDArray[np.int64]]:
                 corners = [int(corner.split("/")[0]) for corner in rest]
                 # Negative ones count back from the vertex that was given last.
                 corners = [corner - 1 if corner > 0 else len(vertices) + corner for corner in corners]
-                faces += [[corners[0], *pair] for pair in zip(corners[1:], corners[2:], strict=False)]
+                faces += [[corners[0], *pair] for pair in pairwise(corners[1:])]
         points, triangles = np.array(vertices, dtype=float), np.array(faces, dtype=np.int64)
     except (ValueError, IndexError, OverflowError) as error:
         raise ConfigError(f"{path} is no Wavefront file of vertices and faces: {shortened(str(error))}") from None

@@ -112,8 +112,9 @@ def load_config(
             keeps nothing of what it had before.
         fidelity: How finely a 3D worm of rods is resolved: a level of `annelid.config.LEVELS`; lies over what the
             source says and under the overrides. None leaves the source as it is.
-        arena: Where the worm is put instead: a name of `arena_names`, a TOML file with a table ``[arena]``, or an MJCF
-            file (``.xml``); lies under the overrides. Friction, gravity and contacts stay the source's where the arena does not state them.
+        arena: Where the worm is put instead: a name of `arena_names`, a TOML file with a table ``[arena]``, or a scene
+            as MJCF (``.xml``); lies under the overrides. Friction, gravity and contacts stay the source's where the
+            arena does not state them.
 
     Returns:
         The checked configuration.
@@ -165,7 +166,9 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
 
 def _arena_instead(present: Any, name: str | Path) -> dict[str, Any]:
     """Returns the table of another arena, with the fields of every arena from the present one where it has none."""
-    reader = next((kind for kind in kinds_of(ArenaKind).values() if kind.suffix and str(name).endswith(kind.suffix)), None)
+    reader = next(
+        (kind for kind in kinds_of(ArenaKind).values() if kind.suffix and str(name).endswith(kind.suffix)), None
+    )
     if reader is not None:
         stated = reader.read(Path(name))
     elif str(name).endswith(".toml"):

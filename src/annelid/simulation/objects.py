@@ -20,7 +20,10 @@ from annelid.morphology import Array
 _DEEPEST, _NET_FORCE = 1, 3
 """The engine's numbers for a contact sensor that gives the deepest contact, and one that adds up all."""
 _FIELDS = mujoco.mjtConDataField
-_FORCE, _PLACE = 1 << int(_FIELDS.mjCONDATA_FORCE), 1 << int(_FIELDS.mjCONDATA_DIST) | 1 << int(_FIELDS.mjCONDATA_NORMAL)
+_FORCE, _PLACE = (
+    1 << int(_FIELDS.mjCONDATA_FORCE),
+    1 << int(_FIELDS.mjCONDATA_DIST) | 1 << int(_FIELDS.mjCONDATA_NORMAL),
+)
 
 
 class Met(NamedTuple):

@@ -278,6 +278,15 @@ def test_a_binary_mesh_and_a_text_give_the_same_ground(tmp_path: Path) -> None:
     assert volumes == pytest.approx([1.0, 1.0])
 
 
+def test_nothing_of_a_scene_counts_as_worm() -> None:
+    """Neither bodies that are at rest, named or not, nor those that move."""
+    world = f'<body pos="-3 0 0"><geom size="0.1"/><body><geom size="0.2"/></body></body>{BOX}'
+    with_scene, bare = plant_in(world), plant_in("")
+    assert with_scene.total_mass_kg == bare.total_mass_kg
+    assert with_scene.posture.center_of_mass == pytest.approx(bare.posture.center_of_mass, abs=1e-12)
+    assert with_scene.model.body_mass.sum() > bare.total_mass_kg + 30.0
+
+
 def test_setae_are_refused_in_a_scene() -> None:
     with pytest.raises(ConfigError, match=r"arena\.backward_friction = 1: must be left out"):
         config("", changes={"arena.friction": 0.3, "arena.backward_friction": 1.0})

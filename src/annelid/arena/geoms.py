@@ -148,8 +148,9 @@ def add_scene(spec: mujoco.MjSpec, text: str, depth_m: float) -> None:
     """
     try:
         scene = mujoco.MjSpec.from_string(text)
-        for number, geom in enumerate(scene.geoms):
-            geom.name = geom.name or f"geom_{number}"
+        # By their names they are known to belong to the scene.
+        for number, part in enumerate([*scene.geoms, *scene.bodies[1:]]):
+            part.name = part.name or f"part_{number}"
         # Alone, so that what it says of a body is of the scene.
         alone = scene.copy().compile()
     except ValueError as error:

@@ -330,6 +330,13 @@ class Skeleton:
         vertices = self._data.xpos[self._body] + np.einsum("vij,vj->vi", turn, self._place)
         return vertices.reshape(self._shape), crossing
 
+    def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Returns centres, m, ``(n_geoms, 3)``, and quaternions, ``(n_geoms, 4)``, of geoms in the posture located last."""
+        turns = np.empty((len(geoms), 4))
+        for turn, axes in zip(turns, self._data.geom_xmat[geoms], strict=True):
+            mujoco.mju_mat2Quat(turn, axes)
+        return self._data.geom_xpos[geoms], turns
+
 
 def _bodies_of_vertices(model: mujoco.MjModel, n_strands: int, n_vertices: int) -> NDArray[np.int64]:
     """Body that carries each vertex, strand by strand: its own for rods, the element behind it for a chain."""

@@ -331,7 +331,7 @@ class Skeleton:
         return vertices.reshape(self._shape), crossing
 
     def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Returns centres, m, ``(n_geoms, 3)``, and quaternions, ``(n_geoms, 4)``, of geoms in the posture located last."""
+        """Returns centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``, of n geoms in the posture located last."""
         turns = np.empty((len(geoms), 4))
         for turn, axes in zip(turns, self._data.geom_xmat[geoms], strict=True):
             mujoco.mju_mat2Quat(turn, axes)

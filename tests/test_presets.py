@@ -124,7 +124,9 @@ def test_the_sprung_rods_ties_and_damping_are_near_the_chain_s() -> None:
     assert isinstance(body.formulation, Rods)
     assert body.formulation.pin_damping_Ns_per_m == pytest.approx(DAMPING_TIME_S * tie_stiffness_N_per_m(sprung))
     element_m = float(np.linalg.norm(np.diff(mesh_of(body.mesh).vertices_m[0], axis=0), axis=1).mean())
-    joint = body.strands.joint_damping(body.strands.young_modulus_Pa * pi * body.strands.radius_m**4 / 4 / element_m)
+    joint = body.strands.joint_damping(
+        body.strands.one_number("young_modulus_Pa") * pi * body.strands.radius_m**4 / 4 / element_m
+    )
     assert 0.06 < joint < 0.12
     assert body.formulation.lateral_damping_Nms_per_rad == 0.0
 
@@ -236,9 +238,9 @@ def test_the_robots_have_the_authors_size_density_and_weight(
     assert (geometry.n_segments, geometry.n_crossings) == (n_segments, n_crossings)
     assert geometry.length_m == pytest.approx(length_m, abs=0.002)
     strands = config.body.strands
-    assert strands.linear_density_kg_per_m == pytest.approx(571.6 * pi * strands.radius_m**2, rel=1e-3)
-    mass = strands.linear_density_kg_per_m * geometry.strand_length_m * geometry.n_strands
-    mass += config.body.pins.mass_kg * geometry.n_crossings
+    assert strands.one_number("linear_density_kg_per_m") == pytest.approx(571.6 * pi * strands.radius_m**2, rel=1e-3)
+    mass = strands.one_number("linear_density_kg_per_m") * geometry.strand_length_m * geometry.n_strands
+    mass += config.body.pins.one_number("mass_kg") * geometry.n_crossings
     # 1.981 kg for six segments of 0.75 m, by length.
     assert mass == pytest.approx(1.981 * length_m / 0.75, rel=0.005)
 

@@ -42,6 +42,18 @@ def test_the_base_is_similar_to_itself() -> None:
     assert own["sensor"]["tolerance_m"] == pytest.approx(base["sensor"]["tolerance_m"], abs=0.002)
 
 
+def test_a_tapering_worm_has_ranges_and_forces_ring_by_ring() -> None:
+    config = load_config(BASE, {path: value for path, (value, _) in similar_worm(0.05, 5, rear_radius_m=0.04).items()})
+    body = config.body
+    assert isinstance(body, WormBody)
+    assert body.mesh.radii_m == pytest.approx([0.05, 0.0475, 0.045, 0.0425, 0.04])
+    shares = np.array(body.rings.length_ranges(5)) / mesh_of(body.mesh).ring_length_m[:, np.newaxis]
+    assert shares == pytest.approx(np.broadcast_to(shares[0], shares.shape), rel=1e-3)
+    assert not check(config)
+    with pytest.raises(ConfigError, match=r"radius_m.2 = -"):
+        similar_worm(0.05, rear_radius_m=-0.01)
+
+
 def test_similar_worms_move_alike(tmp_path: Path) -> None:
     """The oracle is mechanics: lengths over the radius and times over its square root are the same."""
     found = []

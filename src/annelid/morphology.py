@@ -5,7 +5,8 @@ metres, angles in radians.
 
 A strand turns at the rate ``w`` (rad/m) about the axis. Clockwise strand ``i`` lies at the angle
 ``w x + i D`` and counter-clockwise strand ``j`` at ``c - w x - j D``, with ``D = 4 pi / n_helices`` and
-``y = R cos(angle)``, ``z = R + R sin(angle)``, so that the lowest line of the tube is z = 0. Two strands
+``y = R cos(angle)``, ``z = R + R sin(angle)``, so that the lowest line of the tube is z = 0. Where the radius differs
+among the segments, it changes linearly from ring to ring, and the axis is as high as the largest one. Two strands
 meet where ``2 w x = c - (i + j) D`` modulo ``2 pi``: on planes spaced ``D / (2 w)`` apart, each carrying one
 crossing of every clockwise strand. The offset ``c`` puts the first plane half a spacing behind the front end
 and equals pi/2 for 12 helices, as in the paper's model.
@@ -13,18 +14,21 @@ and equals pi/2 for 12 helices, as in the paper's model.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import asin, cos, floor, hypot, pi, radians, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["Array", "Indices", "MeshGeometry", "helical_mesh"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+_SAME_PLACE = 1e-9
+"""Of the body's length: difference of two distances that are equal but for rounding."""
 
 
 def heading_turn(heading_deg: float) -> Array:
@@ -44,7 +48,7 @@ class MeshGeometry:
     """
 
     n_segments: int  # actuated
-    radius_m: float  # of the tube
+    radius_m: float  # of the tube, the largest where it differs; the height of the body axis
     angular_rate_rad_per_m: float  # turn of a strand per metre of body
     vertices_m: Array  # points of every strand, front to back, (n_strands, n_vertices, 3)
     crossing_vertex: Indices  # index along every strand of each plane's crossing, (n_planes,)
@@ -78,6 +82,20 @@ class MeshGeometry:
         """Length of the mesh along the body axis."""
         return float(self.vertices_m[0, -1, 0])
 
+    def along(self, values: ArrayLike, x_m: Array) -> Array:
+        """Spreads numbers of the segments over places along the body.
+
+        Args:
+            values: One for each segment, ``(n_segments, ..)``.
+            x_m: Places along the body at rest, ``(n,)``.
+
+        Returns:
+            Those of the segment whose ring is nearest to each place, the mean of two midway between them, ``(n, ..)``.
+        """
+        away = np.abs(np.subtract.outer(x_m, self.plane_x_m[self.ring_planes]))
+        nearest = away <= away.min(axis=1, keepdims=True) + _SAME_PLACE * self.length_m
+        return (nearest / nearest.sum(axis=1, keepdims=True)) @ np.asarray(values, dtype=float)
+
     @cached_property
     def crossings_m(self) -> Array:
         """Position of every crossing, shape ``(n_crossings, 3)``."""
@@ -98,6 +116,15 @@ class MeshGeometry:
         """Length of every axial spring at rest, shape ``(n_springs,)``."""
         front, rear = self.crossings_m[self.springs[:, 0]], self.crossings_m[self.springs[:, 1]]
         return np.linalg.norm(rear - front, axis=1)
+
+    @cached_property
+    def spring_longest_m(self) -> Array:
+        """Length of every axial spring at which the strands beside it are straight, shape ``(n_springs,)``."""
+        along = np.linalg.norm(np.diff(self.vertices_m, axis=1), axis=2).cumsum(axis=1)
+        sides = np.diff(np.insert(along, 0, 0.0, axis=1)[:, self.crossing_vertex], axis=1)
+        front, plane = self.springs[:, 0], self.crossing_plane[self.springs[:, 0]]
+        beside = front + self.n_per_plane
+        return sides[self.crossing_strands[front, 0], plane] + sides[self.crossing_strands[beside, 1], plane + 1]
 
     @cached_property
     def ring_length_m(self) -> Array:
@@ -144,7 +171,7 @@ def helical_mesh(
     n_segments: int,
     *,
     n_helices: int = 12,
-    radius_m: float = 0.16,
+    radius_m: float | Sequence[float] = 0.16,
     angular_rate_rad_per_m: float = 14.0,
     elements_per_side: int = 3,
     elements_per_end: int | None = None,
@@ -157,7 +184,7 @@ def helical_mesh(
     Args:
         n_segments: Segments; this and all others are fields of `annelid.body.worm.Mesh`, where they are checked.
         n_helices: Strands, half of each handedness.
-        radius_m: Radius at rest, m.
+        radius_m: Radius at rest, m, or that of every ring: linear between two rings, the same beyond the last.
         angular_rate_rad_per_m: Turn of a strand along the axis, rad/m.
         elements_per_side: Elements of a strand between two crossings.
         elements_per_end: Of a free end; as many as of a side by default.
@@ -182,7 +209,9 @@ def helical_mesh(
     x = np.append(np.concatenate(spans), knots[-1])
     turn, phase = angular_rate_rad_per_m * x[None], step * np.arange(half)[:, None]
     angle = np.concatenate([turn + phase, offset - turn - phase])
-    y, z = radius_m * np.cos(angle), radius_m + radius_m * np.sin(angle)
+    radii = np.broadcast_to(radius_m, n_segments)
+    radius, largest = np.interp(x, plane_x[ring_planes], radii), float(radii.max())
+    y, z = radius * np.cos(angle), largest + radius * np.sin(angle)
 
     # Strands pair at each plane: i + j is the same number on a whole plane, modulo half.
     total = np.rint((offset - 2 * angular_rate_rad_per_m * plane_x) / step).astype(np.int64)
@@ -196,7 +225,7 @@ def helical_mesh(
     corners = plane * half + strand, (plane + 1) * half + strand, (plane + 2) * half + lower, (plane + 1) * half + lower
     return MeshGeometry(
         n_segments=n_segments,
-        radius_m=radius_m,
+        radius_m=largest,
         angular_rate_rad_per_m=angular_rate_rad_per_m,
         vertices_m=np.stack([np.broadcast_to(x, angle.shape), y, z], axis=-1),
         crossing_vertex=ends + elements_per_side * np.arange(n_planes),

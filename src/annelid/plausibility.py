@@ -6,12 +6,14 @@ Everything here follows from the configuration alone, in closed form, in under a
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import cos, degrees, hypot, log, pi, radians, sqrt, tan
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 from annelid.body.estimates import Finding, rhombus_of, softened
 from annelid.body.worm import WormBody
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, listed
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
@@ -36,8 +38,13 @@ def check(config: RunConfig) -> list[Finding]:
     body = config.body
     if not isinstance(body, WormBody):
         return []
-    tolerance = _tolerance(config, body)
-    found = [*_mesh(body), *body.rings.findings(body), *_materials(body), *_steps(config, body), *tolerance]
+    found: list[Finding] = []
+    groups = body.groups()
+    for segments, alike in groups:
+        alone = config.model_copy(update={"body": alike})
+        own = [*_mesh(alike), *alike.rings.findings(alike), *_materials(alike), *_steps(alone, alike)]
+        of = f"segment {listed(str(segment + 1) for segment in segments)}: " if len(groups) > 1 else ""
+        found += [replace(one, problem=of + one.problem) for one in (*own, *_tolerance(config, alike))]
     first: dict[tuple[str, str], Finding] = {}
     for finding in found:
         # Rings with ranges of their own may share a fault.
@@ -67,7 +74,7 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
             f"set body.strands.radius_m below {room / 4:.2g}, or fewer helices",
             "error",
         )
-    most, usual = shape.longest_m / shape.along_m, 2.0 / mesh.radius_m
+    most, usual = shape.longest_m / shape.along_m, 2.0 / mesh.one_number("radius_m")
     problem = instead = ""
     if most > 4.0:
         problem = (
@@ -89,7 +96,7 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
             f"a strand turns by {shape.bend_rad * 180 / pi:.0f} degrees about the body in one straight element",
             f"set at least {elements}",
         )
-    rest = body.springs.rest_length_m
+    rest = None if body.springs.rest_length_m is None else body.springs.one_number("rest_length_m")
     if rest is not None and not 0.5 <= rest / shape.along_m <= 1.5:
         yield Finding(
             "body.springs.rest_length_m",
@@ -100,10 +107,8 @@ def _mesh(body: WormBody) -> Iterator[Finding]:
 
 
 def _materials(body: WormBody) -> Iterator[Finding]:
-    young, shear, line = (
-        body.strands.young_modulus_Pa,
-        body.strands.shear_modulus_Pa,
-        body.strands.linear_density_kg_per_m,
+    young, shear, line = map(
+        body.strands.one_number, ("young_modulus_Pa", "shear_modulus_Pa", "linear_density_kg_per_m")
     )
     area = pi * body.strands.radius_m**2
     ratio = f"that is {shear / young:.2g} of the Young's modulus, where an isotropic material has 0.33 to 0.5"
@@ -132,11 +137,11 @@ def _steps(config: RunConfig, body: WormBody) -> Iterator[Finding]:
     rise = arena.slope_rad * cos(radians(body.heading_deg))
     backward = rise > 1e-9 and arena.backward_friction is not None
     field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-    steepness = tan(abs(arena.slope_rad))
-    if steepness >= (friction or 0.0):
+    steepness, relative = tan(abs(arena.slope_rad)), fmean(body.of_each("relative_friction", body.n_segments))
+    if steepness >= relative * (friction or 0.0):
         problem = f"with arena.{field} = {friction:g} the worm slides down"
         slope_deg = round(degrees(arena.slope_rad), 9)
-        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness:.2g}")
+        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness / relative:.2g}")
 
 
 def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
@@ -151,13 +156,15 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     Returns:
         How far neighbours lift a segment, and the length beyond rest at which the releasing and the next segment are
         equally long; where the first is the larger, no tolerance is known to do. None for bodies that were not
-        measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles all round and
-        springs that are at rest as drawn.
+        measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles all round, springs
+        that are at rest as drawn, and segments that are alike.
     """
     body, arena = config.body, config.arena
     if not isinstance(body, WormBody) or arena is None:
         return None
-    damping_s, rings, rate = body.strands.material_damping_s, body.rings, body.springs.stiffness_N_per_m
+    if len(body.groups()) > 1 or body.strands.relative_stiffness is not None or body.relative_friction != 1.0:
+        return None
+    damping_s, rings, rate = body.strands.material_damping_s, body.rings, body.springs.one_number("stiffness_N_per_m")
     whole = body.formulation.has_rigid_crossings and rings.muscle is not None and rings.layout == "whole"
     whole = whole and body.springs.rest_length_m is None
     # Beyond what was measured the lines that were fitted say nothing.

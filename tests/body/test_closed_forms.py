@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from annelid.body.damping import stiffen
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
@@ -18,31 +19,39 @@ LENGTH_M = 0.6
 ELEMENTS = 24
 ELEMENT_M = LENGTH_M / ELEMENTS
 STRANDS = Strands(joint_damping_Nms_per_rad=0.02)
-BENDING = STRANDS.young_modulus_Pa * pi * STRANDS.radius_m**4 / 4
-TORSION = STRANDS.shear_modulus_Pa * pi * STRANDS.radius_m**4 / 2
+BENDING = STRANDS.one_number("young_modulus_Pa") * pi * STRANDS.radius_m**4 / 4
+TORSION = STRANDS.one_number("shear_modulus_Pa") * pi * STRANDS.radius_m**4 / 2
 VERTICES = np.stack([np.linspace(0, LENGTH_M, ELEMENTS + 1), np.zeros(ELEMENTS + 1), np.zeros(ELEMENTS + 1)], axis=-1)
 
 
-def rod_cantilever() -> mujoco.MjModel:
+STEP = 12
+"""Inner vertices up to the step of a strand that is stiff in front and soft behind, `SOFTER` of it in bending."""
+SOFTER = 0.25
+STEPPED = np.where(np.arange(1, ELEMENTS) <= STEP, [[1.0], [1.0]], [[SOFTER], [0.5]])
+
+
+def rod_cantilever(shares: np.ndarray | None = None) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.timestep = 0.005
-    masses = lumped_masses(VERTICES, STRANDS.linear_density_kg_per_m)
+    masses = lumped_masses(VERTICES, STRANDS.one_number("linear_density_kg_per_m"))
     bodies = ["world", "world", *(f"v{i}" for i in range(2, ELEMENTS + 1))]
     for index in range(2, ELEMENTS + 1):
         add_vertex(spec, f"v{index}", VERTICES[index], masses[index])
-    add_rod(spec, "rod", VERTICES, bodies, STRANDS, Rods(), clamped=True)
-    return spec.compile()
+    add_rod(spec, "rod", VERTICES, bodies, STRANDS, Rods(), clamped=True, shares=shares)
+    model = spec.compile()
+    stiffen(model)
+    return model
 
 
-def chain_cantilever(joint: str = "hinges") -> mujoco.MjModel:
+def chain_cantilever(joint: str = "hinges", shares: np.ndarray | None = None) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
     spec.option.timestep = 0.005
     formulation = Chain.model_validate({"joint": joint, "armature_kg_m2": 1e-5})
-    add_chain(spec, "rod", VERTICES, STRANDS, formulation, root=0, fixed_root=True)
+    add_chain(spec, "rod", VERTICES, STRANDS, formulation, root=0, fixed_root=True, shares=shares)
     return spec.compile()
 
 
@@ -59,41 +68,49 @@ def apply_at_rest(model: mujoco.MjModel, data: mujoco.MjData, body: int, load_N:
     data.xfrc_applied[body, 4] = -load_N * (VERTICES[-1, 0] - data.xipos[body, 0])
 
 
-def tip_deflection(load_N: float) -> float:
-    """Euler-Bernoulli, clamped in the middle of the first element, whose direction is held."""
-    return load_N * (LENGTH_M - ELEMENT_M / 2) ** 3 / (3 * BENDING)
+def tip_deflection(load_N: float, shares: np.ndarray | None = None) -> float:
+    """Euler-Bernoulli, clamped in the middle of the first element, whose direction is held; with a step or without."""
+    whole, behind = LENGTH_M - ELEMENT_M / 2, LENGTH_M - (STEP + 0.5) * ELEMENT_M
+    softer = 1.0 if shares is None else SOFTER
+    return load_N * (whole**3 - behind**3 + behind**3 / softer) / (3 * BENDING)
 
 
-def test_tip_of_a_rod_cantilever_follows_beam_theory() -> None:
-    model = rod_cantilever()
+@pytest.mark.parametrize("shares", [None, STEPPED], ids=["even", "stepped"])
+def test_tip_of_a_rod_cantilever_follows_beam_theory(shares: np.ndarray | None) -> None:
+    model = rod_cantilever(shares)
     data = mujoco.MjData(model)
     load = 2e-4
     tip = model.body(f"v{ELEMENTS}").id
     data.xfrc_applied[tip, 2] = load
     settle(model, data, 20.0)
-    assert data.xpos[tip, 2] == pytest.approx(tip_deflection(load), rel=0.01)
+    assert data.xpos[tip, 2] == pytest.approx(tip_deflection(load, shares), rel=0.01)
 
 
-@pytest.mark.parametrize("joint", ["ball", "hinges"])
-def test_tip_of_a_chain_cantilever_follows_beam_theory(joint: str) -> None:
-    model = chain_cantilever(joint)
+@pytest.mark.parametrize(("joint", "shares"), [("ball", None), ("hinges", None), ("ball", STEPPED)])
+def test_tip_of_a_chain_cantilever_follows_beam_theory(joint: str, shares: np.ndarray | None) -> None:
+    model = chain_cantilever(joint, shares)
     data = mujoco.MjData(model)
     load = 2e-4
     last = model.body(f"rod_{ELEMENTS - 1}").id
     apply_at_rest(model, data, last, load)
     settle(model, data, 20.0)
     tip = data.xpos[last] + data.xmat[last].reshape(3, 3) @ [ELEMENT_M, 0, 0]
-    assert tip[2] == pytest.approx(tip_deflection(load), rel=0.01)
+    assert tip[2] == pytest.approx(tip_deflection(load, shares), rel=0.01)
 
 
-def test_a_twisted_rod_turns_by_torque_times_length_over_torsion_stiffness() -> None:
-    model = rod_cantilever()
+@pytest.mark.parametrize(("shares", "softer"), [(None, 1.0), (STEPPED, 0.5)], ids=["even", "stepped"])
+def test_a_twisted_rod_turns_by_torque_times_length_over_torsion_stiffness(
+    shares: np.ndarray | None, softer: float
+) -> None:
+    model = rod_cantilever(shares)
     data = mujoco.MjData(model)
     torque = 2e-3
     data.qfrc_applied[model.joint("rod_twist").dofadr[0]] = torque
     settle(model, data, 2.0)
     turned = data.qpos[model.joint("rod_twist").qposadr[0]]
-    assert turned == pytest.approx(torque * (LENGTH_M - ELEMENT_M) / TORSION, rel=0.01)
+    behind = LENGTH_M - (STEP + 0.5) * ELEMENT_M - ELEMENT_M / 2
+    compliance = (LENGTH_M - ELEMENT_M - behind + behind / softer) / TORSION
+    assert turned == pytest.approx(torque * compliance, rel=0.01)
 
 
 def test_a_twisted_chain_of_hinges_turns_by_the_same() -> None:

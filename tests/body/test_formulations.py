@@ -61,8 +61,8 @@ def test_mass_and_rest_lengths_are_those_of_the_configuration(formulation: dict[
     assert isinstance(config.body, WormBody)
     geometry = mesh_of(config.body.mesh)
     model = build_spec(config).compile()
-    strands = geometry.n_strands * geometry.strand_length_m * config.body.strands.linear_density_kg_per_m
-    pins = geometry.n_crossings * config.body.pins.mass_kg
+    strands = geometry.n_strands * geometry.strand_length_m * config.body.strands.one_number("linear_density_kg_per_m")
+    pins = geometry.n_crossings * config.body.pins.one_number("mass_kg")
     assert model.body_mass.sum() == pytest.approx(strands + pins, rel=1e-5)
     data = mujoco.MjData(model)
     assert tendon_lengths(model, data, "spring_") == pytest.approx(geometry.spring_length_m, abs=1e-9)

@@ -80,7 +80,7 @@ def rod_helix(lateral_damping: float) -> tuple[mujoco.MjModel, int]:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.timestep = 0.002
-    masses = lumped_masses(HELIX, STRANDS.linear_density_kg_per_m)
+    masses = lumped_masses(HELIX, STRANDS.one_number("linear_density_kg_per_m"))
     bodies = ["world", "world", *(f"v{i}" for i in range(2, len(HELIX)))]
     for index in range(2, len(HELIX)):
         add_vertex(spec, f"v{index}", HELIX[index], masses[index])

@@ -54,8 +54,8 @@ FAST = {
     ("chain", "helix", "twist"),
 }
 STRANDS = Strands()
-BENDING = STRANDS.young_modulus_Pa * pi * STRANDS.radius_m**4 / 4
-TORSION = STRANDS.shear_modulus_Pa * pi * STRANDS.radius_m**4 / 2
+BENDING = STRANDS.one_number("young_modulus_Pa") * pi * STRANDS.radius_m**4 / 4
+TORSION = STRANDS.one_number("shear_modulus_Pa") * pi * STRANDS.radius_m**4 / 2
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ class Case:
 
     def frequency(self) -> float:
         """Undamped angular frequency of the continuous rod, rad/s."""
-        unit = sqrt(BENDING / STRANDS.linear_density_kg_per_m) / self.length_m**2
+        unit = sqrt(BENDING / STRANDS.one_number("linear_density_kg_per_m")) / self.length_m**2
         if self.shape == "straight":
-            polar = STRANDS.linear_density_kg_per_m * STRANDS.radius_m**2 / 2
+            polar = STRANDS.one_number("linear_density_kg_per_m") * STRANDS.radius_m**2 / 2
             return pi / (2 * self.length_m) * sqrt(TORSION / polar) if self.motion == "twist" else 1.8751041**2 * unit
         square = 1.0 + (RADIUS_M * RATE_RAD_PER_M) ** 2
         curvature, torsion = RADIUS_M * RATE_RAD_PER_M**2 / square, RATE_RAD_PER_M / square
@@ -147,7 +147,7 @@ def rod(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.Mj
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.tolerance = 1e-20
     vertices = case.vertices(elements)
-    masses = lumped_masses(vertices, strands.linear_density_kg_per_m)
+    masses = lumped_masses(vertices, strands.one_number("linear_density_kg_per_m"))
     masses[:2] = CLAMP_KG
     bodies = [f"v{index}" for index in range(elements + 2)]
     for body, vertex, mass in zip(bodies, vertices, masses, strict=True):
@@ -282,7 +282,7 @@ def test_the_equations_of_a_curved_rod_hold_the_closed_forms_of_a_ring() -> None
 
 def test_the_equations_of_a_straight_rod_hold_those_of_a_cantilever() -> None:
     frequencies, shares = rod_modes(0.0, 0.0, 0.06)
-    unit = sqrt(BENDING / STRANDS.linear_density_kg_per_m) / 0.06**2
+    unit = sqrt(BENDING / STRANDS.one_number("linear_density_kg_per_m")) / 0.06**2
     assert unit * frequencies[:2] == pytest.approx(Case("straight", "across").frequency() * 25, rel=1e-6)
     twist = unit * frequencies[np.argmax(shares[2] > 0.5)]
     assert twist == pytest.approx(Case("straight", "twist").frequency(), rel=1e-6)

@@ -60,6 +60,15 @@ def test_friction_changed_live_is_friction_built_in(friction: float) -> None:
     np.testing.assert_array_equal(posture_after(live), posture_after(twin))
 
 
+def test_friction_changed_live_keeps_its_ratio_among_the_segments() -> None:
+    ratio = {"body.relative_friction": [0.5, 1.0, 2.0]}
+    before, after = (load_config("riddle2023-rods", {**ratio, "arena.friction": value}) for value in (1.0, 0.3))
+    simulation = running(before)
+    twin = built_with(after, simulation)
+    live = adjusted(simulation, before, after)
+    np.testing.assert_array_equal(posture_after(live), posture_after(twin))
+
+
 @pytest.mark.parametrize(
     ("arena", "overrides"),
     [("pipe", {"arena.friction": 0.2}), ("setae", {"arena.friction": 0.2})],

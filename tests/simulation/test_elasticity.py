@@ -12,11 +12,23 @@ from annelid.config import load_config
 from annelid.simulation.worm import WormPlant
 
 CHAIN = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler", "body.formulation.pins": "direct"}
+DIFFER = {
+    "body.mesh.radius_m": [0.16, 0.14, 0.12],
+    "body.rings.length_range_m": [[0.566, 1.067], [0.495, 0.934], [0.425, 0.8]],
+    "body.strands.young_modulus_Pa": [3e8, 6e8, 2e8],
+    "body.strands.shear_modulus_Pa": [2e8, 3e8, 2e8],
+    "body.strands.relative_stiffness": [1.0, 2.0, 0.5] * 4,
+    "body.springs.stiffness_N_per_m": [20.0, 40.0, 10.0],
+    "body.springs.rest_length_m": [0.06, 0.07, 0.08],
+}
+"""Segments, and strands, that differ in all that is elastic."""
 BODIES: dict[str, dict[str, Any]] = {
     "rods": {},
     "short springs": {"body.springs.tension_only": True, "body.springs.rest_length_m": 0.1},
     "chain of balls": CHAIN,
     "chain of hinges": {**CHAIN, "body.formulation.joint": "hinges"},
+    "rods that differ": {**DIFFER, "body.strands.damping_time_s": 0.1},
+    "chain that differs": {**CHAIN, **DIFFER, "body.formulation.joint": "hinges"},
 }
 
 
@@ -86,7 +98,8 @@ def test_one_edge_turned_about_itself_twists_its_neighbours_and_bends_against_it
     half_angle = 0.5 * np.arccos(tangents[0] @ tangents[1])
     curvature = 2.0 * np.tan(half_angle)
     rigidity = np.pi * strands.radius_m**4 / (2.0 * length)
-    bending, torsion = strands.young_modulus_Pa * rigidity / 4, strands.shear_modulus_Pa * rigidity / 2
+    bending = strands.one_number("young_modulus_Pa") * rigidity / 4
+    torsion = strands.one_number("shear_modulus_Pa") * rigidity / 2
     angle = 0.7
     qpos = plant.qpos.copy()
     qpos[body.joint("strand_0_twist_5").qposadr[0]] = angle

@@ -151,10 +151,10 @@ def judge(data: xr.Dataset, config: RunConfig) -> dict[str, str]:
     m = mesh.n_helices // 2
     place = data["crossing_position"].values
     ring = data["ring_length"].values.reshape(data.sizes["time"], mesh.n_segments, -1).sum(axis=2)
-    shares = ring / (2.0 * mesh.radius_m * np.sin(pi / m) * m)
+    shares = ring / (2.0 * mesh.one_number("radius_m") * np.sin(pi / m) * m)
     planes = mesh.free_planes_at_ends + mesh.planes_between_rings * np.arange(mesh.n_segments)
     by_plane = place.reshape(len(place), -1, m, 3)
-    order = np.argsort(np.arctan2(*(by_plane[0, :, :, [2, 1]] - [[[mesh.radius_m]], [[0.0]]])), axis=1)
+    order = np.argsort(np.arctan2(*(by_plane[0, :, :, [2, 1]] - [[[mesh.one_number("radius_m")]], [[0.0]]])), axis=1)
     for plane in planes:
         corners = by_plane[:, plane][:, order[plane]]
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).sum(axis=1)
@@ -166,7 +166,7 @@ def judge(data: xr.Dataset, config: RunConfig) -> dict[str, str]:
     if not (spans / spans[0]).max() <= STRETCHED:
         found["segment"] = f"a segment had {(spans / spans[0]).max():.2f} times its length"
     deep = _depth_m(place, config).max(initial=0.0)
-    if not deep <= DEEP * mesh.radius_m:
+    if not deep <= DEEP * mesh.one_number("radius_m"):
         found["depth"] = f"a crossing was {deep:.3f} m in the ground"
     if not np.abs(place - place[0]).max() <= 3.0:
         found["flight"] = "a crossing went over 3 m"

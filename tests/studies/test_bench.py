@@ -332,8 +332,8 @@ class TestPeer:
         body = peer_module.papers_body()
         strands = body.strands
         area, inertia = math.pi * strands.radius_m**2, math.pi * strands.radius_m**4 / 4
-        stiffness = peer_module.SHEAR_CORRECTION * strands.shear_modulus_Pa * area
-        per_length = strands.linear_density_kg_per_m / area * inertia
+        stiffness = peer_module.SHEAR_CORRECTION * strands.one_number("shear_modulus_Pa") * area
+        per_length = strands.one_number("linear_density_kg_per_m") / area * inertia
         rate = stiffness / per_length
 
         def grows(step: float) -> bool:

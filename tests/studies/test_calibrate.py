@@ -160,7 +160,10 @@ def line(config: RunConfig) -> Loop:
     assert isinstance(body, WormBody)
     x = triangle(0.0, 0.0).displacement_m
     friction = 0.0 if body.joints is None else 100 * body.joints.dry_friction_Nm
-    elastic = 30e-9 * body.strands.young_modulus_Pa * x + 0.1 * body.springs.stiffness_N_per_m * x**2
+    elastic = (
+        30e-9 * body.strands.one_number("young_modulus_Pa") * x
+        + 0.1 * body.springs.one_number("stiffness_N_per_m") * x**2
+    )
     return Loop(x, elastic + np.where(np.arange(len(x)) <= x.argmax(), friction, -friction))
 
 
@@ -232,7 +235,7 @@ def test_a_fit_is_written_as_a_worm_to_run(tmp_path: Path) -> None:
     assert isinstance(body, WormBody)
     assert body.joints is not None
     assert (config.seed, body.springs.rest_length_m, body.strands.radius_m) == (4, 0.065, 0.00299)
-    assert (body.strands.young_modulus_Pa, body.joints.dry_friction_Nm) == (7e8, 0.01312)
+    assert (body.strands.one_number("young_modulus_Pa"), body.joints.dry_friction_Nm) == (7e8, 0.01312)
     numbers = json.loads(report.read_text())
     assert numbers["parameters"]["dry_friction"]["value"] == 0.0131234
     assert numbers["rms_N"]["both"] == pytest.approx(0.1)

@@ -391,3 +391,10 @@ def test_things_of_a_scene_are_placed_where_the_engine_has_them() -> None:
     places, turns = painter.places(np.array([box.geomadr[0]]))
     assert places[0] == pytest.approx([-1.0, 0.5, 0.3])
     assert np.abs(turns[0]) == pytest.approx([0.0, 1.0, 0.0, 0.0])
+
+
+def test_a_field_with_a_number_per_segment_has_no_slider() -> None:
+    lists = {"body.strands.young_modulus_Pa": [3e8, 6e8, 3e8], "body.springs.stiffness_N_per_m": [20.0, 30.0, 20.0]}
+    fields = {knob.field for knob in knobs_of(load_config("riddle2023-rods", lists))}
+    assert "arena.friction" in fields
+    assert not fields & lists.keys()

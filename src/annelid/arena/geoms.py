@@ -10,6 +10,7 @@ ground (docs/arenas.md).
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from annelid.arena.surface import Shape
 from annelid.config.arena import ArenaKind, Walls
 from annelid.errors import ConfigError, shortened
-from annelid.protocols import Array
+from annelid.morphology import Array, MeshGeometry
 
 PLAIN_RGBA, GROUND_RGBA = (0.5, 0.5, 0.5, 1.0), (0.72, 0.75, 0.78, 1.0)
 """Of a geom in MJCF that states no colour, and what a scene shows instead where it is at rest."""
@@ -37,13 +38,22 @@ SCENE = "scene/"
 """What the names of a scene begin with in a worm's model."""
 
 
-def contact_options(arena: ArenaKind) -> dict[str, list[float]]:
-    """Contact attributes that worm and floor share, so that neither dilutes the other's."""
+def contact_options(arena: ArenaKind, relative_friction: float = 1.0) -> dict[str, Any]:
+    """Contact attributes that worm and floor share, so that neither dilutes the other's; skin may have other friction.
+
+    Of two geoms the engine takes the greater friction, unless one has priority.
+    """
     return {
-        "friction": [arena.friction, 0.005, 0.0001],
+        "friction": [relative_friction * arena.friction, 0.005, 0.0001],
+        "priority": int(relative_friction != 1.0),
         "solref": [arena.contact_time_constant_s, 1.0],
         "solimp": [*arena.contact_impedance, 0.5, 2.0],
     }
+
+
+def skin_options(arena: ArenaKind, geometry: MeshGeometry, relative: list[float], x_m: Array) -> list[dict[str, Any]]:
+    """Contact attributes of skin at places along the body at rest, m, from the relative friction of every segment."""
+    return [contact_options(arena, float(share)) for share in geometry.along(relative, x_m)]
 
 
 def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
@@ -57,7 +67,7 @@ def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
 def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
     """Adds to a worm's spec one plane on a mocap body for every geom that can touch the ground, and pairs the two."""
     options = contact_options(arena)
-    slide, spin, roll = options.pop("friction")
+    del options["friction"], options["priority"]
     for geom in touching(spec):
         name = f"ground_of_{geom.name}"
         holder = spec.worldbody.add_body(name=name, mocap=True)
@@ -69,6 +79,7 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
             conaffinity=0,
             group=HIDDEN_GROUP,
         )
+        slide, spin, roll = geom.friction
         friction = [slide, slide, spin, roll, roll]
         spec.add_pair(name=name, geomname1=name, geomname2=geom.name, condim=3, friction=friction, **options)
         geom.conaffinity = int(arena.walls != Walls())
@@ -77,7 +88,7 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
 def set_friction(model: mujoco.MjModel, friction: float) -> None:
     """Gives skin and ground of a compiled worm another coefficient of sliding friction, from the next step on.
 
-    A worm with setae sets its own before every step.
+    A worm with setae sets its own before every step, and one whose segments rub differently cannot be given one.
     """
     model.geom_friction[(model.geom_contype != 0) | (model.geom_conaffinity != 0), 0] = friction
     model.pair_friction[:, :2] = friction
@@ -169,7 +180,8 @@ def add_scene(spec: mujoco.MjSpec, text: str, depth_m: float) -> None:
         moves = alone.body_weldid[alone.geom_bodyid[alone.geom(geom.name).id]] > 0
         geom.rgba = POST_RGBA if moves else GROUND_RGBA
     for geom in touching(spec):
-        geom.priority = -1
+        # Skin with a friction of its own keeps it.
+        geom.priority = geom.priority or -1
     spec.attach(scene, prefix=SCENE, frame=spec.worldbody.add_frame(pos=[0.0, 0.0, -depth_m]))
     for name in floors:
         spec.geom(name).material = "floor"

@@ -44,11 +44,15 @@ def ring_names(n_segments: int, rings: ActuatorKind) -> list[str]:
 
 def add_springs(spec: mujoco.MjSpec, geometry: MeshGeometry, springs: Springs) -> None:
     """Adds one spatial tendon a spring: bilateral, or slack below its rest length."""
-    for index, ends in enumerate(geometry.springs.tolist()):
-        rest = springs.rest_length_m or float(geometry.spring_length_m[index])
+    n, middle_x = geometry.n_segments, geometry.crossings_m[geometry.springs, 0].mean(axis=1)
+    rates = geometry.along(springs.of_each("stiffness_N_per_m", n), middle_x).tolist()
+    lengths = geometry.spring_length_m
+    if springs.rest_length_m is not None:
+        lengths = geometry.along(springs.of_each("rest_length_m", n), middle_x)
+    for index, (ends, rate, rest) in enumerate(zip(geometry.springs.tolist(), rates, lengths.tolist(), strict=True)):
         tendon = spec.add_tendon(
             name=f"spring_{index}",
-            stiffness=[springs.stiffness_N_per_m, 0.0, 0.0],
+            stiffness=[rate, 0.0, 0.0],
             springlength=[0.0 if springs.tension_only else rest, rest],
             width=0.0015,
             rgba=SPRING_RGBA,

@@ -12,6 +12,7 @@ import numpy as np
 from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
 from annelid.arena.surface import gravity_of
 from annelid.body.actuation import add_joint_friction, add_ring_actuators, add_springs
+from annelid.body.damping import stiffen
 from annelid.body.elimination import order_elimination
 from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig
@@ -97,6 +98,7 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
         remedy = next((f"{remedy} ({reason})" for words, remedy in _REMEDIES.items() if words in reason), reason)
         raise ConfigError(f"the engine refuses this body: {remedy}") from None
+    stiffen(model)
     order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:
@@ -129,6 +131,11 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
         )
     spec = build_spec(config)
     assert isinstance(config.body, WormBody)
+    if config.body.strands.stiffness_differs and spec.flexes:
+        raise ConfigError(
+            "body.strands: stiffness that differs along rods or among them cannot be written as MJCF, where a rod has "
+            "one: take body.formulation.kind = 'chain', or run the worm with annelid"
+        )
     if config.body.heading_deg:
         raise ConfigError(
             f"body.heading_deg = {config.body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "

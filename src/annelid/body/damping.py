@@ -41,8 +41,9 @@ INERTANCE = 1e-3
 IMPEDANCE = 0.01
 STRAIGHT = 1e-9
 """Sine of the bend below which a vertex is straight; there the engine itself damps every direction."""
-_DAMPER = "_damper_"
+_DAMPER, _STIFFNESS = "_damper_", "_stiffness"
 _PER_ROW = 10
+_PER_RECORD = 10
 
 
 def damper_name(rod: str, vertex: int) -> str:
@@ -53,6 +54,37 @@ def damper_name(rod: str, vertex: int) -> str:
 def twist_name(rod: str, edge: int, n_edges: int) -> str:
     """Name of the twist hinge of an edge, by which the engine finds it."""
     return f"{rod}_twist" if edge == n_edges - 1 else f"{rod}_twist_{edge}"
+
+
+def shares_name(rod: str) -> str:
+    """Name of the numbers in a model that say how stiff a rod is along itself."""
+    return f"{rod}{_STIFFNESS}"
+
+
+def rod_shares(model: mujoco.MjModel) -> Array:
+    """Returns the stiffness at every inner vertex of rods with as many edges each, over that of their material.
+
+    Returns:
+        Shares in bending and in twist, ``(2, n_rods, n_edges - 1)``.
+    """
+    shares = np.ones((2, model.nflex, int(model.flex_edgenum[0]) - 1))
+    for number in range(model.nnumeric):
+        one = model.numeric(number)
+        rod = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX.value, one.name.removesuffix(_STIFFNESS))
+        if rod >= 0 and one.name.endswith(_STIFFNESS):
+            shares[:, rod] = one.data.reshape(2, -1)
+    return shares
+
+
+def stiffen(model: mujoco.MjModel) -> None:
+    """Gives the rods of a compiled model the stiffness that its numbers say, which the engine has one of for a rod."""
+    if not model.nnumeric or not model.nflex:
+        return
+    # After their number come the records of the inner vertices, with the stiffness in bending, across it, and in twist.
+    records = model.flex_bending.reshape(model.nflex, -1)[:, 1:].reshape(model.nflex, -1, _PER_RECORD)
+    bending, twist = rod_shares(model)
+    for column, share in ((4, bending), (5, bending), (8, twist)):
+        records[..., column] *= share
 
 
 def _coefficients(lengths_m: Array, strands: Strands) -> Array:
@@ -108,15 +140,22 @@ def add_holder(spec: mujoco.MjSpec, name: str, mass_kg: float, inertia_kg_m2: fl
 
 
 def add_dampers(
-    spec: mujoco.MjSpec, rod: str, vertices_m: Array, bodies: list[str], strands: Strands, *, clamped: bool
+    spec: mujoco.MjSpec,
+    rod: str,
+    vertices_m: Array,
+    bodies: list[str],
+    strands: Strands,
+    shares: Array,
+    *,
+    clamped: bool,
 ) -> None:
     """Adds a fixed tendon for every inner vertex of a rod, with the coefficients of the posture at rest.
 
-    The vertices are ``(n_vertices, 3)``, the body of a fixed one is "world", and the first edge of a clamped rod has no
-    twist hinge.
+    The vertices are ``(n_vertices, 3)``, the body of a fixed one is "world", the shares are those of the stiffness in
+    bending, ``(n_vertices - 2,)``, and the first edge of a clamped rod has no twist hinge.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
-    damping, rows = _coefficients(lengths, strands), damper_rows(vertices_m.T)
+    damping, rows = _coefficients(lengths, strands) * shares, damper_rows(vertices_m.T)
     clamped_hinge = twist_name(rod, 0, len(lengths)) if clamped else ""
     for vertex in range(1, len(bodies) - 1):
         joints = [f"{body}_{axis}" for body in bodies[vertex - 1 : vertex + 2] for axis in "xyz"]
@@ -161,7 +200,8 @@ class MaterialDamping:
         """Finds the rows and gives them the damping of a material with a damping time."""
         n_strands, n_edges = model.nflex, int(model.flex_edgenum[0])
         names = [f"strand_{strand}" for strand in range(n_strands)]
-        self._damping = _coefficients(model.flexedge_length0.reshape(n_strands, n_edges), strands)
+        lengths = model.flexedge_length0.reshape(n_strands, n_edges)
+        self._damping = _coefficients(lengths, strands.of_segment(0)) * rod_shares(model)[0]
         tendons = np.array([[model.tendon(damper_name(name, v)).id for v in range(1, n_edges)] for name in names])
         model.tendon_invweight0[tendons] = (
             IMPEDANCE / (1.0 - IMPEDANCE) / (INERTANCE * self._damping * model.opt.timestep)

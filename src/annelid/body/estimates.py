@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import cos, hypot, tan
+from statistics import fmean
 from typing import TYPE_CHECKING, Literal
 
 from annelid.morphology import Rhombus, rhombus
@@ -66,9 +67,9 @@ def _text(value: object) -> str:
 
 
 def rhombus_of(body: WormBody) -> Rhombus:
-    """Returns the rhombus of a body at rest."""
+    """Returns the rhombus at rest of a body whose segments have one radius."""
     mesh = body.mesh
-    return rhombus(mesh.n_helices, mesh.radius_m, mesh.angular_rate_rad_per_m, mesh.elements_per_side)
+    return rhombus(mesh.n_helices, mesh.one_number("radius_m"), mesh.angular_rate_rad_per_m, mesh.elements_per_side)
 
 
 def touching_ring_m(body: WormBody) -> float:
@@ -77,14 +78,19 @@ def touching_ring_m(body: WormBody) -> float:
 
 
 def bearable_force_N(body: WormBody, share: float = 1 / 3) -> float:
-    """Estimates the tension at which a ring closes to a share of the rhombi's opening at rest, N: see the module."""
+    """Estimates the tension at which a ring closes to a share of the rhombi's opening at rest, N: see the module.
+
+    Segments must be alike, as `WormBody.groups` makes them.
+    """
     shape, springs = rhombus_of(body), body.springs
     rest, opening = shape.opening_rad, share * shape.opening_rad
-    bending = _BENDING * body.strands.bending_rigidity_Nm2 * (rest - opening) / (shape.side_m**2 * cos(opening))
-    stretch = hypot(shape.across_m, shape.along_m) * cos(opening) - (springs.rest_length_m or shape.along_m)
+    rigidity = body.strands.bending_rigidity_Nm2 * fmean(body.strands.relative_stiffness or [1.0])
+    bending = _BENDING * rigidity * (rest - opening) / (shape.side_m**2 * cos(opening))
+    spring_m = shape.along_m if springs.rest_length_m is None else springs.one_number("rest_length_m")
+    stretch = hypot(shape.across_m, shape.along_m) * cos(opening) - spring_m
     if springs.tension_only:
         stretch = max(0.0, stretch)
-    return bending + springs.stiffness_N_per_m * stretch * tan(opening)
+    return bending + springs.one_number("stiffness_N_per_m") * stretch * tan(opening)
 
 
 def strongest(rings: ActuatorKind, n_segments: int) -> Iterator[tuple[float, float, float]]:

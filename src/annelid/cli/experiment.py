@@ -316,12 +316,12 @@ def weak_middle_command(
 ) -> None:
     """Find out why the middle of the worm elongates less than its ends.
 
-    Every segment of a resting worm (preset wang with the authors' rods and springs) is pulled alone, wound in and held
-    until it stands still; the deficit is how far the interior segments stay below the two ends, on average. Swept one
-    at a time: number of segments, Young's modulus, weight, friction; each with four kinds of actuators. Force-limited:
-    a servo that stalls at a tension. Servo: one that stalls, or ends at its shortest cable. Muscle: the paper's, whose
-    force falls with its length. Length-limited: wound to a length, whatever that takes. Then: which differences
-    between two interior segments would make them elongate as the robot's, 3.82 and 4.78 cm.
+    Every segment of a resting worm (the four-segment robot with the authors' rods and springs) is pulled alone, wound
+    in and held until it stands still; the deficit is how far the interior segments stay below the two ends, on average.
+    Swept one at a time: number of segments, Young's modulus, weight, friction; each with four kinds of actuators.
+    Force-limited: a servo that stalls at a tension. Servo: one that stalls, or ends at its shortest cable. Muscle: the
+    paper's, whose force falls with its length. Length-limited: wound to a length, whatever that takes. Then: which
+    differences between two interior segments would make them elongate as the robot's, 3.82 and 4.78 cm.
 
     Writes weak_middle.csv, .png and .svg, and keeps runs, so that a second call takes seconds and an interrupted one
     goes on. About 250 runs of some seconds each; docs/weak_middle.md explains the results.

@@ -33,6 +33,9 @@ def new(
     length: Annotated[
         float | None, typer.Option(help="Length at rest, m.  [default: so that rhombi have the paper's shape]")
     ] = None,
+    rear_radius: Annotated[
+        float | None, typer.Option(help="Radius of the last ring at rest, m.  [default: as --radius, no taper]")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Write a worm of your own size, every coupled number with its rule.
@@ -42,6 +45,7 @@ def new(
 
     \b
     annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4
+    annelid new taper.toml --radius 0.05 --rear-radius 0.04
     annelid run mine.toml
     """
     from annelid.experiment.similar import worm_text
@@ -50,7 +54,7 @@ def new(
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
     refuse_existing(path, force, "")
-    print_paths([write_text(path, worm_text(radius, segments, helices, length))])
+    print_paths([write_text(path, worm_text(radius, segments, helices, length, rear_radius))])
 
 
 def check(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 
+from annelid.errors import ConfigError, shown
 from annelid.text import is_line
 
 
@@ -28,12 +29,62 @@ Modulus = Annotated[float, Field(ge=1.0, le=1e13)]
 Impedance = tuple[Annotated[float, Field(gt=0, lt=1)], Annotated[float, Field(gt=0, lt=1)], Positive]
 Seed = Annotated[int, Field(ge=0, lt=2**128)]
 Range = tuple[Positive, Positive]
+Number = TypeVar("Number", bound=float)
+
+
+def _not_empty(value: Any) -> Any:
+    if value == ():
+        raise ValueError("must be a number, or a list of numbers, one per segment")
+    return value
+
+
+def _form(value: Any) -> str:
+    return "list" if isinstance(value, list | tuple) else "one"
+
+
+PerSegmentOf = Annotated[
+    Annotated[Number, Tag("one")] | Annotated[tuple[Number, ...], Tag("list")],
+    Discriminator(_form),
+    AfterValidator(_not_empty),
+]
+"""One number of a kind for all segments, or one for each; the section names the field in `Section.segment_fields`."""
 
 
 class Section(BaseModel):
-    """Base of every section: immutable, and no field but the declared ones."""
+    """Base of every section: immutable, and no field but the declared ones.
+
+    Attributes:
+        segment_fields: Names of the fields of type `PerSegmentOf`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    segment_fields: ClassVar[tuple[str, ...]] = ()
+
+    def of_each(self, name: str, n_segments: int) -> list[float]:
+        """Returns the numbers that a field has for every segment, of a number one for each."""
+        value = getattr(self, name)
+        return list(value) if isinstance(value, tuple) else [value] * n_segments
+
+    def one_number(self, name: str) -> float:
+        """Returns the number that a field has for all segments.
+
+        Raises:
+            ConfigError: Its segments differ.
+        """
+        value = getattr(self, name)
+        first, *others = value if isinstance(value, tuple) else (value,)
+        if any(other != first for other in others):
+            raise ConfigError(
+                f"{name} = {shown(list(value))} differs among the segments; this needs one number for all"
+            )
+        return first
+
+    def of_segment(self, segment: int) -> Self:
+        """Returns the section as it would be if all segments were as one of them, counted from 0."""
+        lists = {
+            name: value[segment] for name in self.segment_fields if isinstance(value := getattr(self, name), tuple)
+        }
+        return self.model_copy(update=lists) if lists else self
 
     @model_validator(mode="before")
     @classmethod

@@ -59,11 +59,12 @@ class DrawnWorm:
         self.model = model = spec.compile()
         self._has_waypoints = config.turning is not None and bool(config.turning.goals.points_m)
         # What is drawn of springs, cables and crossings must not hide the mesh of a small worm.
-        model.tendon_width *= DRAWN_WIDTH * config.body.mesh.radius_m
+        radius_m = max(config.body.mesh.radii_m)
+        model.tendon_width *= DRAWN_WIDTH * radius_m
         self._balls = np.array([model.geom(crossing_site(i)).id for i in range(mesh_of(config.body.mesh).n_crossings)])
         model.geom_rgba[self._balls] = self._behind.ball
         ball_m = model.geom_size[self._balls, 0]
-        ball_m = np.minimum(ball_m, LARGEST_BALL * config.body.mesh.radius_m)
+        ball_m = np.minimum(ball_m, LARGEST_BALL * radius_m)
         model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * config.body.strands.radius_m)
         self._in_scene = in_scene(model)
         bodies = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value

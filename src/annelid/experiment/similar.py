@@ -33,7 +33,13 @@ Fields = dict[str, tuple[Any, str]]
 """Values by dotted path, each with the rule that it follows."""
 
 
-def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, length_m: float | None = None) -> Fields:
+def similar_worm(
+    radius_m: float,
+    n_segments: int = 3,
+    n_helices: int = 12,
+    length_m: float | None = None,
+    rear_radius_m: float | None = None,
+) -> Fields:
     """Returns the fields in which a worm differs from `BASE`.
 
     Args:
@@ -41,6 +47,7 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
         n_segments: Segments.
         n_helices: Strands, half of each handedness.
         length_m: Length at rest; by default that at which rhombi have the shape of the base's.
+        rear_radius_m: Radius at rest of the last ring, where the body tapers; all else follows the first's.
 
     Raises:
         ConfigError: A number is out of its range, or with this length strands would lie along the body or the rings.
@@ -55,7 +62,7 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     # Checked before anything is computed from them.
     geometry = {"n_segments": n_segments, "n_helices": n_helices, "radius_m": radius_m}
     check_section(Mesh, known.mesh.model_dump() | geometry)
-    scale = radius_m / known.mesh.radius_m
+    scale = radius_m / known.mesh.one_number("radius_m")
     slower = sqrt(scale)
     planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m)
     turn = pi / (n_helices // 2)
@@ -67,7 +74,10 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     strands, pins, springs, rings = known.strands, known.pins, known.springs, known.rings
     ranges = [length * own.ring_length_m / shape.ring_length_m for length in rings.length_ranges(1)[0]]
     impedance = [*arena.contact_impedance[:2], arena.contact_impedance[2] * scale]
-    young_Pa, shear_Pa = strands.young_modulus_Pa * longer, strands.shear_modulus_Pa * longer
+    young_Pa, shear_Pa = (
+        strands.one_number("young_modulus_Pa") * longer,
+        strands.one_number("shear_modulus_Pa") * longer,
+    )
     of_length = "the length asked for" if length_m else "rhombi of the base's shape"
     fields: Fields = {f"body.mesh.{name}": (value, "as asked") for name, value in geometry.items()} | {
         "body.mesh.angular_rate_rad_per_m": (rate, of_length),
@@ -78,12 +88,15 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
         "body.strands.radius_m": (strands.radius_m * longer, "in proportion to the side of a rhombus"),
         "body.strands.young_modulus_Pa": (young_Pa, "side of a rhombus: as stiff for its weight as the base"),
         "body.strands.shear_modulus_Pa": (shear_Pa, "the base's ratio to Young's modulus"),
-        "body.strands.linear_density_kg_per_m": (strands.linear_density_kg_per_m * longer**2, "the base's density"),
+        "body.strands.linear_density_kg_per_m": (
+            strands.one_number("linear_density_kg_per_m") * longer**2,
+            "the base's density",
+        ),
         "body.strands.damping_time_s": ((strands.material_damping_s or 0.0) * slower, "a time: radius^0.5"),
-        "body.pins.mass_kg": (pins.mass_kg * longer**3, "the base's share of the weight"),
+        "body.pins.mass_kg": (pins.one_number("mass_kg") * longer**3, "the base's share of the weight"),
         "body.pins.radius_m": (pins.radius_m * scale, "a length"),
         "body.springs.stiffness_N_per_m": (
-            springs.stiffness_N_per_m * longer**2,
+            springs.one_number("stiffness_N_per_m") * longer**2,
             "strands' bending stiffness over side^3",
         ),
         "body.rings.length_range_m": (ranges, "the base's share of the ring at rest"),
@@ -120,18 +133,41 @@ def similar_worm(radius_m: float, n_segments: int = 3, n_helices: int = 12, leng
     if low >= high:
         raise ConfigError(f"n_helices = {n_helices}: neighbours lift a segment further than it lengthens; take more")
     fields["body.rings.peak_force_N"] = (force, "the base's share of what the mesh bears")
+    if rear_radius_m is not None:
+        fields |= _tapered(body, force, ranges, rear_radius_m)
     fields["sensor.tolerance_m"] = ((low + high) / 2.0, f"middle of the window {1e3 * low:.2g} to {1e3 * high:.2g} mm")
     # Steps stay whole multiples of one another.
     return {path: (_rounded(value), rule) for path, (value, rule) in fields.items()} | steps
 
 
-def worm_text(radius_m: float, n_segments: int = 3, n_helices: int = 12, length_m: float | None = None) -> str:
+def _tapered(body: WormBody, force_N: float, range_m: list[float], rear_radius_m: float) -> Fields:
+    """Returns what differs among the segments of a body whose radius changes evenly from the first ring to the last."""
+    n, front_m = body.n_segments, body.mesh.radii_m[0]
+    radii = [front_m + (rear_radius_m - front_m) * ring / (n - 1) for ring in range(n)]
+    mesh = check_section(Mesh, body.mesh.model_dump() | {"radius_m": radii})
+    bodies = [body.model_copy(update={"mesh": mesh.of_segment(ring)}) for ring in range(n)]
+    forces = [force_N * bearable_force_N(one) / bearable_force_N(body) for one in bodies]
+    ranges = [[bound * radius / front_m for bound in range_m] for radius in radii]
+    return {
+        "body.mesh.radius_m": (radii, "even from the first ring to the last"),
+        "body.rings.length_range_m": (ranges, "the base's share of each ring at rest"),
+        "body.rings.peak_force_N": (forces, "the base's share of what the mesh bears there"),
+    }
+
+
+def worm_text(
+    radius_m: float,
+    n_segments: int = 3,
+    n_helices: int = 12,
+    length_m: float | None = None,
+    rear_radius_m: float | None = None,
+) -> str:
     """Returns `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
 
     Raises:
         ConfigError: As `similar_worm`, or its run would be refused, by the checks or by the engine.
     """
-    fields = similar_worm(radius_m, n_segments, n_helices, length_m)
+    fields = similar_worm(radius_m, n_segments, n_helices, length_m, rear_radius_m)
     config = load_config(BASE, _values(fields))
     refuse_nonsense(config)
     compile_spec(build_spec(config))
@@ -169,7 +205,7 @@ def _planes_and_rate(
 ) -> tuple[int, float]:
     """Planes between rings, and turn of a strand along the axis, rad/m, that give a length."""
     mesh = known.mesh
-    shape, half = mesh.angular_rate_rad_per_m * mesh.radius_m, n_helices // 2
+    shape, half = mesh.angular_rate_rad_per_m * mesh.one_number("radius_m"), n_helices // 2
     if length_m is None:
         return mesh.planes_between_rings, shape / radius_m
 

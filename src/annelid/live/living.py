@@ -205,7 +205,6 @@ def knobs_of(config: RunConfig) -> tuple[Knob, ...]:
     assert isinstance(body, WormBody)
     assert arena is not None
     friction, strands, springs = "arena.friction", "body.strands.young_modulus_Pa", "body.springs.stiffness_N_per_m"
-    gpa, stiffness = 1e-9 * body.strands.young_modulus_Pa, body.springs.stiffness_N_per_m
     sliding = f"Sliding friction of skin and ground ({'forwards' if arena.has_setae else 'any direction'}). "
     rebuilt = "The body is rebuilt and goes on where it is."
     bending = f"Young's modulus of the strands, which resists bending. {rebuilt}"
@@ -213,9 +212,13 @@ def knobs_of(config: RunConfig) -> tuple[Knob, ...]:
     most = _above(arena.friction, 2.0)
     knobs = [
         Knob(friction, "friction", 1.0, _LEAST_FRICTION, most, 0.01, sliding + "Takes effect in the next step."),
-        Knob(strands, "strands (GPa)", 1e-9, _round(gpa / 4), _round(4 * gpa), _round(gpa / 40), bending),
-        Knob(springs, "springs (N/m)", 1.0, 0.0, _round(4 * stiffness) or 100.0, 0.1, axial),
     ]
+    # A slider has one number, for all segments.
+    if isinstance(modulus_Pa := body.strands.young_modulus_Pa, float):
+        gpa = 1e-9 * modulus_Pa
+        knobs.append(Knob(strands, "strands (GPa)", 1e-9, _round(gpa / 4), _round(4 * gpa), _round(gpa / 40), bending))
+    if isinstance(rate := body.springs.stiffness_N_per_m, float):
+        knobs.append(Knob(springs, "springs (N/m)", 1.0, 0.0, _round(4 * rate) or 100.0, 0.1, axial))
     if "tolerance_m" in controller.sensor_fields:
         most = _above(1e3 * sensor.tolerance_m, 40.0)
         near = "A stretch sensor is on while its segment is within this of its rest length."

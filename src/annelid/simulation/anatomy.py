@@ -7,6 +7,7 @@ to the last bit in both cases: sums run in the same order whatever the number of
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import atan2, cos, sin
 from typing import NamedTuple
 
 import mujoco
@@ -19,7 +20,7 @@ from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
-from annelid.morphology import Array, MeshGeometry, norm
+from annelid.morphology import Array, MeshGeometry, heading_turn, norm
 from annelid.simulation.energies import Elasticity, EnergyMeter, plastic_at_rest, turned_frames
 from annelid.simulation.objects import Met, Objects, add_scene_sensors, in_scene
 from annelid.simulation.skin import Skin
@@ -213,7 +214,23 @@ def at_rest(model: mujoco.MjModel) -> Placed:
     return Placed(model.qpos0.copy(), plastic_at_rest(model))
 
 
-def turned(model: mujoco.MjModel, placed: Placed, turn: Array) -> Placed:
+def laid_down(anatomy: Anatomy, body: WormBody) -> Placed | None:
+    """Returns how a worm lies on its ground at the start, None where that is the model's own rest.
+
+    It is turned to its heading. If its radius differs along it, its axis is level in the model; then it leans until the
+    lowest points of its first and its last ring are equally high, and its own lowest point has the height z = 0.
+    """
+    geometry, radii, rings = anatomy.geometry, body.mesh.radii_m, anatomy.geometry.ring_planes[[0, -1]]
+    if len(set(radii)) == 1:
+        heading = body.heading_deg
+        return turned(anatomy.model, at_rest(anatomy.model), heading_turn(heading)) if heading else None
+    lean = atan2(radii[0] - radii[-1], float(np.diff(geometry.plane_x_m[rings])[0]))
+    turn = np.array([[cos(lean), 0.0, sin(lean)], [0.0, 1.0, 0.0], [-sin(lean), 0.0, cos(lean)]])
+    lowest_m = float((geometry.vertices_m @ turn[2]).min())
+    return turned(anatomy.model, at_rest(anatomy.model), heading_turn(body.heading_deg) @ turn, -lowest_m)
+
+
+def turned(model: mujoco.MjModel, placed: Placed, turn: Array, lifted_m: float = 0.0) -> Placed:
     """Turns a worm by a rotation matrix, ``(3, 3)``, about the model's origin, which is below its front end at rest.
 
     The model lies along x, and its state at the start is that of the turned worm. So all that belongs to the body
@@ -228,10 +245,13 @@ def turned(model: mujoco.MjModel, placed: Placed, turn: Array) -> Placed:
     address = model.jnt_qposadr[model.body_jntadr[points]][:, np.newaxis] + np.arange(3)
     origin = model.body_pos[points]
     qpos[address] = (origin + qpos[address]) @ turn.T - origin
+    if lifted_m:
+        qpos[address[:, 2]] += lifted_m
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(turn).ravel())
     free_joints = (model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)) & ~scene[model.jnt_bodyid]
     for free in model.jnt_qposadr[free_joints]:
         qpos[free : free + 3] = turn @ qpos[free : free + 3]
+        qpos[free + 2] += lifted_m
         mujoco.mju_mulQuat(qpos[free + 3 : free + 7], quaternion, qpos[free + 3 : free + 7].copy())
     return Placed(qpos, turned_frames(model, placed.plastic, turn))

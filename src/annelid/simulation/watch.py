@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body.estimates import COLLAPSED, HARDLY, rhombus_of, touching_ring_m
+from annelid.body.estimates import COLLAPSED, HARDLY, touching_ring_m
 from annelid.body.worm import WormBody
 from annelid.config import Guard
-from annelid.morphology import Array
+from annelid.morphology import Array, MeshGeometry
 from annelid.plausibility import IDLE_SHARE, NUMERICAL_SHARE
 from annelid.protocols import State
 
@@ -46,19 +46,23 @@ class Energies(NamedTuple):
 class Watch:
     """Looks at one worm, and keeps what is worth a warning."""
 
-    def __init__(self, body: WormBody, guard: Guard) -> None:
+    def __init__(self, body: WormBody, geometry: MeshGeometry, guard: Guard) -> None:
         """Derives the limits from the mesh at rest."""
-        shape, rings, n = rhombus_of(body), body.rings, body.mesh.n_segments
+        rings, n = body.rings, body.mesh.n_segments
         self._guard = guard
         self._per_segment = 2 if rings.layout == "halves" else 1
-        self._ring_rest_m, self._ring_least_m = shape.ring_length_m, touching_ring_m(body)
-        self._spring_rest_m, self._spring_most_m = shape.along_m, shape.longest_m
-        self._deep_m, self._gap_m = DEEP * body.mesh.radius_m, WIDE_GAP * shape.side_m
+        self._ring_rest_m, self._ring_least_m = geometry.ring_length_m, touching_ring_m(body)
+        self._spring_most_m = geometry.spring_longest_m
+        self._deep_m = DEEP * min(body.mesh.radii_m)
+        self._gap_m = WIDE_GAP * float(self._spring_most_m.min()) / 2
         self._idle_N = IDLE_SHARE * np.repeat(rings.forces(n), self._per_segment)
         self._force_field = rings.force_field
         # The largest values so far, when they were reached, s, and where.
         names = "closing", "depth", "gap", "spring"
         self._extremes: dict[str, tuple[float, float, int]] = dict.fromkeys(names, (-math.inf, 0.0, 0))
+        # What they are compared by: the length at rest of the place where each was, rings counted from 1.
+        rings_m, springs_m = self._ring_rest_m.tolist(), geometry.spring_length_m.tolist()
+        self._rest_m = {"closing": [1.0, *rings_m], "depth": [1.0], "gap": [1.0], "spring": springs_m}
         # Of every muscle: whether it is active; since when, s; its longest contraction, s; its largest force since it
         # is active, N; in how many contractions it has pulled nothing; and when the first of these began, s.
         self._muscles = np.zeros((6, len(self._idle_N)))
@@ -89,20 +93,27 @@ class Watch:
         most_N = self._muscles[3]
         np.maximum(most_N, force_N, out=most_N)
         rings = ring_length_m.reshape(-1, 2).sum(axis=1) if self._per_segment == 2 else ring_length_m
-        ring_m, spring_m = float(np.minimum.reduce(rings)), float(np.maximum.reduce(spring_length_m))
-        for name, value in (("closing", -ring_m), ("depth", depth_m), ("gap", gap_m), ("spring", spring_m)):
-            if value > self._extremes[name][0]:
-                self._extremes[name] = value, time_s, int(rings.argmin()) + 1 if name == "closing" else 0
-        guard = self._guard
+        ring, spring = int((rings / self._ring_rest_m).argmin()), int((spring_length_m / self._spring_most_m).argmax())
+        spring_m, spring_most_m = float(spring_length_m[spring]), float(self._spring_most_m[spring])
+        for name, value, place in (
+            ("closing", -float(rings[ring]), ring + 1),
+            ("depth", depth_m, 0),
+            ("gap", gap_m, 0),
+            ("spring", spring_m, spring),
+        ):
+            (most, _, where), rest_m = self._extremes[name], self._rest_m[name]
+            if value / rest_m[place] > most / rest_m[where]:
+                self._extremes[name] = value, time_s, place
+        guard, ring_m = self._guard, float(np.minimum.reduce(rings))
         if ring_m < guard.ring_closure * self._ring_least_m:
             return (
-                f"ring {self._extremes['closing'][2]} is {ring_m:.3g} m long, below the limit guard.ring_closure = "
+                f"ring {int(rings.argmin()) + 1} is {ring_m:.3g} m long, below the limit guard.ring_closure = "
                 f"{guard.ring_closure:g} times the {self._ring_least_m:.3g} m at which its crossings touch"
             )
-        if spring_m > guard.stretch * self._spring_most_m:
+        if spring_m > guard.stretch * spring_most_m:
             return (
                 f"an axial spring is {spring_m:.3g} m long, above the limit guard.stretch = {guard.stretch:g} times "
-                f"the {self._spring_most_m:.3g} m at which the strands beside it are straight"
+                f"the {spring_most_m:.3g} m at which the strands beside it are straight"
             )
         if depth_m > guard.depth_m:
             return (
@@ -131,17 +142,18 @@ class Watch:
         """Returns a sentence for everything doubtful up to a time, s."""
         found: list[str] = []
         (closing_m, closed_s, ring), depth, gap, spring = self._extremes.values()
-        ring_m, rest_m = -closing_m, self._ring_rest_m
+        ring_m, rest_m = -closing_m, self._rest_m["closing"][ring]
         if ring_m < COLLAPSED * rest_m:
             found.append(
                 f"ring {ring} was {ring_m:.3g} m long at {closed_s:.4g} s, "
                 f"{100 * ring_m / rest_m:.0f} % of its length at rest: the mesh has collapsed under "
                 f"body.rings.{self._force_field}, or by itself"
             )
-        if spring[0] > LONG * self._spring_rest_m:
+        spring_rest_m = self._rest_m["spring"][spring[2]]
+        if spring[0] > LONG * spring_rest_m:
             found.append(
                 f"an axial spring was {spring[0]:.3g} m long at {spring[1]:.4g} s, "
-                f"{spring[0] / self._spring_rest_m:.1f} times its length in the mesh at rest"
+                f"{spring[0] / spring_rest_m:.1f} times its length in the mesh at rest"
             )
         if depth[0] > self._deep_m:
             found.append(
@@ -159,7 +171,7 @@ class Watch:
             found.append(
                 f"the actuators of segment{'s' * (len(segments) > 1)} {', '.join(map(str, segments))} pulled nothing "
                 f"in {idle.sum():.0f} of their contractions, first from {first_idle_s[idle > 0].min():.4g} s on: see "
-                f"body.rings.length_range_m, with rings of {rest_m:.3g} m at rest"
+                f"body.rings.length_range_m, with rings of {self._ring_rest_m[segments[0] - 1]:.3g} m at rest"
             )
         elif ring_m > (1.0 - HARDLY) * rest_m and longest_s.max() >= LONG_CONTRACTION_S:
             found.append(

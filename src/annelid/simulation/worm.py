@@ -22,7 +22,7 @@ from annelid.errors import SimulationStopped
 from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
-from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, at_rest, turned
+from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, laid_down
 from annelid.simulation.energies import EnergyTotals, Engine
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.objects import NOTHING
@@ -171,8 +171,7 @@ class Worm(ABC):
         self._floor = cast(Plane, arena.ground())
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._activation: Array = np.zeros(anatomy.n_muscles)
-        heading = body.heading_deg
-        self.start = turned(anatomy.model, at_rest(anatomy.model), heading_turn(heading)) if heading else None
+        self.start = laid_down(anatomy, body)
 
     @property
     def _time_s(self) -> float:
@@ -241,7 +240,7 @@ class Worm(ABC):
         self._tension_N = np.zeros(self.n_muscles)
         self.touch = Touch.none(n)
         self.posture = self._locate()
-        self._watch = Watch(self._body, self._config.guard)
+        self._watch = Watch(self._body, self.geometry, self._config.guard)
         self._elastic_at_start_J, self._potential_at_start_J = self.elastic_energy_J(), self.potential_energy_J()
         return self.observe()
 

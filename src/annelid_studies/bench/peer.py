@@ -75,20 +75,20 @@ def stable_step_s(body: WormBody) -> float:
     ``omega**2 = k G A / (rho I)`` with ``I / A = r**2 / 4``; the scheme is stable while ``omega * step < 2``. So the
     step depends neither on the length nor on the number of elements.
     """
-    shear_Pa = SHEAR_CORRECTION * body.strands.shear_modulus_Pa
+    shear_Pa = SHEAR_CORRECTION * body.strands.one_number("shear_modulus_Pa")
     return body.strands.radius_m * sqrt(_density_kg_per_m3(body) / shear_Pa)
 
 
 def _density_kg_per_m3(body: WormBody) -> float:
     """Density that gives a solid strand its mass a length."""
-    return body.strands.linear_density_kg_per_m / (pi * body.strands.radius_m**2)
+    return body.strands.one_number("linear_density_kg_per_m") / (pi * body.strands.radius_m**2)
 
 
 def _run(body: WormBody, step_s: float, n_steps: int) -> tuple[float, bool]:
     """Steps the rods from a bending wave; returns the wall-clock time (s) and whether they stayed bounded."""
     elastica: Any = import_module("elastica")
     strands, mesh = body.strands, body.mesh
-    length_m = mesh_of(mesh).length_m * hypot(1.0, mesh.angular_rate_rad_per_m * mesh.radius_m)
+    length_m = mesh_of(mesh).length_m * hypot(1.0, mesh.angular_rate_rad_per_m * mesh.one_number("radius_m"))
     system, rods = elastica.BaseSystemCollection(), []
     for index in range(mesh.n_helices):
         rod = elastica.CosseratRod.straight_rod(
@@ -99,8 +99,8 @@ def _run(body: WormBody, step_s: float, n_steps: int) -> tuple[float, bool]:
             length_m,
             strands.radius_m,
             _density_kg_per_m3(body),
-            youngs_modulus=strands.young_modulus_Pa,
-            shear_modulus=strands.shear_modulus_Pa,
+            youngs_modulus=strands.one_number("young_modulus_Pa"),
+            shear_modulus=strands.one_number("shear_modulus_Pa"),
         )
         rod.velocity_collection[2] = _WAVE_M_PER_S * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, ELEMENTS + 1))
         system.append(rod)

@@ -16,17 +16,19 @@ from annelid.experiment import Case, Hold, Outcome, Store
 from annelid_studies.riddle2023.figures.muscle_surface import scaled_length
 from annelid_studies.worms import RODS
 
-PRESET = "wang"
-AUTHORS_MESH: dict[str, Any] = {
-    "body.strands.young_modulus_Pa": 2.0e9,
-    "body.strands.shear_modulus_Pa": 1.33e9,
-    "body.springs.stiffness_N_per_m": 24.5,
-    "body.springs.rest_length_m": 0.065,
+PRESET = "riddle2025"
+BASE_WORM: dict[str, Any] = {
+    "body.mesh.n_segments": 4,
+    "body.mesh.elements_per_side": 3,
+    "body.mesh.planes_between_rings": 4,
+    "body.mesh.free_planes_at_ends": 3,
+    "body.mesh.rear_overhang_m": 0.0177013,
+    "body.pins.mass_kg": 0.0135,
     "body.rings.force_limit_N": 13.2,
-    "body.rings.speed_limit_m_per_s": 0.2,
 }
-"""The preset with these is the base worm, which all others change in one quantity: rods and springs of the authors'
-models, none of them tuned to the robot's elongations, and servos of which a single one moves an end as the robot's."""
+"""The preset with these is the base worm, which all others change in one quantity: the four-segment robot with rods and
+springs of the authors' models, none of them tuned to its elongations, and servos of which one alone moves an end as the
+robot's."""
 RESOLUTION: dict[str, Any] = {
     "clock.control_timestep_s": 0.02,
     "clock.physics_timestep_s": 0.02,
@@ -71,8 +73,8 @@ class Actuator(NamedTuple):
 
 @cache
 def base_body() -> WormBody:
-    """Returns the body of the base worm: the preset's with the authors' mesh."""
-    body = load_config(PRESET, AUTHORS_MESH).body
+    """Returns the body of the base worm: four segments of the preset."""
+    body = load_config(PRESET, BASE_WORM).body
     assert isinstance(body, WormBody)
     return body
 
@@ -152,7 +154,7 @@ def pull(segment: int, actuator: Actuator, changes: Mapping[str, Any] | None = N
         "contractions": [{**contraction, "stop_s": stop} for stop in READ_S],
     }
     own = {"duration_s": DURATION_S, "controller": program}
-    return Case(PRESET, {**AUTHORS_MESH, **RESOLUTION, **STANDSTILL, **actuator.changes, **(changes or {}), **own})
+    return Case(PRESET, {**BASE_WORM, **RESOLUTION, **STANDSTILL, **actuator.changes, **(changes or {}), **own})
 
 
 @dataclass(frozen=True, slots=True)

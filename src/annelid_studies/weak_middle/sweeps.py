@@ -51,10 +51,10 @@ def stiffness_changes(young_GPa: float) -> dict[str, Any]:
     The shear modulus keeps its ratio to it and the damping its time: soft rods come to rest as soon as stiff ones.
     """
     strands = base_body().strands
-    share = young_GPa * 1e9 / strands.young_modulus_Pa
+    share = young_GPa * 1e9 / strands.one_number("young_modulus_Pa")
     return {
         "body.strands.young_modulus_Pa": young_GPa * 1e9,
-        "body.strands.shear_modulus_Pa": round(share * strands.shear_modulus_Pa),
+        "body.strands.shear_modulus_Pa": round(share * strands.one_number("shear_modulus_Pa")),
     }
 
 
@@ -64,7 +64,7 @@ def weight_changes(mass_kg: float) -> dict[str, Any]:
         return {"arena.gravity_m_per_s2": 0.0}
     body = base_body()
     mesh = mesh_of(body.mesh)
-    strands_kg = mesh.n_strands * mesh.strand_length_m * body.strands.linear_density_kg_per_m
+    strands_kg = mesh.n_strands * mesh.strand_length_m * body.strands.one_number("linear_density_kg_per_m")
     if mass_kg <= strands_kg:
         raise ConfigError(f"mass_kg = {mass_kg:g} must be above {strands_kg:.3f}, which the strands weigh alone")
     return {"body.pins.mass_kg": round((mass_kg - strands_kg) / mesh.n_crossings, 9)}

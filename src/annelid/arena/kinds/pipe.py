@@ -93,10 +93,10 @@ class Pipe(ArenaKind):
     def check_with(self, config: RunConfig) -> None:
         """Checks that the worm leads along the pipe and fits into its entry."""
         free, mesh = self.bore_m + self.entry_clearance_m, getattr(config.body, "mesh", None)
-        if mesh is not None and free < mesh.radius_m:
+        if mesh is not None and free < max(mesh.radii_m):
             raise ValueError(
                 f"arena.bore_m = {self.bore_m:g}: with arena.entry_clearance_m = {self.entry_clearance_m:g} it must be "
-                f"at least body.mesh.radius_m = {mesh.radius_m:g}, the worm that starts inside; make it narrower "
+                f"at least body.mesh.radius_m = {max(mesh.radii_m):g}, the worm that starts inside; make it narrower "
                 "further on with arena.profile"
             )
         refuse_heading(config, f"arena.kind = {self.kind!r}")

@@ -85,5 +85,6 @@ class Scene(ArenaKind):
         """Adds ground and things, which have the arena's contact parameters unless they state their own."""
         from annelid.arena.geoms import add_scene, contact_options
 
-        contact = {name: " ".join(map(repr, values)) for name, values in contact_options(self).items()}
+        options = contact_options(self)
+        contact = {name: " ".join(map(repr, options[name])) for name in ("friction", "solref", "solimp")}
         add_scene(spec, with_contact(self.xml, contact), self.floor_gap_m)

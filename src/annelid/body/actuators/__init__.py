@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import Field, field_validator
 
 from annelid.config.kinds import Kind
-from annelid.config.sections import Positive, Range
+from annelid.config.sections import PerSegmentOf, Positive, Range
 from annelid.morphology import Array
 from annelid.registry import Registry
 
@@ -22,13 +22,7 @@ if TYPE_CHECKING:
     from annelid.body.worm import WormBody
 
 
-def _not_empty(value: float | tuple[float, ...]) -> float | tuple[float, ...]:
-    if value == ():
-        raise ValueError("needs one number for all segments or one for each")
-    return value
-
-
-PerSegment = Annotated[Positive | tuple[Positive, ...], AfterValidator(_not_empty)]
+PerSegment = PerSegmentOf[Positive]
 """One number for all segments, or one for each."""
 
 
@@ -77,8 +71,13 @@ class ActuatorKind(Kind):
 
     def forces(self, n_segments: int) -> list[float]:
         """Returns the greatest force of every segment's actuators, N."""
-        value = getattr(self, self.force_field)
-        return list(value) if isinstance(value, tuple) else [value] * n_segments
+        return self.of_each(self.force_field, n_segments)
+
+    def of_segments(self, segments: Sequence[int], n_segments: int) -> Self:
+        """Returns the section with the ranges and forces of some of the segments only, counted from 0."""
+        ranges, forces = self.length_ranges(n_segments), self.forces(n_segments)
+        chosen = {"length_range_m": ranges, self.force_field: forces}
+        return self.model_copy(update={name: tuple(values[s] for s in segments) for name, values in chosen.items()})
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
         """Checks its lengths and forces against the mesh, before anything runs; by default nothing is doubted."""

@@ -6,6 +6,8 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import numpy as np
+
 from annelid.config.kinds import Kind
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry
@@ -15,9 +17,30 @@ if TYPE_CHECKING:
     import mujoco
 
     from annelid.body.estimates import Finding
-    from annelid.body.worm import WormBody
+    from annelid.body.worm import Strands, WormBody
     from annelid.config.arena import ArenaKind
     from annelid.config.run import RunConfig
+
+
+def stiffness_shares(geometry: MeshGeometry, strands: Strands) -> Array:
+    """Returns how stiff every strand is along itself, over the material of the first segment.
+
+    Returns:
+        Shares in bending and in twist at every inner vertex, ``(2, n_strands, n_vertices - 2)``.
+    """
+    each = [strands.of_segment(segment) for segment in range(geometry.n_segments)]
+    moduli = np.array([[one.one_number("young_modulus_Pa"), one.one_number("shear_modulus_Pa")] for one in each])
+    along = geometry.along(moduli / moduli[0], geometry.vertices_m[0, 1:-1, 0])
+    of_strand = np.array(strands.relative_stiffness or [1.0] * geometry.n_strands)
+    return along.T[:, np.newaxis] * of_strand[:, np.newaxis]
+
+
+def densities_kg_per_m(geometry: MeshGeometry, strands: Strands) -> Array:
+    """Returns the mass per length of every element of a strand, which all have alike, ``(n_elements,)``."""
+    x = geometry.vertices_m[0, :, 0]
+    each = strands.of_each("linear_density_kg_per_m", geometry.n_segments)
+    return geometry.along(each, (x[:-1] + x[1:]) / 2)
+
 
 PinReader = Callable[[Mapping[str, Array]], Array]
 """Reads the largest gap at a pin, m, from the engine's arrays."""

@@ -83,11 +83,11 @@ def structure_claims(evidence: Evidence) -> list[Claim]:
             "Density and thickness give the model the mass of the robot's tubes.",
             "section 2.2",
             f"{1e3 * density:.1f} g/m",
-            f"{1e3 * body.strands.linear_density_kg_per_m:.1f} g/m in the authors' files",
+            f"{1e3 * body.strands.one_number('linear_density_kg_per_m'):.1f} g/m in the authors' files",
             "The thinner strand is lighter than the tube by the same share as its area, even with the capsules' "
             "overlapping caps. Motors and cables, most of the robot's weight, are not in the model.",
             "annelid presets riddle2023",
-            *near([body.strands.linear_density_kg_per_m], density, ""),
+            *near([body.strands.one_number("linear_density_kg_per_m")], density, ""),
         ),
         pins_claim(evidence),
         elements_claim(evidence),
@@ -174,7 +174,7 @@ def actuation_claims(evidence: Evidence) -> list[Claim]:
     summaries = [one.summary for one, _ in evidence.runs]
     medians = [summary.contraction_force_median_N or nan for summary in summaries]
     peaks = [summary.contraction_force_peak_N or nan for summary in summaries]
-    spring_force = [6 * body.springs.stiffness_N_per_m * stretch for stretch in (0.02, 0.03)]
+    spring_force = [6 * body.springs.one_number("stiffness_N_per_m") * stretch for stretch in (0.02, 0.03)]
     slope, reach = (field_value(MAIN.config, f"controller.{name}") for name in ("activation_slope_per_mV", "range_mV"))
     printed, meant = (1 / (1 + np.exp(sign * slope * reach)) for sign in (1, -1))
     usual, short = (

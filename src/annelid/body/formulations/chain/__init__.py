@@ -103,11 +103,12 @@ class Chain(FormulationKind):
 def _largest_step_s(body: WormBody, formulation: Chain) -> float:
     """Largest stable step of the explicit integrator, s, from the joints' and the springs' own rates."""
     strands, element = body.strands, rhombus_of(body).side_m / body.mesh.elements_per_side
-    inertia = formulation.armature_kg_m2 + strands.linear_density_kg_per_m * element**3 / 12.0
+    density = strands.one_number("linear_density_kg_per_m")
+    inertia = formulation.armature_kg_m2 + density * element**3 / 12.0
     stiffness = strands.bending_rigidity_Nm2 / element
-    mass = body.pins.mass_kg if formulation.pins == "separate" else strands.linear_density_kg_per_m * element * 2.0
+    mass = body.pins.one_number("mass_kg") if formulation.pins == "separate" else density * element * 2.0
     # Neighbouring joints act on one element: four times the rate of one at the shortest wave.
-    swung = max((4.0 * stiffness / inertia) ** 0.5, (4.0 * body.springs.stiffness_N_per_m / mass) ** 0.5)
+    swung = max((4.0 * stiffness / inertia) ** 0.5, (4.0 * body.springs.one_number("stiffness_N_per_m") / mass) ** 0.5)
     if formulation.integrator != "RK4":
         return 2.0 / swung
     damped = 4.0 * strands.joint_damping(stiffness) / inertia

@@ -9,14 +9,15 @@ tied by two `connect` constraints to its strands, or one constraint straight bet
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import contact_options
+from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.damping import add_row
+from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.formulations.rods.net import AXES, STRAND_RGBA, add_touch
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
@@ -35,12 +36,18 @@ def add_chains(
     spec.option.iterations = formulation.solver_iterations
     spec.option.tolerance = formulation.solver_tolerance
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    touch = {"contact": contact_options(arena), "vertices_touch": spheres}
+    n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
+    places = x if spheres else (x[:-1] + x[1:]) / 2
+    contact = skin_options(arena, geometry, body.of_each("relative_friction", n), places)
+    material, shares = body.strands.of_segment(0), stiffness_shares(geometry, body.strands)
+    density = densities_kg_per_m(geometry, body.strands)
     for strand, vertices_m in enumerate(geometry.vertices_m):
+        own = {"density_kg_per_m": density, "shares": shares[:, strand], "contact": contact, "vertices_touch": spheres}
         rgba = STRAND_RGBA[strand // geometry.n_per_plane]
-        add_chain(spec, f"strand_{strand}", vertices_m, body.strands, formulation, rgba=rgba, **touch)
+        add_chain(spec, f"strand_{strand}", vertices_m, material, formulation, rgba=rgba, **own)
+    pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
     for crossing in range(geometry.n_crossings):
-        _add_pin(spec, geometry, crossing, body, formulation)
+        _add_pin(spec, geometry, crossing, body, formulation, float(pins_kg[geometry.crossing_plane[crossing]]))
 
 
 def add_chain(
@@ -50,7 +57,9 @@ def add_chain(
     strands: Strands,
     formulation: Chain,
     *,
-    contact: dict[str, list[float]] | None = None,
+    contact: list[dict[str, Any]] | None = None,
+    density_kg_per_m: Array | None = None,
+    shares: Array | None = None,
     vertices_touch: bool = False,
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     root: int | None = None,
@@ -59,10 +68,15 @@ def add_chain(
     """Adds one chain of capsules; element ``e`` is body ``<name>_<e>`` between vertices ``e`` and ``e + 1``.
 
     The tree grows from a root element, by default the middle one, which may be welded to the world (a cantilever).
-    Without contact attributes the chain touches nothing, else by its capsules or by spheres at its vertices,
-    ``(n_vertices, 3)``.
+    Without contact attributes the chain touches nothing, else by its capsules, with attributes for each, or by spheres
+    at its vertices, ``(n_vertices, 3)``, with attributes for each of these. Mass per length of every element,
+    ``(n_elements,)``, and shares of the stiffness at every inner vertex, ``(2, n_elements - 1)``, are as of a rod.
     """
     n_elements = len(vertices_m) - 1
+    if density_kg_per_m is None:
+        density_kg_per_m = np.full(n_elements, strands.one_number("linear_density_kg_per_m"))
+    if shares is None:
+        shares = np.ones((2, n_elements - 1))
     middle = _middle_element(len(vertices_m)) if root is None else root
 
     def add_element(parent: mujoco.MjsBody, element: int, joint_vertex: int, origin: Array) -> mujoco.MjsBody:
@@ -74,16 +88,16 @@ def add_chain(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=span.ravel(),
             size=[strands.radius_m, 0.0, 0.0],
-            mass=strands.linear_density_kg_per_m * length,
+            mass=density_kg_per_m[element] * length,
             contype=0,
             conaffinity=0 if contact is None or vertices_touch else 1,
             rgba=rgba,
-            **(contact or {}),
+            **(contact[element] if contact is not None and not vertices_touch else {}),
         )
         if contact is not None and vertices_touch:
             own = {element, element + 1} if element == middle else {element, element + 1} - {joint_vertex}
             for vertex in sorted(own):
-                add_touch(link, strands.radius_m, contact, vertices_m[vertex] - place)
+                add_touch(link, strands.radius_m, contact[vertex], vertices_m[vertex] - place)
         return link
 
     first = add_element(spec.worldbody, middle, middle, np.zeros(3))
@@ -95,14 +109,17 @@ def add_chain(
             joint_vertex = element if direction > 0 else element + 1
             parent = add_element(parent, element, joint_vertex, origin)
             origin = vertices_m[joint_vertex]
-            _add_joint(parent, vertices_m, joint_vertex, strands, formulation)
+            _add_joint(parent, vertices_m, joint_vertex, strands, formulation, shares[:, joint_vertex - 1].tolist())
 
 
-def _add_joint(link: mujoco.MjsBody, vertices_m: Array, vertex: int, strands: Strands, formulation: Chain) -> None:
-    """Joins two elements at a vertex; the joint stands for half of each."""
+def _add_joint(
+    link: mujoco.MjsBody, vertices_m: Array, vertex: int, strands: Strands, formulation: Chain, shares: list[float]
+) -> None:
+    """Joins two elements at a vertex; the joint stands for half of each, as stiff as the material times its shares."""
     before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
     length = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
-    bending, torsion = strands.bending_rigidity_Nm2, strands.shear_modulus_Pa * pi * strands.radius_m**4 / 2
+    bending = strands.bending_rigidity_Nm2 * shares[0]
+    torsion = strands.one_number("shear_modulus_Pa") * pi * strands.radius_m**4 / 2 * shares[1]
 
     def add(kind: mujoco.mjtJoint, rate: float, **axis: Array) -> None:
         stiffness = rate / length
@@ -125,7 +142,9 @@ def _add_joint(link: mujoco.MjsBody, vertices_m: Array, vertex: int, strands: St
         add(mujoco.mjtJoint.mjJNT_HINGE, rate, axis=axis)
 
 
-def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain) -> None:
+def _add_pin(
+    spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain, mass_kg: float
+) -> None:
     name = crossing_site(crossing)
     position = geometry.crossings_m[crossing]
     vertex = int(geometry.crossing_vertex[geometry.crossing_plane[crossing]])
@@ -140,7 +159,7 @@ def _add_pin(spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: W
         pin, joint = links[0], vertex if vertex >= _middle_element(geometry.vertices_m.shape[1]) else vertex + 1
         place = position - geometry.vertices_m[geometry.crossing_strands[crossing, 0], joint]
         pairs = [(pin.name, links[1].name)]
-    mark_crossing(pin, name, body.pins.radius_m, body.pins.mass_kg, place)
+    mark_crossing(pin, name, body.pins.radius_m, mass_kg, place)
     solver = {"solref": [formulation.pin_time_constant_s, 1.0], "solimp": [*formulation.pin_impedance, 0.5, 2.0]}
     connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
     for k, pair in enumerate(pairs):

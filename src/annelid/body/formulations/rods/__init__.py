@@ -68,9 +68,14 @@ class Rods(FormulationKind):
         return 1e-8 * n_elements**2 * n_helices, 2e-6 * n_elements * n_helices
 
     def check_body(self, body: WormBody) -> None:
-        """Checks that the dampers that are fixed in the world stand alone, on a worm that leads towards -x."""
-        lateral = self.lateral_damping_Nms_per_rad
-        if lateral > 0 and body.strands.material_damping_s is not None:
+        """Checks that stiffness differs with the material's damping only, and what stands beside lateral dampers."""
+        lateral, strands = self.lateral_damping_Nms_per_rad, body.strands
+        if strands.stiffness_differs and strands.material_damping_s is None:
+            raise ValueError(
+                "body.strands.damping_time_s = none: must be given for rods whose stiffness differs, since the engine "
+                "damps a rod in proportion to its stiffness"
+            )
+        if lateral > 0 and strands.material_damping_s is not None:
             raise ValueError(
                 f"body.formulation.lateral_damping_Nms_per_rad = {lateral:g} must be 0 where body.strands gives the "
                 "damping of the material, which acts in every direction"

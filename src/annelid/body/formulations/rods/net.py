@@ -16,14 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import contact_options
+from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, add_row, twist_name
+from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, add_row, shares_name, twist_name
+from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
@@ -57,32 +58,44 @@ def add_rods(
     spec.option.impratio = formulation.friction_impedance_ratio
     # The net is one island; looking for others takes 3 % of a step.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
-    names = _add_vertices(spec, geometry, body, formulation, contact_options(arena))
+    density, shares = densities_kg_per_m(geometry, body.strands), stiffness_shares(geometry, body.strands)
+    names = _add_vertices(spec, geometry, body, formulation, arena, density)
+    material = body.strands.of_segment(0)
     for strand, (vertices_m, bodies) in enumerate(zip(geometry.vertices_m, names, strict=True)):
-        rgba = STRAND_RGBA[strand // geometry.n_per_plane]
-        add_rod(spec, f"strand_{strand}", vertices_m, bodies, body.strands, formulation, rgba=rgba, dampers=dampers)
+        options = {"rgba": STRAND_RGBA[strand // geometry.n_per_plane], "dampers": dampers}
+        own = {"density_kg_per_m": density, "shares": shares[:, strand]}
+        add_rod(spec, f"strand_{strand}", vertices_m, bodies, material, formulation, **own, **options)
 
 
 def _add_vertices(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, contact: dict[str, list[float]]
+    spec: mujoco.MjSpec,
+    geometry: MeshGeometry,
+    body: WormBody,
+    formulation: Rods,
+    arena: ArenaKind,
+    density_kg_per_m: Array,
 ) -> list[list[str]]:
     """Adds a body for every vertex, crossings first (which the solver is fastest with); returns each strand's names."""
-    masses = lumped_masses(geometry.vertices_m[0], body.strands.linear_density_kg_per_m).tolist()
+    n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
+    masses = lumped_masses(geometry.vertices_m[0], density_kg_per_m).tolist()
+    pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
+    contact = skin_options(arena, geometry, body.of_each("relative_friction", n), x)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
     shared = formulation.pins == "shared"
     for crossing in range(geometry.n_crossings):
         name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
         place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
-        pin = add_vertex(spec, name, place, body.pins.mass_kg + (2 * masses[vertex] if shared else 0.0))
+        pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
+        pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if shared else 0.0))
         mark_crossing(pin, name, body.pins.radius_m, 0.0, ORIGIN)
         if shared:
-            add_touch(pin, body.strands.radius_m, contact)
+            add_touch(pin, body.strands.radius_m, contact[vertex])
             for strand in strands:
                 names[strand][vertex] = name
             continue
         for strand in strands:
             point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
-            add_touch(point, body.strands.radius_m, contact)
+            add_touch(point, body.strands.radius_m, contact[vertex])
             _tie(spec, pin, point, formulation)
 
     between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
@@ -90,7 +103,7 @@ def _add_vertices(
         with _built_apart(spec, vertex_name(strand, "")) as part:
             for vertex in between:
                 point = add_vertex(part, str(vertex), geometry.vertices_m[strand, vertex], masses[vertex])
-                add_touch(point, body.strands.radius_m, contact)
+                add_touch(point, body.strands.radius_m, contact[vertex])
     return names
 
 
@@ -147,7 +160,7 @@ def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> 
     return point
 
 
-def add_touch(point: mujoco.MjsBody, radius_m: float, contact: dict[str, list[float]], place_m: Array = ORIGIN) -> None:
+def add_touch(point: mujoco.MjsBody, radius_m: float, contact: dict[str, Any], place_m: Array = ORIGIN) -> None:
     """Lets a vertex touch the ground: one sphere, where a flex would make a contact for each strand of a crossing.
 
     Its place is in the axes of the vertex' body, m, ``(3,)``, and its radius that of the strand.
@@ -175,6 +188,8 @@ def add_rod(
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     clamped: bool = False,
     dampers: bool = True,
+    density_kg_per_m: Array | None = None,
+    shares: Array | None = None,
 ) -> None:
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
@@ -188,16 +203,25 @@ def add_rod(
         rgba: Colour.
         clamped: The first two vertices belong to one body (a cantilever): their edge has no twist hinge.
         dampers: As of `add_rods`.
+        density_kg_per_m: Mass per length of every edge, ``(n_edges,)``, instead of the material's.
+        shares: Stiffness at every inner vertex over the material's, in bending and in twist, ``(2, n_edges - 1)``; then
+            the model is to be compiled by `annelid.body.compile_spec`.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     n_edges = len(lengths)
+    if density_kg_per_m is None:
+        density_kg_per_m = np.full(n_edges, strands.one_number("linear_density_kg_per_m"))
+    if shares is None:
+        shares = np.ones((2, n_edges - 1))
+    if (shares != 1.0).any():
+        spec.add_numeric(name=shares_name(name), data=shares.ravel())
     joint = strands.bending_rigidity_Nm2 / float(lengths.mean())
     flex = spec.add_flex(
         name=name,
         dim=1,
         radius=strands.radius_m,
-        young=strands.young_modulus_Pa,
-        shear=strands.shear_modulus_Pa,
+        young=strands.one_number("young_modulus_Pa"),
+        shear=strands.one_number("shear_modulus_Pa"),
         damping=strands.joint_damping(joint) / joint,
         rgba=rgba,
         selfcollide=0,
@@ -212,7 +236,7 @@ def add_rod(
     with _built_apart(spec, f"{name}_") as part:
         for edge in range(1 if clamped else 0, n_edges):
             hinge = twist_name(name, edge, n_edges).removeprefix(f"{name}_")
-            inertia = 0.5 * strands.linear_density_kg_per_m * lengths[edge] * strands.radius_m**2
+            inertia = 0.5 * density_kg_per_m[edge] * lengths[edge] * strands.radius_m**2
             holder = add_holder(part, hinge, TWIST_MASS_KG, inertia)
             holder.add_joint(name=hinge, type=mujoco.mjtJoint.mjJNT_HINGE, axis=AXES[0])
     spec.add_equality(
@@ -226,7 +250,7 @@ def add_rod(
     if strands.material_damping_s:
         add_held_coordinate(spec)
         if dampers:
-            add_dampers(spec, name, vertices_m, bodies, strands, clamped=clamped)
+            add_dampers(spec, name, vertices_m, bodies, strands, shares[0], clamped=clamped)
     elif formulation.lateral_damping_Nms_per_rad > 0:
         for vertex in range(1, n_edges):
             _add_lateral_damper(spec, name, vertices_m, bodies, vertex, formulation.lateral_damping_Nms_per_rad)
@@ -258,7 +282,7 @@ def _add_lateral_damper(
     add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, name, name, **row)
 
 
-def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float) -> Array:
-    """Shares each element's mass between its two vertices, kg, shape ``(n_vertices,)``."""
+def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float | Array) -> Array:
+    """Shares each element's mass between its two vertices, kg, ``(n_vertices,)``; elements may differ in density."""
     half = 0.5 * linear_density_kg_per_m * np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     return np.append(half, 0.0) + np.insert(half, 0, 0.0)

@@ -88,7 +88,7 @@ def refusal(path: Path) -> str:
     sentence = str(error.value)
     assert "\n" not in sentence
     assert 10 < len(sentence) < 800
-    assert str(path) in sentence
+    assert path.name in sentence, "long paths are shortened"
     return sentence
 
 

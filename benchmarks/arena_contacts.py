@@ -61,7 +61,7 @@ class StillGround(WormPlant):
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.delete(spec.geom("floor"))
         _add_contact_sensors(spec)
-        super().__init__(config, Anatomy(compile_spec(spec), config.body, surface_of(config.arena)))
+        super().__init__(config, Anatomy(compile_spec(spec), config.body, config.arena))
         self.ground = None
 
 

@@ -26,6 +26,7 @@ from annelid.config import RunConfig, load_config
 from annelid.morphology import Array
 from annelid.output import write_csv
 from annelid.simulation import build_controller
+from annelid.simulation.objects import in_scene
 from annelid.simulation.worm import WormPlant
 
 HELD = ("kinetic_energy", "elastic_energy", "potential_energy")
@@ -43,7 +44,9 @@ class AuditedWorm(WormPlant):
     def __init__(self, config: RunConfig) -> None:
         super().__init__(config)
         self.integrator_J = self.spring_J = 0.0
-        self._slides = self.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        slides = self.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        # Those of a scene are none of the integrator's points.
+        self._slides = slides[self.model.dof_jntid] & ~in_scene(self.model)[self.model.dof_bodyid]
 
     def add_step(self, drive: Array) -> None:
         """Adds a step to the energy totals and audits it."""
@@ -52,7 +55,7 @@ class AuditedWorm(WormPlant):
         inertial = np.zeros(self.model.nv)
         mujoco.mj_mulM(self.model, data, inertial, data.qacc)
         known = data.qfrc_passive + data.qfrc_constraint - data.qfrc_bias
-        # The hinges' own matrix the engine does not show; their share is told by the force that is missing there.
+        # The hinges' own matrix, and a scene's, the engine does not show; their share is told by the missing force.
         implicit = np.where(self._slides, self._implicit_force(), inertial - known)
         self.integrator_J += 0.5 * h * h * float(inertial @ data.qacc) - h * float(implicit @ data.qvel)
         self.spring_J += h * float(data.qfrc_spring @ data.qvel)

@@ -43,22 +43,31 @@ def read_text(path: Path, what: str = "") -> str:
     Raises:
         UnreadableText: It cannot be read, is no regular file, is longer than `MOST_BYTES`, or is not UTF-8.
     """
+    content = read_bytes(path, what)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        named = f"{what} {path}".strip()
+        raise UnreadableText(f"cannot read {named}: it is not UTF-8 at byte {error.start}") from None
+    return text
+
+
+def read_bytes(path: Path, what: str = "", most: int = MOST_BYTES) -> bytes:
+    """Reads a file of at most so many bytes; raises as `read_text`."""
     named = f"{what} {path}".strip()
     try:
         # Asked first, since opening a pipe would wait for a writer.
         if not stat.S_ISREG(path.stat().st_mode):
             raise UnreadableText(f"cannot read {named}: it is a folder, a pipe or a device, not a file")
         with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
+            content = file.read(most + 1)
     except OSError as error:
         raise UnreadableText(f"cannot read {named}: {error.strerror}") from None
     except ValueError as error:
         raise UnreadableText(f"cannot read {shortened(named)!r}: {error}") from None
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise UnreadableText(f"cannot read {named}: it is not UTF-8 at byte {error.start}") from None
-    return _bounded(text, str(path), len(content))
+    if len(content) > most:
+        raise _too_long(str(path), most)
+    return content
 
 
 def read_toml(path: Path, what: str = "the configuration file") -> dict[str, Any]:
@@ -157,8 +166,12 @@ def _has_long_key(text: str) -> bool:
 
 def _bounded(text: str, name: str, size: int) -> str:
     if size > MOST_BYTES:
-        raise UnreadableText(f"{shortened(name)} is too long: more than {MOST_BYTES / 1e6:g} MB are not read")
+        raise _too_long(name, MOST_BYTES)
     return text
+
+
+def _too_long(name: str, most: int) -> UnreadableText:
+    return UnreadableText(f"{shortened(name)} is too long: more than {most / 1e6:g} MB are not read")
 
 
 def _too_deep(name: str) -> UnreadableText:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
 from annelid.live.panel import plots_of
 from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
+from annelid.live.things import triangles
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 
@@ -340,6 +342,55 @@ def test_the_live_diagram_is_of_the_network_that_is_stepped(preset: str) -> None
     assert network is not None
     assert list(network.neurons) == neurons
     assert network_of(worm.config, ["another"]) is None
+
+
+SHAPES = {
+    "box": ('type="box" size="0.1 0.2 0.3"', 0.048),
+    "sphere": ('type="sphere" size="0.1"', 4 / 3 * math.pi * 0.1**3),
+    "ellipsoid": ('type="ellipsoid" size="0.1 0.2 0.3"', 4 / 3 * math.pi * 0.006),
+    "cylinder": ('type="cylinder" size="0.1 0.2"', math.pi * 0.01 * 0.4),
+    "capsule": ('type="capsule" size="0.1 0.2"', math.pi * 0.01 * 0.4 + 4 / 3 * math.pi * 0.1**3),
+    "mesh": ('type="mesh" mesh="m"', 0.5 / 3),
+}
+
+
+@pytest.mark.parametrize(("geom", "volume"), SHAPES.values(), ids=SHAPES)
+def test_triangles_of_a_thing_enclose_its_volume_about_its_centre(geom: str, volume: float) -> None:
+    import mujoco
+    import trimesh
+
+    mesh = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{mesh}<worldbody><geom {geom}/></worldbody></mujoco>")
+    made = trimesh.Trimesh(*triangles(model, 0), process=True)
+    assert made.is_watertight
+    assert made.volume == pytest.approx(volume, rel=0.03)
+    assert made.center_mass == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
+
+
+def test_a_height_field_is_drawn_where_the_engine_has_it() -> None:
+    import mujoco
+
+    field = '<asset><hfield name="h" nrow="2" ncol="3" size="2 1 0.5 0.1" elevation="0 0 1 0 0 0"/></asset>'
+    world = '<worldbody><geom type="hfield" hfield="h"/></worldbody>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco>{field}{world}</mujoco>")
+    vertices, faces = triangles(model, 0)
+    # The first row of the text is at the left, +y.
+    assert vertices[vertices[:, 2].argmax()] == pytest.approx([2.0, 1.0, 0.5])
+    first, second, third = vertices[faces[0]]
+    assert np.cross(second - first, third - first)[2] > 0.0
+
+
+def test_things_of_a_scene_are_placed_where_the_engine_has_them() -> None:
+    config = load_config("riddle2023-rods", arena=Path(__file__).parents[2] / "examples" / "scene" / "scene.xml")
+    anatomy = compile_worm(config)
+    painter, qpos = Painter(anatomy, config), anatomy.model.qpos0.copy()
+    box = anatomy.model.body("scene/box")
+    first = int(anatomy.model.jnt_qposadr[box.jntadr[0]])
+    qpos[first : first + 7] = [-1.0, 0.5, 0.3, 0.0, 1.0, 0.0, 0.0]
+    painter.paint(moment(qpos, anatomy.n_segments))
+    places, turns = painter.places(np.array([box.geomadr[0]]))
+    assert places[0] == pytest.approx([-1.0, 0.5, 0.3])
+    assert np.abs(turns[0]) == pytest.approx([0.0, 1.0, 0.0, 0.0])
 
 
 def test_a_field_with_a_number_per_segment_has_no_slider() -> None:

@@ -17,8 +17,11 @@ import numpy as np
 
 from annelid.arena.surface import Shape
 from annelid.config.arena import ArenaKind, Walls
+from annelid.errors import ConfigError, shortened
 from annelid.morphology import Array, MeshGeometry
 
+PLAIN_RGBA, GROUND_RGBA = (0.5, 0.5, 0.5, 1.0), (0.72, 0.75, 0.78, 1.0)
+"""Of a geom in MJCF that states no colour, and what a scene shows instead where it is at rest."""
 PLANE_HALF_SIZE_M = 0.01
 """Of a moving plane as drawn; the engine's planes have no end."""
 HIDDEN_GROUP = 4
@@ -31,6 +34,8 @@ POST_HALF_HEIGHT_M = 0.3
 POST_RGBA = (0.75, 0.47, 0.30, 1.0)
 RAIL_RGBA = (0.55, 0.6, 0.66, 0.45)
 PIPE_RGBA = (0.62, 0.72, 0.80, 0.28)
+SCENE = "scene/"
+"""What the names of a scene begin with in a worm's model."""
 
 
 def contact_options(arena: ArenaKind, relative_friction: float = 1.0) -> dict[str, Any]:
@@ -121,6 +126,9 @@ def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
         # The engine would let walls that are seen through cast the shadow of solid ones.
         castshadow=not arena.is_closed and arena.walls == Walls(),
     )
+    if arena.is_scene:
+        arena.add_own(spec)
+        return
     shape = arena.shape(length_m)
     if shape is not None:
         _add_shape(spec, shape, arena)
@@ -138,6 +146,45 @@ def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
             **contact_options(arena),
         )
     add_walls(spec, arena)
+
+
+def add_scene(spec: mujoco.MjSpec, text: str, depth_m: float) -> None:
+    """Adds a checked scene, whose z = 0 is so far below the mesh's lowest line, to a worm's spec.
+
+    Between skin and scene the scene's contact parameters hold. What has no look of its own looks like a floor, or like
+    a post where it moves.
+
+    Raises:
+        ConfigError: The engine refuses the scene.
+    """
+    try:
+        scene = mujoco.MjSpec.from_string(text)
+        # By their names they are known to belong to the scene.
+        for number, part in enumerate([*scene.geoms, *scene.bodies[1:]]):
+            part.name = part.name or f"part_{number}"
+        # Alone, so that what it says of a body is of the scene.
+        alone = scene.copy().compile()
+    except ValueError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        raise ConfigError(f"the engine refuses the scene: {shortened(reason, 200)}") from None
+    free = alone.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)
+    if alone.jnt_stiffness[free].any():
+        raise ConfigError("the scene has a free joint with a stiffness: springs are for slides, hinges and ball joints")
+    floors: list[str] = []
+    for geom in scene.geoms:
+        if geom.material or not np.allclose(geom.rgba, PLAIN_RGBA):
+            continue
+        if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+            floors.append(f"{SCENE}{geom.name}")
+            continue
+        moves = alone.body_weldid[alone.geom_bodyid[alone.geom(geom.name).id]] > 0
+        geom.rgba = POST_RGBA if moves else GROUND_RGBA
+    for geom in touching(spec):
+        # Skin with a friction of its own keeps it.
+        geom.priority = geom.priority or -1
+    spec.attach(scene, prefix=SCENE, frame=spec.worldbody.add_frame(pos=[0.0, 0.0, -depth_m]))
+    for name in floors:
+        spec.geom(name).material = "floor"
 
 
 def add_walls(spec: mujoco.MjSpec, arena: ArenaKind) -> None:

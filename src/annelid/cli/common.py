@@ -55,8 +55,9 @@ ArenaName = Annotated[
     str | None,
     typer.Option(
         "--arena",
-        metavar="ARENA|FILE.toml",
-        help="Put the 3D worm elsewhere: a name of `annelid arenas`, or a TOML file  [default: where the preset is]",
+        metavar="ARENA|FILE.toml|FILE.xml",
+        help="Put the 3D worm elsewhere: a name of `annelid arenas`, a TOML file, or a scene of your own as MJCF"
+        " [default: where the preset is]",
     ),
 ]
 Jobs = Annotated[

@@ -12,6 +12,8 @@ from annelid.config.sections import Impedance, NonNegative, Positive
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import mujoco
 
     from annelid.arena.course import Bore, Course
@@ -40,11 +42,15 @@ class ArenaKind(Kind):
 
     Attributes:
         is_closed: Whether its walls surround the worm; they are drawn so that one sees through them.
+        is_scene: Whether all that the skin touches comes from `add_own`, as geoms that the engine collides with it.
+        suffix: Ending of the files that it is read from by `read`; empty for none.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("arena.kind", "annelid.arena.kinds")
     default: ClassVar[str] = "floor"
     is_closed: ClassVar[bool] = False
+    is_scene: ClassVar[bool] = False
+    suffix: ClassVar[str] = ""
 
     friction: Friction = Field(default=1.0, description="coefficient of sliding friction")
     backward_friction: Friction | None = Field(
@@ -60,6 +66,15 @@ class ArenaKind(Kind):
         description="elliptic: friction is alike in every direction of sliding; pyramidal: it is weaker by 16 % at 45 "
         "degrees to the world's axes",
     )
+
+    @classmethod
+    def read(cls, path: Path) -> dict[str, Any]:
+        """Reads the fields of the section from a file of the kind's `suffix` that the user has named.
+
+        Raises:
+            ConfigError: The file cannot be read, or is no such arena.
+        """
+        raise NotImplementedError
 
     @property
     def has_setae(self) -> bool:
@@ -114,6 +129,14 @@ class ArenaKind(Kind):
             length_m: Length of the worm, which stands or lies in it.
         """
         return None
+
+    @property
+    def object_names(self) -> tuple[str, ...]:
+        """Names of the things that move in it, in the order of the model."""
+        return ()
+
+    def add_own(self, spec: mujoco.MjSpec) -> None:
+        """Adds what it has beyond its surface to a worm's spec: nothing unless `is_scene`."""
 
     def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
         """Adds geoms that hold a worm in plain MuJoCo where the ground is not one plane; they are not drawn.

@@ -10,9 +10,10 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from annelid.config.arena import SHARED
+from annelid.config.arena import SHARED, ArenaKind
 from annelid.config.checking import check_config, field_value, whole_path
 from annelid.config.fidelity import HOME, RESOLUTION, find_level
+from annelid.config.kinds import kinds_of
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
@@ -111,8 +112,9 @@ def load_config(
             keeps nothing of what it had before.
         fidelity: How finely a 3D worm of rods is resolved: a level of `annelid.config.LEVELS`; lies over what the
             source says and under the overrides. None leaves the source as it is.
-        arena: Where the worm is put instead: a name of `arena_names`, or a TOML file with a table ``[arena]``; lies
-            under the overrides. Friction, gravity and contacts stay the source's where the arena does not state them.
+        arena: Where the worm is put instead: a name of `arena_names`, a TOML file with a table ``[arena]``, or a scene
+            as MJCF (``.xml``); lies under the overrides. Friction, gravity and contacts stay the source's where the
+            arena does not state them.
 
     Returns:
         The checked configuration.
@@ -164,8 +166,15 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
 
 def _arena_instead(present: Any, name: str | Path) -> dict[str, Any]:
     """Returns the table of another arena, with the fields of every arena from the present one where it has none."""
-    from_file = str(name).endswith(".toml")
-    stated = (read_toml(Path(name)) if from_file else parse_toml(arena_text(str(name)), str(name))).get("arena")
+    reader = next(
+        (kind for kind in kinds_of(ArenaKind).values() if kind.suffix and str(name).endswith(kind.suffix)), None
+    )
+    if reader is not None:
+        stated = reader.read(Path(name))
+    elif str(name).endswith(".toml"):
+        stated = read_toml(Path(name)).get("arena")
+    else:
+        stated = parse_toml(arena_text(str(name)), str(name)).get("arena")
     if not isinstance(stated, Mapping):
         raise ConfigError(f"{name} describes no arena: it must have a table [arena]")
     shared = present if isinstance(present, Mapping) else {}

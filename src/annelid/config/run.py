@@ -75,8 +75,10 @@ class Record(Section):
 class Guard(Section):
     """Limits at which a run stops because its numbers have run away."""
 
-    kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body")
-    height_m: Positive = Field(default=1.0, description="of any crossing above the ground, or off a pipe's wall")
+    kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body and of what moves in a scene")
+    height_m: Positive = Field(
+        default=1.0, description="of any crossing above the ground (in a scene: its z = 0), or off a pipe's wall"
+    )
     edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
     pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
     depth_m: Positive = Field(default=0.05, description="of any vertex below the ground, or outside a pipe's wall")

@@ -22,6 +22,7 @@ from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, Overlay, backgr
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy
+from annelid.simulation.objects import in_scene
 from annelid.simulation.runfile import Run
 
 ROOM = 1.3
@@ -65,6 +66,7 @@ class DrawnWorm:
         ball_m = model.geom_size[self._balls, 0]
         ball_m = np.minimum(ball_m, LARGEST_BALL * radius_m)
         model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * config.body.strands.radius_m)
+        self._in_scene = in_scene(model)
         bodies = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
         self._links = np.flatnonzero(bodies & (model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value))
         self.posture = mujoco.MjData(self.model)
@@ -118,7 +120,7 @@ class DrawnWorm:
         The strands' free ends reach beyond the crossings, so these would not do.
         """
         model, posture = self.model, self.posture
-        parts = np.flatnonzero(model.geom_bodyid > 0)
+        parts = np.flatnonzero((model.geom_bodyid > 0) & ~self._in_scene[model.geom_bodyid])
         capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
         half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
         posture.qpos[:] = qpos
@@ -324,10 +326,17 @@ class Skeleton:
     def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
         """Returns vertices of the strands from front to rear, m, ``(n_strands, n_vertices, 3)``, and the crossings."""
         self._data.qpos[:] = qpos
-        crossing, _, _ = self.anatomy.locate(self._data)
+        crossing, *_ = self.anatomy.locate(self._data)
         turn = self._data.xmat[self._body].reshape(-1, 3, 3)
         vertices = self._data.xpos[self._body] + np.einsum("vij,vj->vi", turn, self._place)
         return vertices.reshape(self._shape), crossing
+
+    def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Returns centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``, of n geoms in the posture located last."""
+        turns = np.empty((len(geoms), 4))
+        for turn, axes in zip(turns, self._data.geom_xmat[geoms], strict=True):
+            mujoco.mju_mat2Quat(turn, axes)
+        return self._data.geom_xpos[geoms], turns
 
 
 def _bodies_of_vertices(model: mujoco.MjModel, n_strands: int, n_vertices: int) -> NDArray[np.int64]:

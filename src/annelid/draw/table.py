@@ -23,7 +23,7 @@ from annelid.analysis.paper import (
 from annelid.analysis.summary import Summary
 from annelid.body.worm import WormBody
 from annelid.config import field_value, fields_of, toml_value
-from annelid.errors import listed
+from annelid.errors import listed, shortened
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from annelid.config import RunConfig
 
 UNKNOWN = "-"
+MOST_CHARACTERS = 400
+"""Of a value in a table of fields; a scene has up to a million."""
 _ONSETS_SHOWN, _MULTIPLIERS_SHOWN = 12, 4
 COMPARED = ("reference", "deviation")  # headings of what stands beside our numbers
 NEXT = (
@@ -396,7 +398,7 @@ def _first_of_order(order: Sequence[int]) -> str:
 
 
 def _setting(value: Any) -> str:
-    return "not set" if value is None else toml_value(value)
+    return "not set" if value is None else shortened(toml_value(value), MOST_CHARACTERS)
 
 
 def _multiplier(value: complex) -> str:

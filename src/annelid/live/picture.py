@@ -46,18 +46,19 @@ class Painter:
     """Turns the moments of one worm into pictures.
 
     Attributes:
+        model: The compiled worm.
         arrow_N: Contact force whose arrow is as long as the worm's radius at rest, about two segments' weight, N.
     """
 
     def __init__(self, anatomy: Anatomy, config: RunConfig, grain_m: float = 0.0) -> None:
         """Takes the worm, and what places are rounded to, so that they compress."""
         self._skeleton, self._grain_m = Skeleton(anatomy), grain_m
-        self._geometry = anatomy.geometry
+        self.model, self._geometry = anatomy.model, anatomy.geometry
         path = anatomy.ring_path
         self._ring_pairs = np.stack([path[:, :-1], path[:, 1:]], axis=-1).reshape(-1, 2)
         self._corners = path.shape[1] - 1
         assert config.arena is not None
-        share = float(anatomy.model.body_mass.sum()) * config.arena.gravity_m_per_s2 / anatomy.n_segments
+        share = anatomy.total_mass_kg * config.arena.gravity_m_per_s2 / anatomy.n_segments
         self.arrow_N = float(f"{2.0 * share:.1g}") if share > 0 else 1.0
 
     def strand_colors(self) -> Colors:
@@ -81,6 +82,10 @@ class Painter:
             contacts=self._arrows(moment.contact_force_N, crossing),
             middle=crossing.mean(axis=0),
         )
+
+    def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Returns where geoms are in the moment painted last: centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``."""
+        return self._skeleton.places(geoms)
 
     def _arrows(self, force_N: NDArray[np.floating], crossing: Array) -> Lines:
         """Arrows from the crossing of each ring that lies farthest against the force."""

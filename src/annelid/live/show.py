@@ -71,7 +71,7 @@ class Show:
         self._server = Server(host, port)
         self.address = self._server.address
         self.stage = Stage(self._server, self.config, painter, self.player.moment)
-        weight_N = round(EARTH_M_PER_S2 * float(anatomy.model.body_mass.sum()), 1)
+        weight_N = round(EARTH_M_PER_S2 * anatomy.total_mass_kg, 1)
         legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
         self.panel = Panel(self._server, self, speed, weight_N, legend)
         if self.player.worm is not None:

@@ -17,6 +17,7 @@ from annelid.arena.geoms import (
     RAIL_RGBA,
 )
 from annelid.arena.kinds.floor import Floor
+from annelid.arena.surface import Shape
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.config.arena import ArenaKind
@@ -24,6 +25,7 @@ from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axe
 from annelid.draw.scene import ROOM, upright
 from annelid.live.living import Moment
 from annelid.live.picture import CONTACT_COLOR, Painter
+from annelid.live.things import Things
 from annelid.morphology import Array, heading_turn
 
 if TYPE_CHECKING:
@@ -42,6 +44,13 @@ RELIEF_LIGHT, RELIEF_CONTRAST = (-0.5, -0.3, 0.8), 1.5
 """Where the light on relief comes from: against it, the risers of steps are dark."""
 _GROUND_COLOR = (0.97, 0.98, 1.0)
 _ROOT = "/worm"
+# The plainest of the viewer's materials.
+_FLOOR_LOOK: dict[str, Any] = {
+    "color": SQUARE_COLOR,
+    "material": "toon3",
+    "cast_shadow": False,
+    "receive_shadow": False,
+}
 
 
 class Stage:
@@ -87,6 +96,8 @@ class Stage:
         heading = config.body.heading_deg
         assert config.arena is not None
         _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
+        self._things = Things(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
+        self._things.place(*painter.places(self._things.geoms))
         self._first_middle = first.middle
         self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
         points = first.strands.reshape(-1, 3) @ self.turn.T
@@ -108,6 +119,7 @@ class Stage:
         self._springs.points = picture.springs
         self._springs.colors = picture.spring_colors
         self._contacts.points = picture.contacts
+        self._things.place(*self._painter.places(self._things.geoms))
         shift = self.turn @ (self._first_middle - picture.middle) if follow else np.zeros(3)
         if self._level:
             # A worm that breathes is not to make the ground bob.
@@ -141,12 +153,10 @@ def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float, headin
         relief = trimesh.Trimesh(shape.vertices_m, shape.faces, process=False)
         relief.visual = ColorVisuals(relief, vertex_colors=_shaded(relief.vertex_normals))
         scene.add_mesh_trimesh(f"{_ROOT}/ground/relief", relief, cast_shadow=False, receive_shadow=False)
-    if shape is None or pipe:
+    if (shape is None or pipe) and not arena.is_scene:
         vertices, faces = _squares(-arena.floor_depth_m)
         vertices = vertices @ heading_turn(heading_deg).T
-        # The plainest of the viewer's materials.
-        look = {"color": SQUARE_COLOR, "material": "toon3", "cast_shadow": False, "receive_shadow": False}
-        scene.add_mesh_simple(f"{_ROOT}/ground/floor", vertices, faces, **look)
+        scene.add_mesh_simple(f"{_ROOT}/ground/floor", vertices, faces, **_FLOOR_LOOK)
     _add_walls(scene, arena)
 
 

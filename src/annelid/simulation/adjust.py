@@ -47,7 +47,8 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
 def _differ_in_friction_only(before: RunConfig, after: RunConfig) -> bool:
     if before.arena is None or after.arena is None or before.arena.has_setae or after.arena.has_setae:
         return False
-    if getattr(before.body, "relative_friction", None) is not None:
+    # Some parts of the skin, or of a scene, have a friction of their own.
+    if after.arena.is_scene or getattr(before.body, "relative_friction", None) is not None:
         return False
     alike = before.arena.model_copy(update={"friction": after.arena.friction})
     return (before.body, alike, before.clock, before.trial) == (after.body, after.arena, after.clock, after.trial)

@@ -15,23 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.arena.geoms import touching
-from annelid.arena.surface import Surface
+from annelid.arena.surface import Surface, surface_of
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
 from annelid.body.worm import WormBody
+from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, heading_turn, norm
 from annelid.simulation.energies import Elasticity, EnergyMeter, plastic_at_rest, turned_frames
+from annelid.simulation.objects import Met, Objects, add_scene_sensors, in_scene
 from annelid.simulation.skin import Skin
 
 _NET_FORCE = 3
 """The engine's number for a contact sensor that adds up all contacts of a pair."""
 
 
-def add_contact_sensors(spec: mujoco.MjSpec) -> None:
+def add_contact_sensors(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
     """Adds, for every geom of the skin and every geom of the arena that it can touch, a sensor of the net force on it.
 
-    They are in the world's axes, change nothing in the motion, and read the same in a batch as alone.
+    They are in the world's axes, change nothing in the motion, and read the same in a batch as alone. In a scene there
+    is one for every geom of the skin, whatever it touches.
     """
+    if arena.is_scene:
+        add_scene_sensors(spec, arena.object_names)
+        return
     force = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
     grounds = [geom.name for geom in spec.geoms if geom.contype]
     pairs = [(ground, geom.name) for geom in touching(spec) for ground in grounds]
@@ -60,6 +66,7 @@ class Posture(NamedTuple):
     heading: Array  # unit vector from the centre of the last ring to that of the foremost, (3,)
     axis: Array  # unit vectors along the body towards its front at every ring, (n_segments, 3)
     skin: Array  # centres of the geoms that can touch the ground, (n_geoms, 3)
+    objects: Array  # centres of mass of what moves in a scene, (n_objects, 3)
 
 
 class Forces(NamedTuple):
@@ -68,6 +75,7 @@ class Forces(NamedTuple):
     contact: Array  # force of the arena on every segment, N, (n_segments, 3)
     edge_strain: Array  # largest strain of a rod's edge, (); 0 for a chain
     pin_gap: Array  # largest gap between two pinned strands, m, (); 0 where pins cannot part
+    met: Met  # what was met in a scene
 
 
 class Movement(NamedTuple):
@@ -85,6 +93,8 @@ class Anatomy:
         ring_path: Crossings that each ring muscle runs through, in order, ``(n_muscles, n_corners)``.
         crossing_body: The engine's body at every crossing, ``(n_crossings,)``.
         rest_stretch_m: Lengths of the stretch sensors at rest, m, ``(n_segments, n_sensors)``.
+        objects: What moves in a scene.
+        total_mass_kg: Mass of the worm.
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
@@ -93,8 +103,8 @@ class Anatomy:
         outputs: Names of the engine's arrays that `forces` needs.
     """
 
-    def __init__(self, model: mujoco.MjModel, body: WormBody, surface: Surface) -> None:
-        """Finds the parts of a body compiled with `add_contact_sensors`, on a surface."""
+    def __init__(self, model: mujoco.MjModel, body: WormBody, arena: ArenaKind) -> None:
+        """Finds the parts of a body compiled with `add_contact_sensors`, in an arena."""
         self.model = model
         self.geometry: MeshGeometry = mesh_of(body.mesh)
         self.rings = body.rings
@@ -110,9 +120,12 @@ class Anatomy:
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
         self.crossing_body: NDArray[np.int32] = model.site_bodyid[self._crossing_site]
         self.ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
-        self._mass_share = model.body_mass / model.body_mass.sum()
+        mass = np.where(in_scene(model), 0.0, model.body_mass)
+        self.total_mass_kg = float(mass.sum())
+        self._mass_share = mass / mass.sum()
         self._edges_per_m = 1.0 / model.flexedge_length0
-        self._find_skin(surface)
+        self.objects = Objects(model, arena)
+        self._find_skin(surface_of(arena))
         self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
         self.pins_can_part = self._pin_gap is not None
         self.elasticity = Elasticity(model, body)
@@ -130,6 +143,7 @@ class Anatomy:
         """Finds the contact sensors, their geoms, and which segment's ring is nearest to each of these at rest."""
         model, geometry = self.model, self.geometry
         sensors = np.flatnonzero(model.sensor_type == int(mujoco.mjtSensor.mjSENS_CONTACT))
+        sensors = sensors[: self.objects.n_skin or len(sensors)]
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         self._skin_geom = model.sensor_refid[sensors].astype(np.int64)
@@ -140,19 +154,21 @@ class Anatomy:
         self._segment_rows = np.eye(geometry.n_segments)[:, nearest]
         self.skin = Skin(rest, nearest, geometry.n_segments, geometry.radius_m, surface)
 
-    def locate(self, data: mujoco.MjData) -> tuple[Array, Array, Array]:
+    def locate(self, data: mujoco.MjData) -> tuple[Array, Array, Array, Array]:
         """Brings the engine's positions up to its coordinates, which is not part of a step.
 
-        Returns those of crossings, ``(n_crossings, 3)``, centre of mass, ``(3,)``, and skin, ``(n_geoms, 3)``, m.
+        Returns those of crossings, ``(n_crossings, 3)``, centre of mass, ``(3,)``, skin, ``(n_geoms, 3)``, and objects,
+        ``(n_objects, 3)``, m.
         """
         mujoco.mj_kinematics(self.model, data)
         return (
             data.site_xpos.take(self._crossing_site, axis=0),
             self._mass_share @ data.xipos,
             data.geom_xpos.take(self._skin_geom, axis=0),
+            self.objects.places(data),
         )
 
-    def posture(self, crossing: Array, center_of_mass: Array, skin: Array) -> Posture:
+    def posture(self, crossing: Array, center_of_mass: Array, skin: Array, objects: Array) -> Posture:
         """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
         ends = crossing.take(self.geometry.springs, axis=-2)
         spring = norm(ends[..., 1, :] - ends[..., 0, :])
@@ -163,7 +179,7 @@ class Anatomy:
         heading = _unit(front - center[..., -1, :])
         axis = _unit(center.take(self._before, axis=-2) - center.take(self._behind, axis=-2))
         stretch = spring.take(self._sensors, axis=-1)
-        return Posture(crossing, center_of_mass, spring, stretch, ring, front, heading, axis, skin)
+        return Posture(crossing, center_of_mass, spring, stretch, ring, front, heading, axis, skin, objects)
 
     def forces(self, engine: Mapping[str, Array]) -> tuple[Forces, Array]:
         """Reads what acted during the last physics step, and the ground's force on each geom, N, ``(n_geoms, 3)``.
@@ -178,7 +194,7 @@ class Anatomy:
             strain = np.abs(engine["flexedge_length"] * self._edges_per_m - 1.0).max(axis=-1)
         if self._pin_gap is not None:
             gap = self._pin_gap(engine)
-        return Forces(contact, strain, gap), by_geom.copy()
+        return Forces(contact, strain, gap, self.objects.met(engine)), by_geom.copy()
 
 
 def _unit(vectors: Array) -> Array:
@@ -224,7 +240,8 @@ def turned(model: mujoco.MjModel, placed: Placed, turn: Array, lifted_m: float =
     qpos = placed.qpos.copy()
     # Points on three slides along the world's axes.
     slides = model.jnt_type[model.body_jntadr] == int(mujoco.mjtJoint.mjJNT_SLIDE)
-    points = np.flatnonzero(slides & (model.body_jntnum == 3))
+    scene = in_scene(model)
+    points = np.flatnonzero(slides & (model.body_jntnum == 3) & ~scene)
     address = model.jnt_qposadr[model.body_jntadr[points]][:, np.newaxis] + np.arange(3)
     origin = model.body_pos[points]
     qpos[address] = (origin + qpos[address]) @ turn.T - origin
@@ -232,7 +249,8 @@ def turned(model: mujoco.MjModel, placed: Placed, turn: Array, lifted_m: float =
         qpos[address[:, 2]] += lifted_m
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(turn).ravel())
-    for free in model.jnt_qposadr[model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)]:
+    free_joints = (model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)) & ~scene[model.jnt_bodyid]
+    for free in model.jnt_qposadr[free_joints]:
         qpos[free : free + 3] = turn @ qpos[free : free + 3]
         qpos[free + 2] += lifted_m
         mujoco.mju_mulQuat(qpos[free + 3 : free + 7], quaternion, qpos[free + 3 : free + 7].copy())

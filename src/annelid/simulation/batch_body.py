@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch, SimulationError
 
-from annelid.arena.surface import surface_of
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture
+from annelid.simulation.objects import Met
 from annelid.simulation.worm import Worm, body_and_arena, compile_worm, engine_stopped, owns_model
 
 _NO_STAGE = int(mujoco.mjtStage.mjSTAGE_NONE)
@@ -107,7 +107,9 @@ class BodyBatch:
         forces, ground = anatomy.forces(engine)
         located = zip(*(self.worms[row].located() for row in rows), strict=True)
         postures = zip(*anatomy.posture(*(np.stack(parts) for parts in located)), strict=True)
-        each = zip(map(Posture._make, postures), map(Forces._make, zip(*forces, strict=True)), ground, strict=True)
+        met = map(Met._make, zip(*forces.met, strict=True))
+        acted = map(Forces._make, zip(*forces[:-1], met, strict=True))
+        each = zip(map(Posture._make, postures), acted, ground, strict=True)
         return [Movement(*one) for one in each]
 
 
@@ -129,8 +131,8 @@ class BatchWorm(Worm):
             raise SimulationStopped(reasons[self._row])
         return self._bodies.moved([self._row])[0]
 
-    def located(self) -> tuple[Array, Array, Array]:
-        """Returns crossings, centre of mass and skin as `Anatomy.locate` does."""
+    def located(self) -> tuple[Array, Array, Array, Array]:
+        """Returns positions as `Anatomy.locate` does."""
         self._bodies.scratch.qpos[:] = self.qpos
         return self.anatomy.locate(self._bodies.scratch)
 
@@ -168,6 +170,6 @@ def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
             known = models[physical] = compile_worm(config)
         elif owns_model(config):
             body, arena = body_and_arena(config)
-            known = Anatomy(copy(known.model), body, surface_of(arena))
+            known = Anatomy(copy(known.model), body, arena)
         anatomies.append(known)
     return anatomies

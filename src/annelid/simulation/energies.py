@@ -113,7 +113,9 @@ class Elasticity:
         self._spring_rate = model.tendon_stiffness[springs].copy()
         self._spring_slack = model.tendon_lengthspring[springs].T.copy()
         stiff = model.jnt_stiffness > 0
-        hinges = np.flatnonzero(stiff & (model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)))
+        # Slides are those of a scene; a vertex' own have no stiffness.
+        scalar = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+        hinges = np.flatnonzero(stiff & np.isin(model.jnt_type, scalar))
         balls = np.flatnonzero(stiff & (model.jnt_type == int(mujoco.mjtJoint.mjJNT_BALL)))
         self._angle = model.jnt_qposadr[hinges]
         self._angle_at_rest = model.qpos_spring[self._angle]

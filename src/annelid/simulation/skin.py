@@ -62,19 +62,27 @@ class Skin:
         self._quarter = len(SIDES) * segment + self.side
 
     def touch(
-        self, so_far: Touch, ground_N: Array, before_m: Array, after_m: Array, axis: Array, time_s: float
+        self,
+        so_far: Touch,
+        ground_N: Array,
+        before_m: Array,
+        after_m: Array,
+        axis: Array,
+        time_s: float,
+        normals: Array | None = None,
     ) -> Touch:
         """Adds a movement of the body, which took a time, to what was sensed so far.
 
         Given are the force of the ground on each geom during the last physics step, N, ``(n_geoms, 3)``, their centres
         before and after the movement, m, and unit vectors along the body towards its front at each segment,
-        ``(n_segments, 3)``.
+        ``(n_segments, 3)``. In a scene also the normals of what each geom touched, ``(n_geoms, 3)``; else they are the
+        surface's.
         """
         # A few belly vertices touch, of hundreds.
         touching = np.flatnonzero(_dot(ground_N, ground_N))
         force, segment = ground_N.take(touching, axis=0), self.segment.take(touching)
         before = before_m.take(touching, axis=0)
-        normal = self._surface.normal(before)
+        normal = self._surface.normal(before) if normals is None else normals.take(touching, axis=0)
         moved = after_m.take(touching, axis=0) - before
         pressure = _dot(force, normal)
         along = moved - _dot(moved, normal)[:, np.newaxis] * normal

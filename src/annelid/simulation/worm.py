@@ -25,6 +25,7 @@ from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Value
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, laid_down
 from annelid.simulation.energies import EnergyTotals, Engine
 from annelid.simulation.ground import MovingGround
+from annelid.simulation.objects import NOTHING
 from annelid.simulation.skin import Touch
 from annelid.simulation.watch import Energies, Watch
 
@@ -77,6 +78,8 @@ _SIGNALS = {
         "J",
         "energy lost to contacts, friction and inextensible edges so far",
     ),
+    "object_position": ("posture.objects", ("object", "axis"), "m", "centre of mass of a body that moves in the scene"),
+    "object_force": ("_forces.met.force", ("object", "axis"), "N", "force of the worm on a body that moves"),
     "edge_strain": ("_forces.edge_strain", (), "1", "largest strain of a rod's edge"),
     "pin_gap": ("_forces.pin_gap", (), "m", "largest gap between two pinned strands"),
 }
@@ -109,9 +112,9 @@ def compile_worm(config: RunConfig) -> Anatomy:
     spec = build_spec(config, for_plant=True)
     body, arena = body_and_arena(config)
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    add_contact_sensors(spec)
+    add_contact_sensors(spec, arena)
     add_damper_rows(spec)
-    return Anatomy(compile_spec(spec), body, surface_of(arena))
+    return Anatomy(compile_spec(spec), body, arena)
 
 
 def owns_model(config: RunConfig) -> bool:
@@ -153,11 +156,12 @@ class Worm(ABC):
         """Makes a worm that has sensed nothing yet."""
         self.anatomy, self.model, self.geometry = anatomy, anatomy.model, anatomy.geometry
         self.n_segments, self.n_muscles = anatomy.n_segments, anatomy.n_muscles
-        self.total_mass_kg = float(anatomy.model.body_mass.sum())
+        self.total_mass_kg = anatomy.total_mass_kg
         self._config = config
         body, arena = body_and_arena(config)
         self._body = body
         self._surface = surface_of(arena)
+        self._is_scene = arena.is_scene
         self._height_words = (
             "distance of a crossing from the pipe's wall" if arena.is_closed else "height of a crossing"
         )
@@ -180,7 +184,10 @@ class Worm(ABC):
 
     @abstractmethod
     def kinetic_energy_J(self) -> float:
-        """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
+        """Kinetic energy of the whole body and of what moves in a scene, J.
+
+        A chain's includes its numerical joint inertia.
+        """
 
     @abstractmethod
     def _reset_engine(self, state: Array | None = None) -> None:
@@ -199,8 +206,9 @@ class Worm(ABC):
         return self.anatomy.elasticity.energy_J(self.qpos, self.plastic, self.posture.spring_length)
 
     def potential_energy_J(self) -> float:
-        """Energy of the weight, J, zero with the centre of mass at the origin."""
-        return -self.total_mass_kg * float(self.model.opt.gravity @ self.posture.center_of_mass)
+        """Energy of the weight, also of what moves in a scene, J; zero with the centres of mass at the origin."""
+        own = -self.total_mass_kg * float(self.model.opt.gravity @ self.posture.center_of_mass)
+        return own + self.anatomy.objects.potential_energy_J(self.posture.objects)
 
     def control(self, activation: Array, n_steps: int) -> Array:
         """Returns the engine's control during the next physics steps under an activation, ``(n_muscles,)``."""
@@ -227,7 +235,8 @@ class Worm(ABC):
         n = self.n_segments
         self._reset_engine()
         self._control_step = 0
-        self._forces = Forces(np.zeros((n, 3)), np.zeros(()), np.zeros(()))
+        nothing = NOTHING._replace(force=np.zeros((len(self.anatomy.objects.names), 3)))
+        self._forces = Forces(np.zeros((n, 3)), np.zeros(()), np.zeros(()), nothing)
         self.energies = EnergyTotals.zero(self.n_muscles)
         self._tension_N = np.zeros(self.n_muscles)
         self.touch = Touch.none(n)
@@ -265,7 +274,10 @@ class Worm(ABC):
         if moved is not None:
             before, (self.posture, self._forces, ground) = self.posture, moved
             after = self.posture
-            self.touch = self.anatomy.skin.touch(self.touch, ground, before.skin, after.skin, after.axis, time_s)
+            normals = self._forces.met.normal if self._is_scene else None
+            self.touch = self.anatomy.skin.touch(
+                self.touch, ground, before.skin, after.skin, after.axis, time_s, normals
+            )
         return self.observe()
 
     def observe(self) -> Sensation:
@@ -313,7 +325,9 @@ class Worm(ABC):
         return self._watch.look(self._time_s, rings, springs, self._depth_m(), gap, self._activation, self._tension_N)
 
     def _depth_m(self) -> float:
-        """Depth of the deepest vertex in the ground, m; over moving planes that at the start of the last step."""
+        """Depth of the deepest vertex in the ground, m; over moving planes, or in a scene, that in the last step."""
+        if self._is_scene:
+            return float(self._forces.met.depth)
         if self.ground is not None:
             return self.ground.depth_m
         return self._floor.offset_m - float(np.minimum.reduce(self.posture.skin @ self._floor.facing))
@@ -337,6 +351,7 @@ class Worm(ABC):
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
         anatomy = self.anatomy
+        objects = anatomy.objects.names
         present = {
             "edge_strain": anatomy.has_edges,
             "pin_gap": anatomy.pins_can_part,
@@ -345,9 +360,10 @@ class Worm(ABC):
         signals = (
             Signal(name, dims, np.shape(self._value(path)), units, words, name in _FRAME_SIGNALS)
             for name, (path, dims, units, words) in (_SIGNALS | _FRAME_SIGNALS).items()
-            if present.get(name, True)
+            if present.get(name, True) and ("object" not in dims or objects)
         )
         coords = {"muscle": anatomy.muscle_names, "axis": ("x", "y", "z"), "side": SIDES}
+        coords |= {"object": objects} if objects else {}
         attrs = {"total_mass_kg": self.total_mass_kg, "body_length_m": self.geometry.length_m}
         return Recordable(tuple(signals), coords, attrs)
 
@@ -369,6 +385,7 @@ class Worm(ABC):
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
             **{name: np.array(total) for name, total in self.energies._asdict().items()},
+            **({"object_force": forces.met.force.copy()} if self._is_scene else {}),
             **self.touch.state(),
             **self._watch.get_state(),
         }
@@ -379,7 +396,10 @@ class Worm(ABC):
         self._control_step = int(state["control_step"][0])
         strain, gap = np.asarray(state["extremes"], dtype=float)
         self._tension_N = np.array(state["muscle_force"], dtype=float)
-        self._forces = Forces(np.array(state["contact_force"], dtype=float), strain, gap)
+        met = NOTHING
+        if self._is_scene:
+            met = NOTHING._replace(force=np.array(state["object_force"], dtype=float))
+        self._forces = Forces(np.array(state["contact_force"], dtype=float), strain, gap, met)
         self.energies = EnergyTotals(*(np.array(state[name], dtype=float) for name in EnergyTotals._fields))
         self.touch = Touch.of_state(state)
         self._watch.set_state(state)

@@ -1,0 +1,294 @@
+"""Scenes: a plane is a floor, things move by closed forms, the skin feels them, and the energy totals close."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from PIL import Image
+
+from annelid import RunConfig, load_config, simulate
+from annelid.body import build_spec
+from annelid.body.assemble import mjcf_text
+from annelid.draw.scene import DrawnWorm
+from annelid.errors import ConfigError
+from annelid.simulation import Run
+from annelid.simulation.batch_body import BodyBatch, compile_worms
+from annelid.simulation.worm import WormPlant
+
+ROOT = Path(__file__).parents[2]
+PLANE = '<geom name="floor" type="plane" size="5 5 1"/>'
+STEP_S = 0.005
+COARSE: dict[str, Any] = {
+    "body.mesh.elements_per_side": 1,
+    "clock": {"control_timestep_s": STEP_S, "physics_timestep_s": STEP_S},
+    "record": {"signals_interval_s": STEP_S, "frames_interval_s": 0.02},
+}
+QUICK = {"body.strands.damping_time_s": None, "body.strands.joint_damping_Nms_per_rad": 0.02}
+"""Damped little, so that a worm soon comes to rest."""
+
+
+def config(world: str, assets: str = "", changes: dict[str, Any] | None = None) -> RunConfig:
+    xml = f"<mujoco><asset>{assets}</asset><worldbody>{PLANE}{world}</worldbody></mujoco>"
+    tree = load_config("riddle2023-rods").model_dump()
+    # The preset's contacts, but its friction on every side.
+    arena = {name: tree["arena"][name] for name in ("friction", "contact_time_constant_s", "contact_impedance")}
+    return load_config({**tree, "arena": {**arena, "kind": "scene", "xml": xml}}, {**COARSE, **(changes or {})})
+
+
+def plant_in(world: str, assets: str = "", changes: dict[str, Any] | None = None) -> WormPlant:
+    plant = WormPlant(config(world, assets, changes))
+    plant.reset(0)
+    return plant
+
+
+def moved(plant: WormPlant, duration_s: float, activation: float = 0.0) -> WormPlant:
+    for _ in range(round(duration_s / STEP_S)):
+        plant.step(np.full(plant.n_muscles, activation))
+    return plant
+
+
+def total_J(plant: WormPlant) -> float:
+    """All that is held, and all that was lost but for the integrator."""
+    losses = float(plant.energies.damping_loss + plant.energies.constraint_loss)
+    return plant.kinetic_energy_J() + plant.elastic_energy_J() + plant.potential_energy_J() + losses
+
+
+def assert_same(ours: Run, theirs: Run) -> None:
+    start = ours.data["time"].values[0]
+    for name, variable in ours.data.data_vars.items():
+        if "time" in variable.dims and name != "wall_time":
+            other = theirs.data[name].isel(time=theirs.data["time"] >= start)
+            assert np.array_equal(variable, other, equal_nan=True), name
+
+
+def test_a_plane_of_a_scene_is_a_floor_bit_for_bit(tmp_path: Path) -> None:
+    (tmp_path / "plane.xml").write_text(f"<mujoco><worldbody>{PLANE}</worldbody></mujoco>")
+    changes = {**COARSE, "duration_s": 0.6}
+    arenas = {"floor": "floor", "scene": tmp_path / "plane.xml"}
+    floor, scene = (
+        simulate(load_config("riddle2023-rods", changes, arena=arena), tmp_path / name, progress=False)
+        for name, arena in arenas.items()
+    )
+    assert float(floor.data["touch"][-1].sum()) > 0.5
+    assert_same(scene, floor)
+
+
+def test_a_thing_on_a_spring_sinks_by_weight_over_stiffness_and_its_energy_closes() -> None:
+    """A mass of 0.2 kg on a slide of 40 N/m, damped by 4 N s/m: 49 mm; half of the fall is stored, half is lost."""
+    slide = '<joint type="slide" axis="0 0 1" stiffness="40" damping="4"/>'
+    plant = plant_in(f'<body name="lift" pos="-2 0 1">{slide}<geom size="0.02" mass="0.2"/></body>')
+    bare = plant_in("")
+    start, bare_start = total_J(plant), total_J(bare)
+    sunk = 0.2 * 9.81 / 40
+    for worm in (plant, bare):
+        moved(worm, 1.0)
+    assert plant.posture.objects[0] == pytest.approx([-2.0, 0.0, 0.991 - sunk], abs=1e-5)
+    stored = plant.elastic_energy_J() - bare.elastic_energy_J()
+    lost = float(plant.energies.damping_loss - bare.energies.damping_loss)
+    assert stored == pytest.approx(0.5 * 40 * sunk**2, rel=1e-3)
+    assert plant.potential_energy_J() - bare.potential_energy_J() == pytest.approx(
+        0.2 * 9.81 * (0.991 - sunk), rel=1e-3
+    )
+    # The integrator takes less than a tenth of the half that is lost at this step.
+    assert lost == pytest.approx(0.5 * 40 * sunk**2, rel=0.1)
+    missing = (total_J(plant) - start) - (total_J(bare) - bare_start)
+    assert abs(missing) < 0.1 * lost
+
+
+def test_a_falling_tumbling_thing_turns_potential_into_kinetic_energy() -> None:
+    """Free fall over n steps is g h^2 n (n + 1) / 2; the energy of turning stays, but for the step's error."""
+    plant = plant_in('<body pos="-2 0 9"><freejoint/><geom type="box" size="0.1 0.2 0.05" mass="0.5"/></body>')
+    first = int(plant.model.jnt_dofadr[-1])
+    plant.data.qvel[first + 3 : first + 6] = [3.0, 1.0, 2.0]
+    turning = 0.5 * float(plant.model.body("scene/object_1").inertia @ [9.0, 1.0, 4.0])
+    bare = moved(plant_in(""), 0.25)
+    moved(plant, 0.25)
+    n = round(0.25 / STEP_S)
+    fallen = 9.81 * STEP_S**2 * n * (n + 1) / 2
+    assert plant.posture.objects[0, 2] == pytest.approx(8.991 - fallen, abs=1e-9)
+    gained = plant.kinetic_energy_J() - bare.kinetic_energy_J()
+    assert gained == pytest.approx(turning + 0.5 * 0.5 * (9.81 * n * STEP_S) ** 2, rel=1e-3)
+
+
+SLAB = '<body name="slab" pos="0.4 0 0.02"><freejoint/><geom type="box" size="1.5 0.6 0.02" mass="2"/></body>'
+BLOCK = "".join(f"{x} {y} {z} " for x in (-1.5, 1.5) for y in (-0.6, 0.6) for z in (0.0, 0.04))
+
+
+@pytest.mark.parametrize("kind", ["slab", "mesh", "hfield"])
+def test_a_worm_at_rest_on_a_thing_presses_on_it_with_its_weight(kind: str) -> None:
+    grid = " ".join(["0 0 0 0 0", *["0 1 1 1 0"] * 3, "0 0 0 0 0"])
+    world, assets = {
+        "slab": (SLAB, ""),
+        "mesh": ('<geom type="mesh" mesh="b" pos="0.4 0 0"/>', f'<mesh name="b" vertex="{BLOCK}"/>'),
+        "hfield": (
+            '<geom type="hfield" hfield="h" pos="0.4 0 0"/>',
+            f'<hfield name="h" nrow="5" ncol="5" size="3 1.2 0.04 0.1" elevation="{grid}"/>',
+        ),
+    }[kind]
+    plant = plant_in(world, assets, {**QUICK, "arena.floor_gap_m": 0.05})
+    moved(plant, 3.0)
+    weight = 9.81 * plant.total_mass_kg
+    felt = plant.observe()
+    assert felt.touch_N is not None
+    assert felt.contact_force_N.sum(axis=0) == pytest.approx([0.0, 0.0, weight], abs=0.03 * weight)
+    assert felt.touch_N.sum() == pytest.approx(weight, rel=0.05)
+    assert -0.01 < plant._depth_m() < 0.004
+    assert plant.alarm() is None
+    if kind == "slab":
+        assert plant._forces.met.force[0] == pytest.approx(-felt.contact_force_N.sum(axis=0), abs=1e-9)
+        assert plant.total_mass_kg == pytest.approx(plant_in("").total_mass_kg)
+
+
+BOX = (
+    '<body name="box" pos="-0.06 0 0.1"><freejoint/>'
+    '<geom type="box" size="0.05 0.3 0.1" mass="0.03" friction="0.3" priority="1"/></body>'
+)
+
+
+def test_the_energy_totals_close_with_a_box_that_the_worm_pushes() -> None:
+    """What is left of the work is what the engine's integrator takes by its own matrices, as without a box."""
+    place = ROOT / "benchmarks" / "energy_balance.py"
+    spec = importlib.util.spec_from_file_location("energy_balance", place)
+    assert spec is not None
+    assert spec.loader is not None
+    benchmark = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(benchmark)
+    plant = benchmark.AuditedWorm(config(BOX))
+    plant.reset(0)
+    start, elastic, place_m = total_J(plant), plant.elastic_energy_J(), plant.posture.objects[0].copy()
+    pushed = 0.0
+    for _ in range(160):
+        plant.step(np.ones(plant.n_muscles))
+        pushed = min(pushed, float(plant.read(False)["object_force"][0, 0]))
+    assert plant.posture.objects[0, 0] < place_m[0] - 0.01, "the box must move"
+    assert pushed < -0.3 * 9.81 * 0.03, "the worm must push it ahead"
+    work = float(plant.energies.muscle_work.sum())
+    left = work - (total_J(plant) - start)
+    integrator = plant.integrator_J - plant.spring_J - (plant.elastic_energy_J() - elastic)
+    assert work > 0.5
+    assert left == pytest.approx(integrator, abs=1e-3 * work)
+
+
+def test_what_a_thing_states_counts_for_the_skin_and_the_rest_is_the_arena_s() -> None:
+    world = '<geom name="ice" size="0.1" pos="-3 0 0" friction="0.05"/><geom name="plain" size="0.1" pos="-4 0 0"/>'
+    model = WormPlant(config(world, changes={"arena.friction": 0.6})).model
+    assert model.geom("scene/ice").friction[0] == 0.05
+    assert model.geom("scene/plain").friction[0] == 0.6
+    skin = (model.geom_conaffinity != 0) & (model.geom_contype == 0)
+    assert (model.geom_priority[skin] < model.geom("scene/ice").priority).all()
+
+
+def test_a_scene_continues_bit_for_bit_without_its_file(tmp_path: Path) -> None:
+    for name in ("scene.xml", "ramp.obj"):
+        (tmp_path / name).write_bytes((ROOT / "examples" / "scene" / name).read_bytes())
+    changes = {**COARSE, "duration_s": 0.4}
+    made = load_config("riddle2023-rods", changes, arena=tmp_path / "scene.xml")
+    whole = simulate(made, tmp_path / "whole", progress=False)
+    simulate(made.model_copy(update={"duration_s": 0.2}), tmp_path / "first", progress=False)
+    for name in ("scene.xml", "ramp.obj"):
+        (tmp_path / name).unlink()
+    rest = simulate(made, tmp_path / "rest", resume=tmp_path / "first", progress=False)
+    assert_same(rest, whole)
+    assert whole.data["object"].values.tolist() == ["box", "ball", "post"]
+    assert whole.data["object_position"].dims == ("time", "object", "axis")
+
+
+def test_pictures_show_things_where_they_are(tmp_path: Path) -> None:
+    run = simulate(
+        config(BOX, changes={"duration_s": 0.3}), tmp_path / "run", controller=lambda _: np.ones(3), progress=False
+    )
+    drawn = DrawnWorm(run.config)
+    box = drawn.model.body("scene/box").id
+    for frame, time_s in enumerate(run.data["frame_time"].values):
+        drawn.pose(run.data["qpos"].values[frame])
+        there = run.data["object_position"].sel(time=time_s, method="nearest").values[0]
+        assert drawn.posture.xipos[box] == pytest.approx(there, abs=1e-6)
+    geom = int(np.flatnonzero(drawn.model.geom_bodyid == box)[0])
+    assert drawn.model.geom_rgba[geom, 3] == 1.0
+    assert drawn.model.geom_group[geom] <= 2, "as the engine draws"
+    # The camera keeps to the worm.
+    ends = drawn.part_ends(run.data["qpos"].values[-1])
+    assert ends[:, 0].min() > run.data["crossing_position"].values[..., 0].min() - 0.1
+
+
+def test_a_batch_computes_the_same_bits_in_a_scene() -> None:
+    configs = [config(BOX), config(BOX, changes={"arena.friction": 0.6})]
+    bodies = BodyBatch(configs, compile_worms(configs))
+    alone = [WormPlant(made) for made in configs]
+    for worm in (*bodies.worms, *alone):
+        worm.reset(0)
+    pushed_N = 0.0
+    for _ in range(40):
+        for worm, plant in zip(bodies.worms, alone, strict=True):
+            ours, theirs = worm.step(np.ones(3)), plant.step(np.ones(3))
+            assert np.array_equal(ours.center_of_mass_m, theirs.center_of_mass_m)
+            for name in ("object_position", "object_force", "touch", "slip_distance", "potential_energy"):
+                assert np.array_equal(worm.read(False)[name], plant.read(False)[name]), name
+        pushed_N = max(pushed_N, float(np.abs(alone[0]._forces.met.force).max()))
+    assert pushed_N > 0.01
+
+
+def test_a_heading_turns_the_worm_and_leaves_the_scene() -> None:
+    along, across = plant_in(BOX), plant_in(BOX, changes={"body.heading_deg": 90.0})
+    assert across.posture.objects == pytest.approx(along.posture.objects, abs=1e-12)
+    assert across.posture.heading == pytest.approx([0.0, -1.0, 0.0], abs=1e-9)
+
+
+def test_a_picture_is_a_height_field_with_white_high_and_its_first_row_to_the_left(tmp_path: Path) -> None:
+    shades = np.zeros((3, 4), dtype=np.uint8)
+    shades[0, 3] = 255
+    Image.fromarray(shades).save(tmp_path / "field.png")
+    path = tmp_path / "scene.xml"
+    field = '<asset><hfield name="h" file="field.png" size="2 1 0.1 0.1"/></asset>'
+    path.write_text(f'<mujoco>{field}<worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>')
+    model = build_spec(load_config("riddle2023-rods", COARSE, arena=path), for_plant=True).compile()
+    # The engine's rows go from -y to +y, its columns from -x to +x.
+    height = model.hfield_data.reshape(3, 4)
+    assert height[2, 3] == 1.0
+    assert height.sum() == 1.0
+
+
+def test_a_scene_is_written_for_plain_mujoco() -> None:
+    model = mujoco.MjModel.from_xml_string(mjcf_text(config(BOX)))
+    assert model.body("scene/box").mass[0] == pytest.approx(0.03)
+
+
+def test_a_binary_mesh_and_a_text_give_the_same_ground(tmp_path: Path) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    record = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    record["corners"] = corners[faces]
+    (tmp_path / "m.stl").write_bytes(b"\0" * 80 + len(faces).to_bytes(4, "little") + record.tobytes())
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    # With texture and normal numbers, counted from the end, and a face of four corners made of two.
+    lines += [f"f {' '.join(f'{corner - 4}/1/1' for corner in face)}" for face in faces]
+    (tmp_path / "m.obj").write_text("\n".join(lines))
+    volumes = []
+    for name in ("m.stl", "m.obj"):
+        (tmp_path / "scene.xml").write_text(
+            f'<mujoco><asset><mesh name="m" file="{name}"/></asset><worldbody>{PLANE}'
+            '<body name="thing" pos="-3 0 0"><freejoint/><geom type="mesh" mesh="m" density="6"/></body>'
+            "</worldbody></mujoco>"
+        )
+        made = load_config("riddle2023-rods", COARSE, arena=tmp_path / "scene.xml")
+        volumes.append(float(WormPlant(made).model.body("scene/thing").mass[0]))
+    assert volumes == pytest.approx([1.0, 1.0])
+
+
+def test_nothing_of_a_scene_counts_as_worm() -> None:
+    """Neither bodies that are at rest, named or not, nor those that move."""
+    world = f'<body pos="-3 0 0"><geom size="0.1"/><body><geom size="0.2"/></body></body>{BOX}'
+    with_scene, bare = plant_in(world), plant_in("")
+    assert with_scene.total_mass_kg == bare.total_mass_kg
+    assert with_scene.posture.center_of_mass == pytest.approx(bare.posture.center_of_mass, abs=1e-12)
+    assert with_scene.model.body_mass.sum() > bare.total_mass_kg + 30.0
+
+
+def test_setae_are_refused_in_a_scene() -> None:
+    with pytest.raises(ConfigError, match=r"arena\.backward_friction = 1: must be left out"):
+        config("", changes={"arena.friction": 0.3, "arena.backward_friction": 1.0})

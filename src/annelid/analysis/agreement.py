@@ -109,9 +109,7 @@ def compare_with_log(run: Run, log: Measured, *, from_s: float = 0.0) -> Agreeme
     return compare_series({name: run_series(run, one.signal) for name, one in log.columns.items()}, log, from_s=from_s)
 
 
-def compare_series(
-    series: Mapping[str, tuple[Array, Array, str]], log: Measured, *, from_s: float = 0.0
-) -> Agreement:
+def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured, *, from_s: float = 0.0) -> Agreement:
     """Does what `compare_with_log` does, with times, s, values and unit of every column's signal."""
     simulated: dict[str, tuple[Array, Array]] = {}
     units: dict[str, str] = {}

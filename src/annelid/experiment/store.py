@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from annelid.config.kinds import kinds_in
-from annelid.errors import AnnelidError, ConfigError, RunFileError
+from annelid.errors import AnnelidError, ConfigError
 from annelid.experiment.attempt import (
     DRAFTS,
     MARK_NAME,

@@ -63,9 +63,7 @@ class Experiment(Kind):
         name: As residuals, parameters (``experiments.NAME.FIELD``) and tables call it.
     """
 
-    registry: ClassVar[Registry[type[Experiment]]] = Registry(
-        "experiments.kind", "annelid.experiment.identify.kinds"
-    )
+    registry: ClassVar[Registry[type[Experiment]]] = Registry("experiments.kind", "annelid.experiment.identify.kinds")
     default: ClassVar[str] = "load-frame"
     name: Annotated[Line, Field(pattern=r"^[A-Za-z][\w-]*$", max_length=40)] = Field(description="name in results")
     data: Line = Field(description="file of the data, beside the study or below it")

@@ -88,9 +88,7 @@ class IdentifyStudy(Section):
     parameters: Mapping[str, Parameter] = Field(
         max_length=MOST, description="what is fitted; of one that annelid knows, only what differs"
     )
-    experiments: tuple[Annotated[Experiment, Choice()], ...] = Field(
-        max_length=MOST, description="what was measured"
-    )
+    experiments: tuple[Annotated[Experiment, Choice()], ...] = Field(max_length=MOST, description="what was measured")
 
     @model_validator(mode="before")
     @classmethod

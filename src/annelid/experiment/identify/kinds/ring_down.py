@@ -42,6 +42,16 @@ class RingDown(Experiment):
 
     def predicted(self, config: RunConfig, data: Data, found: Found) -> Array:
         """Returns the displacement that fits the points best with the strand's frequency and damping, m."""
+        frequency, rate = self.mode(config)
+        turn = np.sqrt(complex(frequency**2 - rate**2))
+        # Real and imaginary part of one wave, or two decays where it is damped too much to ring.
+        waves = [np.exp((sign * 1j * turn - rate) * data.at) for sign in (1, -1)]
+        parts = [one.real for one in waves] if turn.imag else [waves[0].real, waves[0].imag]
+        basis = np.stack([np.ones(len(data.at)), *parts], axis=1)
+        return basis @ np.linalg.lstsq(basis, data.values, rcond=None)[0]
+
+    def mode(self, config: RunConfig) -> tuple[float, float]:
+        """Undamped angular frequency of a worm's strand, rad/s, and the rate at which its amplitude decays, 1/s."""
         strands = config.body.strands if isinstance(config.body, WormBody) else None
         if strands is None or not strands.material_damping_s:
             raise ConfigError(
@@ -51,14 +61,7 @@ class RingDown(Experiment):
         density = strands.linear_density_kg_per_m
         root = first_root(self.tip_mass_kg / (density * self.length_m))
         frequency = root**2 * sqrt(strands.bending_rigidity_Nm2 / density) / self.length_m**2
-        rate = frequency**2 * strands.material_damping_s / 2.0
-        turn = np.sqrt(complex(frequency**2 - rate**2))
-        # Real and imaginary part of one wave, or two decays where it is damped too much to ring.
-        waves = np.exp((1j * turn - rate) * data.at), np.exp((-1j * turn - rate) * data.at)
-        basis = np.stack([np.ones(len(data.at)), (waves[0] + waves[1]).real, ((waves[0] - waves[1]) * -1j).real], axis=1)
-        if turn.imag:
-            basis[:, 1:] = np.stack([waves[0].real, waves[1].real], axis=1)
-        return basis @ np.linalg.lstsq(basis, data.values, rcond=None)[0]
+        return frequency, frequency**2 * strands.material_damping_s / 2.0
 
 
 def first_root(tip: float) -> float:

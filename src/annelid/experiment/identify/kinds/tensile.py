@@ -1,8 +1,8 @@
 """A tensile test of the tube that the strands are made of, and the law by which its modulus falls.
 
 The stress at a strain e is ``E0 e_s ln(1 + e / e_s)``: the tangent modulus is ``E0 / (1 + e / e_s)``. A rod of the
-engine is linear, so that its modulus is the secant of this law in bending, at the strain that the strands reach. Young's
-modulus of the strands and the tensile test share E0 in this way.
+engine is linear, so that its modulus is the secant of this law in bending, at the strain that the strands reach. In
+this way the strands' modulus and the tensile test share E0.
 """
 
 from __future__ import annotations
@@ -66,16 +66,21 @@ class Tensile(Experiment):
 
     def predicted(self, config: RunConfig, data: Data, found: Found) -> Array:
         """Returns the force at each strain, N."""
+        return self.tension(config, data.at)
+
+    def tension(self, config: RunConfig, strain: Array) -> Array:
+        """Returns the force of a worm's tube at strains, ``(n,)``, N."""
         body = config.body
         if not isinstance(body, WormBody):
             raise ConfigError(f"body.kind = {body.kind!r} has no strands: an experiment of kind 'tensile' needs 'worm'")
         outer, inner = self.outer_diameter_m / 2, self.inner_diameter_m / 2
         # The tube bends like the strand, whatever section the strand's radius stands for.
         linear = body.strands.bending_rigidity_Nm2 / (pi / 4 * (outer**4 - inner**4))
+        area = pi * (outer**2 - inner**2)
         if self.softening_strain is None:
-            return linear * data.at * pi * (outer**2 - inner**2)
+            return linear * strain * area
         initial = linear / float(bending_secant(self.working_strain, self.softening_strain, inner / outer))
-        return initial * stress(data.at, self.softening_strain) * pi * (outer**2 - inner**2)
+        return initial * stress(strain, self.softening_strain) * area
 
 
 def stress(strain: Array, softening_strain: float) -> Array:

@@ -86,11 +86,13 @@ class Loop:
         """
         return np.arange(1, n + 1) / (n + 2) * float(self.displacement_m.max())
 
-    def branches(self, at_m: Array) -> Array:
+    def branches(self, at_m: Array, values: Array | None = None) -> Array:
         """Mean force, N, about displacements on both branches, loading first, ``(2, k)``.
 
         There are at least two displacements, ``(k,)``, evenly spaced; a mean reaches half a spacing to both sides.
+        With values, ``(n,)``, these stand in place of the force.
         """
+        values = self.force_N if values is None else values
         half = (at_m[1] - at_m[0]) / 2
         edges = np.append(at_m - half, at_m[-1] + half)
         force = np.empty((2, len(at_m)))
@@ -102,7 +104,7 @@ class Loop:
                     f"the loop has no sample near {at_m[int(count.argmin())] / MM:g} mm: it covers "
                     f"{x.min() / MM:.0f} to {x.max() / MM:.0f} mm with {len(x)} samples"
                 )
-            row[:] = np.histogram(x, edges, weights=self.force_N[branch])[0] / count
+            row[:] = np.histogram(x, edges, weights=values[branch])[0] / count
         return force
 
 

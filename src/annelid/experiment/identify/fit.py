@@ -150,7 +150,7 @@ class Model:
             for field, share in one.fields.items():
                 changes |= dict.fromkeys(self.study.paths(field), share * value)
         worm = {path: value for path, value in changes.items() if not path.startswith("experiments.")}
-        own = [
+        own: list[dict[str, float]] = [
             {p.rsplit(".", 1)[1]: v for p, v in changes.items() if p.startswith(f"experiments.{one.name}.")}
             for one in self.study.experiments
         ]

@@ -34,7 +34,8 @@ class Simulation:
     def __call__(self) -> bytes:
         """Computes it; the arrays come as an archive of numpy."""
         file = io.BytesIO()
-        np.savez(file, **self.test.run(RunConfig.model_validate_json(self.config)))
+        arrays = self.test.run(RunConfig.model_validate_json(self.config))
+        np.savez(file, **arrays)  # pyright: ignore[reportArgumentType]
         return file.getvalue()
 
     @property

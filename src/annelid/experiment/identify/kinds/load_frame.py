@@ -62,21 +62,26 @@ class LoadFrame(Experiment):
         at = loop.places(self.points)
         values, side = loop.branches(at), np.repeat([0, 1], self.points)
         labels = ("displacement of the cable (m)", "force of the cable (N)")
-        return Data(np.tile(at, 2), values.ravel(), side, labels, "N", notes)
+        # Where rows are missing, the mean lies beside the middle.
+        centre = loop.branches(at, loop.displacement_m).ravel()
+        return Data(centre, values.ravel(), side, labels, "N", notes, at)
 
     def test(self, config: RunConfig, data: Data) -> FrameTest:
         """Returns the loop to wind, as far as the measured one: see `Loop.places`."""
-        return FrameTest(float(f"{data.at[0] * (self.points + 2):.6g}"), self.speed_m_per_s, self.haste)
+        return FrameTest(float(f"{data.source[0] * (self.points + 2):.6g}"), self.speed_m_per_s, self.haste)
 
     def predicted(self, config: RunConfig, data: Data, found: Found) -> Array:
         """Returns the force at the cable's pulled end at each point, N."""
-        return self._loop(found).branches(data.at[: self.points]).ravel()
+        loop, at = self._loop(found), data.source
+        force, centre = loop.branches(at), loop.branches(at, loop.displacement_m)
+        slope = np.stack([np.gradient(*pair) for pair in zip(force, centre, strict=True)])
+        return (force + slope * (data.at.reshape(2, -1) - centre)).ravel()
 
     def numbers(self, data: Data, found: Found) -> dict[str, float]:
         """Returns the share of the work that is lost, between the points: fitted and measured."""
-        at = data.at[: self.points]
+        at = data.source
         fitted = self._loop(found).branches(at)
-        work = np.trapezoid(np.stack([fitted, data.values.reshape(2, -1)]), at, axis=-1)
+        work = np.asarray(np.trapezoid(np.stack([fitted, data.values.reshape(2, -1)]), at, axis=-1))
         lost = 1.0 - work[:, 1] / work[:, 0]
         return {"lost_share_fitted": float(lost[0]), "lost_share_measured": float(lost[1])}
 

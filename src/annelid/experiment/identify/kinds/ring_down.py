@@ -69,10 +69,10 @@ def first_root(tip: float) -> float:
 
     ``tip`` is the tip's mass over the strand's.
     """
-    from scipy.optimize import brentq
+    from scipy.optimize import root_scalar
 
     def zero(root: float) -> float:
         c, s, ch, sh = cos(root), sin(root), cosh(root), sinh(root)
         return 1.0 + c * ch + tip * root * (c * sh - s * ch)
 
-    return float(brentq(zero, 1e-3, 1.9))
+    return float(root_scalar(zero, bracket=(1e-3, 1.9)).root)

@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from annelid.analysis.agreement import compare_series
 from annelid.analysis.measured import Measured, read_map, read_measured, run_series
 from annelid.config import RunConfig
 from annelid.config.sections import Line, NonNegative
@@ -77,6 +76,9 @@ class Walk(Experiment):
 
     def predicted(self, config: RunConfig, data: Data, found: Found) -> Array:
         """Returns the run's signals at the points; where log and run do not overlap, the points themselves."""
+        # It loads much of SciPy, which other experiments do not need.
+        from annelid.analysis.agreement import compare_series
+
         log: Measured = data.source
         units = {name: str(found[f"unit_{i}"]) for i, name in enumerate(log.columns)}
         series = {name: (found[f"time_{i}"], found[f"value_{i}"], units[name]) for i, name in enumerate(log.columns)}

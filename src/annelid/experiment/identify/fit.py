@@ -24,10 +24,14 @@ from annelid.protocols import Array
 
 STEP = 0.04
 """Relative step of the derivatives, above the scatter of a mesh that buckles a little differently each time."""
+SMALL_STEP = 1e-4
+"""The same of closed forms, which do not scatter."""
 MOST_EVALUATIONS = 12
 """Evaluations of the optimiser beside those for derivatives, for each estimate of the errors."""
 ROUNDS = 3
 """Estimates of the errors, each followed by a fit."""
+SINGULAR = 1e-12
+"""Least eigenvalue of what the data know, of the greatest."""
 FIRST_NOISE = 0.02
 """Noise that is assumed before any is known, of the range of the values."""
 OFF_SCALE = 20.0
@@ -121,7 +125,7 @@ class Fit:
     def covariance(self) -> Array:
         """Covariance of the logarithms of the parameters, ``(p, p)``; what the data say nothing of has a huge one."""
         values, vectors = np.linalg.eigh(self.information)
-        return (vectors / np.maximum(values, 1e-12)) @ vectors.T
+        return (vectors / np.maximum(values, SINGULAR * values[-1])) @ vectors.T
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -142,6 +146,7 @@ class Model:
         if n_fitted <= len(study.parameters):
             raise ConfigError(f"{n_fitted} points cannot fit {len(study.parameters)} parameters")
         self._known: dict[bytes, list[Array]] = {}
+        self._slopes: list[tuple[Array, list[Array]]] = []
 
     def worms(self, logs: Array) -> tuple[RunConfig, list[Experiment]]:
         """Returns the worm and the experiments for logarithms of the parameters, ``(p,)``."""
@@ -183,14 +188,34 @@ class Model:
 
     def derivatives(self, logs: Array, stage: str = "identifying") -> list[Array]:
         """Returns the change of every prediction for a relative change of each parameter, ``(n, p)``."""
+        for at, known in self._slopes:
+            # Differences over a step change less than that from so near a place.
+            if np.abs(logs - at).max() <= STEP / 4:
+                return known
         high = bounds(self.study)[1]
         steps = [STEP if logs[i] + STEP <= high[i] else -STEP for i in range(len(logs))]
         moved = [logs + step * axis for step, axis in zip(steps, np.eye(len(logs)), strict=True)]
         here, *there = self.predicted([logs, *moved], stage)
-        return [
+        slopes = [
             np.stack([(one[part] - here[part]) / step for one, step in zip(there, steps, strict=True)], axis=-1)
             for part in range(len(self.data))
         ]
+        slopes = [own if exact is None else exact for own, exact in zip(slopes, self._closed(logs), strict=True)]
+        self._slopes.append((logs, slopes))
+        return slopes
+
+    def _closed(self, logs: Array) -> list[Array | None]:
+        """Central differences of the experiments that need no test of a worm, by a small step; None for the others."""
+        config, experiments = self.worms(logs)
+        closed = [one.test(config, data) is None for one, data in zip(experiments, self.data, strict=True)]
+        slopes: list[list[Array]] = [[] for _ in experiments]
+        for axis in np.eye(len(logs)):
+            ends = [self.worms(logs + sign * SMALL_STEP * axis) for sign in (1.0, -1.0)]
+            for part, data in enumerate(self.data):
+                if closed[part]:
+                    ahead, behind = (own[part].predicted(worm, data, {}) for worm, own in ends)
+                    slopes[part].append((ahead - behind) / (2.0 * SMALL_STEP))
+        return [np.stack(own, axis=-1) if is_closed else None for own, is_closed in zip(slopes, closed, strict=True)]
 
 
 def bounds(study: IdentifyStudy) -> tuple[Array, Array]:

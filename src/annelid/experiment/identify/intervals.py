@@ -9,7 +9,7 @@ from math import exp, sqrt
 import numpy as np
 
 from annelid.errors import SimulationStopped
-from annelid.experiment.identify.fit import Fit, Model, Part, bounds, prior_rows, relative_gain
+from annelid.experiment.identify.fit import SINGULAR, Fit, Model, Part, bounds, prior_rows, relative_gain
 from annelid.experiment.identify.noise import whitened
 from annelid.protocols import Array
 
@@ -63,7 +63,7 @@ def intervals(fit: Fit, model: Model) -> Intervals:
     error = np.sqrt(np.diag(fit.covariance))
     values, vectors = np.linalg.eigh(fit.information)
     correlation = fit.covariance / np.outer(error, error)
-    errors = 1.0 / np.sqrt(np.maximum(values, 1e-12))
+    errors = 1.0 / np.sqrt(np.maximum(values, SINGULAR * values[-1]))
     return Intervals(
         profile=_profile(fit, model, error, quantile),
         bootstrap=np.exp(fit.logs + np.quantile(replicates(fit), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)).T,
@@ -175,13 +175,11 @@ def confused(names: Sequence[str], correlation: Array, errors: Array, directions
         up = [name for name, share in shares if share > 0]
         down = [name for name, share in shares if share < 0]
         if len(shares) == 1:
-            found.append(f"the data do not determine {up[0]}: its relative error is {error:.0%}")
+            found.append(f"the data do not determine {up[0]}: its relative error is {error:.3g}")
         else:
             how = f"raising {' and '.join(up)}" + (f" while lowering {' and '.join(down)}" if down else "")
-            found.append(
-                f"the data do not tell {', '.join(n for n, _ in shares)} apart: {how} changes the predictions too "
-                f"little to see, up to {exp(min(error, 50.0)) - 1:.0%}"
-            )
+            by = f"by {exp(error) - 1:.0%}" if error < 1.0 else "by any factor"
+            found.append(f"the data do not tell {' and '.join(n for n, _ in shares)} apart: {how} {by} changes nothing")
     pairs = [(names[k], names[i], correlation[i, k]) for i in range(len(names)) for k in range(i)]
     alike = (f"{one} and {other} are correlated by {by:+.2f}" for one, other, by in pairs if abs(by) > ALIKE)
     return (*found, *alike)

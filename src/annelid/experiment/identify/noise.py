@@ -81,11 +81,14 @@ def estimated(data: Data, residual: Array, jacobian: Array, elsewhere: Array, st
         root = errors(logs).root(data)
         whitened = solve_triangular(root, np.column_stack([residual, jacobian]), lower=True)
         r, j = whitened[:, 0], whitened[:, 1:]
-        known = cholesky(elsewhere + j.T @ j + 1e-12 * np.eye(j.shape[1]), lower=True)
+        known = elsewhere + j.T @ j
+        # Two parameters that do the same would leave it singular.
+        known = cholesky(known + (1e-10 * np.trace(known) + 1e-300) * np.eye(len(known)), lower=True)
         gone = solve_triangular(known, j.T @ r, lower=True)
         return float(2 * np.log(np.diag(root)).sum() + 2 * np.log(np.diag(known)).sum() + r @ r - gone @ gone)
 
-    bounds = [(log(LEAST * size), log(10 * size)), (log(spacing / 2), log(2 * reach))]
+    # A discrepancy as long as the data would be told apart from no parameter: the fit would follow slopes only.
+    bounds = [(log(LEAST * size), log(10 * size)), (log(spacing / 2), log(max(reach / 4, spacing)))]
     if stated is None:
         bounds.append((log(LEAST * scale), log(10 * size)))
     shares = ((0.7, 5 * spacing, 0.7), (0.05, 2 * spacing, 1.0), (0.9, reach / 3, 0.2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import log, log1p, pi, sqrt
+from math import exp, log, log1p, sqrt
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -18,11 +18,6 @@ from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.experiment.identify.base import Experiment, beside
 from annelid.textfiles import check_depth, read_toml
 
-EQUAL_STIFFNESS: dict[str, Any] = {
-    "body.strands.radius_m": 0.00299,
-    "body.strands.linear_density_kg_per_m": 571.6 * pi * 0.00299**2,
-}
-"""The authors' solid strand that bends like their tube, and weighs as much."""
 MOST = 20
 """Parameters, and experiments, that a study may have."""
 ROBOT = Path(annelid.__file__).parent / "data" / "identify_robot.toml"
@@ -39,8 +34,6 @@ class Prior(Section):
     def row(self, log_value: float) -> tuple[float, float]:
         """Returns the residual of a logarithm in standard deviations, and its derivative."""
         if self.shape == "normal":
-            from math import exp
-
             value = exp(log_value)
             return (value - self.mean) / self.sd, value / self.sd
         square = log1p((self.sd / self.mean) ** 2)

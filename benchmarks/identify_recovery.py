@@ -26,6 +26,7 @@ from annelid.experiment.identify.kinds.tensile import Tensile
 from annelid.experiment.identify.report import identify
 from annelid.experiment.identify.study import load_identify_study
 from annelid.experiment.load_frame import Loop, cable_force
+from annelid.output import write_csv
 
 ROBOTS = 50
 REACH_M = 0.24
@@ -144,19 +145,20 @@ def rows_of(number: int) -> list[list[object]]:
     ]
 
 
-def table(path: Path) -> str:
+def summary(path: Path) -> list[list[object]]:
     """How often intervals hold the truth, and the bias over the mean width of an interval, by parameter."""
-    lines = ["parameter           n  profile  bootstrap  bias / interval"]
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    found: list[list[object]] = []
     for name in (*DRAWN, "all"):
         mine = [row for row in rows if name in (row["parameter"], "all")]
         ends = {head: np.array([float(row[head]) for row in mine]) for head in HEADS[2:]}
         truth = ends["truth"]
         held = [np.mean((ends[f"{s}low"] <= truth) & (truth <= ends[f"{s}high"])) for s in ("", "bootstrap_")]
-        bias = np.mean(np.log(ends["value"] / truth)) / np.mean(np.log(ends["high"] / ends["low"]))
-        lines.append(f"{name:18} {len(mine):3}  {held[0]:7.1%}  {held[1]:9.1%}  {bias:+.3f}")
-    return "\n".join(lines)
+        width = np.log(ends["high"] / ends["low"])
+        bias = np.mean(np.log(ends["value"] / truth)) / np.mean(width)
+        found.append([name, len(mine), *(f"{value:.3f}" for value in (*held, bias, np.exp(np.median(width) / 2) - 1))])
+    return found
 
 
 def main(path: Path, robots: int = ROBOTS) -> None:
@@ -172,7 +174,8 @@ def main(path: Path, robots: int = ROBOTS) -> None:
         with path.open("a", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
         print(f"robot {number} of {robots}", flush=True)
-    print(table(path))
+    columns = ("parameter", "n", "profile", "bootstrap", "bias", "half_width")
+    print(write_csv(path.with_stem(f"{path.stem}_table"), columns, summary(path)).read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -228,7 +228,7 @@ def test_what_the_data_cannot_tell_apart_is_said(tmp_path: Path) -> None:
 
 def test_a_parameter_that_changes_nothing_is_named() -> None:
     sentences = confused(("a", "b"), np.eye(2), np.array([1e6, 0.01]), np.array([[0.0, 1.0], [1.0, 0.0]]))
-    assert sentences == (f"the data do not determine b: its relative error is 1e+06",)
+    assert sentences == ("the data do not determine b: its relative error is 1e+06",)
 
 
 def test_a_stiffer_tube_widens_the_intervals_by_its_discrepancy(tmp_path: Path) -> None:

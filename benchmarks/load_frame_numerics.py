@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid import load_config
-from annelid.experiment.calibration import EQUAL_STIFFNESS, places
 from annelid.experiment.case import SHEAR_OVER_YOUNG
+from annelid.experiment.identify.study import ROBOT, load_identify_study
 from annelid.experiment.load_frame import cable_force, load_frame, read_loop
 
-YOUNG_MODULUS_PA, DRY_FRICTION_NM, CABLE_FRICTION = 0.437e9, 0.0083, 2.15
+POINTS = 20
+YOUNG_MODULUS_PA, DRY_FRICTION_NM, CABLE_FRICTION = 0.28e9, 0.0055, 2.3
 """About those of the default fit."""
-WORM = EQUAL_STIFFNESS | {
+WORM = dict(load_identify_study(ROBOT).set) | {
     "body.strands.young_modulus_Pa": YOUNG_MODULUS_PA,
     "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG * YOUNG_MODULUS_PA,
     "body.joints.dry_friction_Nm": DRY_FRICTION_NM,
@@ -34,7 +35,7 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
 
 def main() -> None:
     measured = read_loop()
-    reach_m, at_m = float(measured.displacement_m.max()), places(measured)
+    reach_m, at_m = float(measured.displacement_m.max()), measured.places(POINTS)
 
     def forces(changes: dict[str, Any], options: dict[str, float]) -> NDArray[np.float64]:
         config = load_config("riddle2023-rods", WORM | changes)

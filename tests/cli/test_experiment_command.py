@@ -27,7 +27,7 @@ def test_load_frame_writes_a_table_and_its_picture(annelid: Command) -> None:
         (("experiment", "load-frame", "--displacement", "2000"), "four fifths"),
         (("experiment", "load-frame", "--data", "none.csv"), "cannot read none.csv"),
         (("calibrate", "--free", "yuong_modulus"), "did you mean 'young_modulus'"),
-        (("calibrate", "--data", "none.csv"), "cannot read none.csv"),
+        (("calibrate", "none.toml"), "cannot read the study none.toml"),
     ],
 )
 def test_bad_input_ends_in_one_sentence(annelid: Command, arguments: tuple[str, ...], says: str) -> None:

@@ -104,12 +104,11 @@ def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def calibrate(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    fit = SimpleNamespace(simulated=None)
-    written = lambda *words: (write_json(words[-1], {"n_loops": 3}), Path("calibrated.toml"))  # noqa: E731
-    found = {"calibrate": fit, "fit_tables": [], "write_calibration": None}
-    fake(monkeypatch, "annelid.experiment.calibration", **found)
-    fake(monkeypatch, "annelid.experiment.load_frame")
-    monkeypatch.setattr("annelid.experiment.calibration.write_calibration", written)
+    report = "annelid.experiment.identify.report"
+    monkeypatch.setattr(f"{report}.identify", lambda *_: SimpleNamespace(intervals=SimpleNamespace(confused=())))
+    written = lambda _, folder: [write_json(folder / "calibration.json", {"n_tests": 3}), Path("calibrated.toml")]  # noqa: E731
+    monkeypatch.setattr(f"{report}.write_identified", written)
+    monkeypatch.setattr(f"{report}.tables", lambda _: [])
     return annelid("calibrate", "--json")
 
 

@@ -71,7 +71,7 @@ LONG = {
     ("annelid", "challenge"): ("hours, or minutes with --quick", ("--quick",)),
     ("annelid", "robustness"): ("hours for 300 points", ("--points", "1")),
     ("annelid", "tune"): ("an hour", ("--trials", "2", "--duration", "1")),
-    ("annelid", "calibrate"): ("half a minute and more", ()),
+    ("annelid", "calibrate"): ("some minutes", ("--free", "dry_friction", "--free", "cable_friction")),
     ("annelid", "limit-cycle"): ("ten seconds of one core", ()),
     ("annelid", "experiment", "weak-middle"): ("minutes", ("--quick",)),
     ("annelid", "experiment", "speed"): ("an hour", ("--quick",)),
@@ -100,6 +100,7 @@ ELSEWHERE = {
     ("annelid", "gallery"): "tests/docs/test_gallery.py calls it",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
+    ("annelid", "run", "mine/calibrated.toml"): "the file is what a fit found",
     ("annelid", "render", "course", "--time"): "its run is that of the page's example, which takes minutes",
     ("annelid", "render", "course", "--video", "course.mp4", "--camera", "course"): "docs/turning.md executes it",
 }

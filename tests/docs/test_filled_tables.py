@@ -55,12 +55,10 @@ NO_WORM = {
     "bench.json": "every case names the digest of its own configuration",
     "robust_network.csv": "networks without a body",
     "lateral_damping.csv": "rods with and without the damping that it is about",
-    "calibration_authors_springs.json": "fits to the load frame, each with a body of its own",
-    "calibration_default.json": "the same",
-    "calibration_no_cable_friction.json": "the same",
-    "calibration_no_crossing_friction.json": "the same",
-    "calibration_spring_rate.json": "the same",
-    "calibration_thin_strands.json": "the same",
+    "calibration_default.json": "a fit with a body of its own",
+    "identify_recovery.csv": "synthetic robots",
+    "identify_recovery_table.csv": "the same",
+    "tube_law.csv": "fits to the load frame, each with a body of its own",
     "material.csv": "the swept materials are its rows",
 }
 """Result files that are not of presets, and why."""

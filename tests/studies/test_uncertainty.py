@@ -19,9 +19,7 @@ from annelid.analysis import summary
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment import uncertainty as study
-from annelid.experiment.calibration import EQUAL_STIFFNESS, calibrate
 from annelid.experiment.case import Case
-from annelid.experiment.load_frame import read_loop
 from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
 from annelid.experiment.store import case_key
 from annelid.experiment.uncertainty import (
@@ -211,16 +209,6 @@ def test_the_fit_that_comes_along_is_whole() -> None:
     assert known.relative_error == pytest.approx(np.sqrt(np.diag(covariance)))
     assert known.correlation * np.outer(known.relative_error, known.relative_error) == pytest.approx(covariance)
     assert known.cable_exponent == content["parameters"]["cable_friction"]["value"]
-
-
-@pytest.mark.slow
-def test_the_fit_that_comes_along_is_the_one_that_calibrate_makes() -> None:
-    fit = calibrate(load_config(RODS, EQUAL_STIFFNESS), read_loop())
-    known = read_spread()
-    assert fit.names == known.names
-    # The optimiser stops where a step changes parameters by less than 1e-3.
-    assert fit.identifiability.relative_error == pytest.approx(known.relative_error, rel=0.02)
-    assert fit.identifiability.correlation == pytest.approx(known.correlation, abs=0.02)
 
 
 def test_another_fit_is_read_as_it_was_written(tmp_path: Path) -> None:

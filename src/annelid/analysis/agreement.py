@@ -106,11 +106,16 @@ def compare_with_log(run: Run, log: Measured, *, from_s: float = 0.0) -> Agreeme
         ConfigError: A signal is not in the run, has another unit, or is off by orders of magnitude; or there is too
             little to compare.
     """
+    return compare_series({name: run_series(run, one.signal) for name, one in log.columns.items()}, log, from_s=from_s)
+
+
+def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured, *, from_s: float = 0.0) -> Agreement:
+    """Does what `compare_with_log` does, with times, s, values and unit of every column's signal."""
     simulated: dict[str, tuple[Array, Array]] = {}
     units: dict[str, str] = {}
     notes = list(log.notes)
-    for name, column in log.columns.items():
-        time_s, values, units[name] = run_series(run, column.signal)
+    for name in log.columns:
+        time_s, values, units[name] = series[name]
         kept = time_s >= from_s
         simulated[name] = time_s[kept], values[kept]
         _refuse_unlike(name, log, values, units[name])

@@ -448,54 +448,61 @@ def tune_command(
 
 
 def calibrate_command(
-    preset: NamedPreset = RIGID_PRESET,
-    output: ResultsFolder = Path("calibration"),
+    study: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[STUDY.toml]",
+            help="Worm, parameters and experiments; --example prints one.  [default: the robot of annelid's data]",
+        ),
+    ] = None,
+    output: Output = Path("calibration"),
     assignments: Assignments = None,
     free: Annotated[
         list[str] | None,
-        typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: the first three]"),
+        typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: those of the study]"),
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="Measured loop to fit: CSV of mm, N.  [default: the one of annelid]")
-    ] = None,
+    jobs: Jobs = None,
+    cluster: ClusterName = None,
+    example: Annotated[bool, typer.Option("--example", help="Print the study of the robot, to begin with.")] = False,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:
-    """Fit the rod worm to a measured load-frame loop.
+    """Identify a robot from several measured experiments at once.
 
-    Strands of the stiffness-equivalent radius 0.00299 m and 571.6 kg/m^3, unless --set says otherwise. Takes a
-    few minutes. Writes calibration.json, calibration.png and .svg, and calibrated.toml: the fields to put into
-    a file of your own.
+    A study names a worm, parameters with their bounds, and experiments with their data, beside it or below it:
 
     \b
-    --free young_modulus         of the strands; the shear modulus keeps its ratio to it
-    --free dry_friction          Coulomb torque of a crossing
-    --free cable_friction        of the cable round the ring: coefficient times angle
-    --free spring_rate           of the axial springs
-    --free spring_rest_length    of the axial springs
-    --free viscous_friction      torque of a crossing per angular velocity
+    tensile       force over the elongation of the strands' tube
+    load-frame    force over the displacement of a ring's cable, there and back
+    ring-down     a strand that is bent, released, and rings down
+    walk          the log of a walking robot, with a map, as annelid compare takes it
+
+    Writes calibration.json, with values, 95 % intervals, correlations and the size of what the model leaves out;
+    calibration.png and .svg; and calibrated.toml, the fitted worm. Tests of worms are kept, so the same command
+    continues one that was interrupted. A study with a load frame takes some minutes. Without a study, the tube and
+    one segment of the robot are fitted.
 
     \b
-    annelid calibrate
-    annelid calibrate --set body.strands.radius_m=0.002
-    annelid calibrate --set body.springs.stiffness_N_per_m=24.5 --set body.springs.rest_length_m=0.065
-    annelid calibrate --free young_modulus --free dry_friction --data mine.csv
+    annelid calibrate --example > study.toml
+    annelid calibrate study.toml -o mine
+    annelid calibrate --free young_modulus --free spring_rate --free dry_friction --free cable_friction
+    annelid run mine/calibrated.toml --uncertainty 8 --uncertainty-from mine/calibration.json
     """
-    from annelid.experiment.calibration import DEFAULT_FREE, EQUAL_STIFFNESS, calibrate, fit_tables, write_calibration
-    from annelid.experiment.load_frame import draw_loops, read_loop
-    from annelid.experiment.progress import study_progress
+    from annelid.experiment.identify.report import REPORT, identify, tables, write_identified
+    from annelid.experiment.identify.simulations import Simulations
+    from annelid.experiment.identify.study import ROBOT, load_identify_study
 
-    report = output / "calibration.json"
-    lock(output)
-    refuse_existing(report, force)
-    measured, changes = read_loop(data), EQUAL_STIFFNESS | overrides_of(assignments)
-    config = config_of(preset, dict(changes))
-    with study_progress(quiet=quiet) as progress:
-
-        def simulated(loops: int, rms_N: float) -> None:
-            if progress is not None:
-                progress(f"calibrating, {rms_N:.2f} N off after {loops} loops", 0, 0, 0.0)
-
-        fit = calibrate(config, measured, free=free or DEFAULT_FREE, progress=simulated)
-    picture = draw_loops({"fitted": fit.simulated, "measured": measured}, report.with_suffix(""))
-    print_results((*write_calibration(fit, preset, changes, report), picture), *fit_tables(fit), quiet=quiet)
+    refuse_json(example, "--example")
+    if example:
+        typer.echo(ROBOT.read_text(encoding="utf-8"), nl=False)
+        return
+    source = ROBOT if study is None else study
+    loaded = load_identify_study(source).but(overrides_of(assignments))
+    loaded = loaded.only(free) if free else loaded
+    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+        refuse_existing(output / REPORT, force)
+        simulations = Simulations(store.folder, store.workers, store.progress)
+        found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))
+    for sentence in found.intervals.confused:
+        complain(f"note: {sentence}")
+    print_results(write_identified(found, output), *tables(found), quiet=quiet)

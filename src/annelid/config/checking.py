@@ -219,7 +219,7 @@ def _place(loc: tuple[int | str, ...], root: type[Section], tree: Any) -> tuple[
     section: type[BaseModel] = root
     members: list[type[Section]] = []
     parts: list[str] = []
-    for part in loc:
+    for place, part in enumerate(loc):
         names = {info.alias or name: name for name, info in section.model_fields.items()}
         if part in names and not members:
             field = section.model_fields[names[str(part)]]
@@ -231,6 +231,10 @@ def _place(loc: tuple[int | str, ...], root: type[Section], tree: Any) -> tuple[
             continue
         elif isinstance(part, int):
             tree = tree[part] if isinstance(tree, Sequence) and part < len(tree) else None
+            members = _of_kind(members, tree.get("kind") if isinstance(tree, Mapping) else None)
+        elif isinstance(tree, Mapping) and part in tree and place < len(loc) - 1:
+            # A key of a mapping of sections.
+            tree = tree[part]
         else:
             continue
         parts.append(str(part))

@@ -10,7 +10,7 @@ import platform
 import shutil
 import tempfile
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,11 +56,17 @@ def own_code() -> tuple[str, str]:
     return physics_fingerprint(), code_fingerprint(*READERS)
 
 
-def attempt(task: Task) -> bytes | None:
+Work = Task | Callable[[], bytes]
+"""What a worker computes: a run, or anything else that gives the bytes to send."""
+
+
+def attempt(task: Work) -> bytes | None:
     """Computes a run and publishes it in its store; returns the file to send where its folder is not on this machine.
 
     A run that a guard stops is no error; an interrupted one is a KeyboardInterrupt.
     """
+    if not isinstance(task, Task):
+        return task()
     if task.code != own_code():
         raise ClusterError(
             f"the worker on {platform.node()} has other code: install the same versions of annelid, mujoco-core and "

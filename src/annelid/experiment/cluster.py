@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from annelid.config import cluster as settings
 from annelid.errors import ClusterError, MissingDependency, RunKilled
-from annelid.experiment.attempt import Task, attempt
+from annelid.experiment.attempt import Work, attempt
 from annelid.experiment.workers import Processes, Result, Workers
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class DaskWorkers(Workers):
             self._counted = now, n_workers
         return self._counted[1]
 
-    def submit(self, task: Task) -> Result:
+    def submit(self, task: Work) -> Result:
         """Has a run computed by one of the workers."""
         assert self._client is not None
         return self._client.get_executor(pure=False).submit(attempt, task)

@@ -79,11 +79,21 @@ class Loop:
         done, back = self.work_J()
         return 1.0 - back / done
 
-    def branches(self, at_m: Array) -> Array:
+    def places(self, n: int) -> Array:
+        """Displacements at which loops are compared, m, ``(n,)``: even, and clear of both ends of this one.
+
+        At the start a cable is slack, and where it turns its force falls while cable and joints still stick: over 20 mm
+        on the robot, which `cable_force` leaves out.
+        """
+        return np.arange(1, n + 1) / (n + 2) * float(self.displacement_m.max())
+
+    def branches(self, at_m: Array, values: Array | None = None) -> Array:
         """Mean force, N, about displacements on both branches, loading first, ``(2, k)``.
 
         There are at least two displacements, ``(k,)``, evenly spaced; a mean reaches half a spacing to both sides.
+        With values, ``(n,)``, these stand in place of the force.
         """
+        values = self.force_N if values is None else values
         half = (at_m[1] - at_m[0]) / 2
         edges = np.append(at_m - half, at_m[-1] + half)
         force = np.empty((2, len(at_m)))
@@ -95,7 +105,7 @@ class Loop:
                     f"the loop has no sample near {at_m[int(count.argmin())] / MM:g} mm: it covers "
                     f"{x.min() / MM:.0f} to {x.max() / MM:.0f} mm with {len(x)} samples"
                 )
-            row[:] = np.histogram(x, edges, weights=self.force_N[branch])[0] / count
+            row[:] = np.histogram(x, edges, weights=values[branch])[0] / count
         return force
 
 
@@ -112,10 +122,15 @@ def read_loop(path: str | Path | None = None) -> Loop:
         raise AnnelidError(f"{source} is no table of numbers: {str(error).splitlines()[0]}") from None
     if table.shape[1] < 2:
         raise AnnelidError(f"{source} has {table.shape[1]} column: displacement (mm) and force (N) are needed")
-    loop = Loop(table[:, 0] * MM, table[:, 1].copy())
-    if not 0 < loop.turn < len(table) - 1:
+    table = table[np.isfinite(table[:, :2]).all(axis=1)]
+    return loop_of_table(table[:, 0] * MM, table[:, 1].copy(), str(source))
+
+
+def loop_of_table(displacement_m: Array, force_N: Array, source: str) -> Loop:
+    """Returns columns of a table, ``(n,)``, as a loop; an error that names the source where it does not turn within."""
+    if not len(displacement_m) or not 0 < displacement_m.argmax() < len(displacement_m) - 1:
         raise AnnelidError(f"{source} does not go there and back: its displacement is greatest at an end")
-    return loop
+    return Loop(displacement_m, force_N)
 
 
 def cable_force(loop: Loop, friction: float) -> Loop:

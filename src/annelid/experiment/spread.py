@@ -1,7 +1,7 @@
 """What is uncertain about a worm's body, by how much, and Monte Carlo samples of it.
 
-Errors and their correlations are those of a fit to the load frame (`annelid.experiment.calibration`); the one that
-comes with annelid is what ``annelid calibrate`` writes. They are relative, about the run's own values.
+Errors and their correlations are those of a fit (`annelid.experiment.identify`), as ``annelid calibrate`` writes it;
+the one that comes with annelid is of the load frame alone. They are relative, about the run's own values.
 """
 
 from __future__ import annotations
@@ -22,17 +22,16 @@ from annelid.body.actuators.servo import wrap_factors
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
-from annelid.experiment.calibration import PARAMETERS
+from annelid.experiment.identify.study import PARAMETERS
 from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text
 
 CABLE = "cable_friction"
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    **{name: tuple(parameter.fields) for name, parameter in PARAMETERS.items()},
-    CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N"),
-    "floor_friction": ("arena.friction",),
-}
+    name: tuple(field for field in parameter.fields if not field.startswith("experiments."))
+    for name, parameter in PARAMETERS.items()
+} | {CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N")}
 """What can be varied, and the fields that it scales: what a fit may change, and the floor. The shear modulus keeps its
 ratio to Young's. The cable's friction scales the rings' force by the mean tension of a cable, ``(1 - exp(-m)) / m`` of
 that at its pulled end. By default what the load frame can distinguish is varied: the first

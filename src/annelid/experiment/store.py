@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-import time
 import uuid
-from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, wait
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from annelid.config.kinds import kinds_in
-from annelid.errors import AnnelidError, ClusterError, ConfigError, RunFileError
+from annelid.errors import AnnelidError, ConfigError
 from annelid.experiment.attempt import (
     DRAFTS,
     MARK_NAME,
@@ -34,15 +31,12 @@ from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.workers import Processes, Result, Workers
+from annelid.experiment.workers import Processes, Workers
 from annelid.plausibility import refuse_nonsense
 from annelid.simulation.runfile import Run, open_run
 
 Progress = Callable[[int, int, float], object]
 """Called with the number of runs done, their total, and the share of the work that is done."""
-
-POLL_S = 0.5
-"""How often workers are looked for that have come or gone, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,38 +206,17 @@ class Store:
         if not marked.exists():
             marked.write_text(uuid.uuid4().hex, encoding="utf-8")
         home, mark, code = str(self.folder.resolve()), marked.read_text(encoding="utf-8"), own_code()
-        # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
-        # dies would be counted against the runs behind the one that killed it.
-        waiting, running, tries = deque(missing), dict[Result, Case](), Counter[str]()
-        while waiting or running:
-            while waiting and len(running) < workers.slots():
-                case = waiting.popleft()
-                task = Task(self.path(case).name, case.config.model_dump_json(), code, home, mark, self._keep)
-                running[workers.submit(task)] = case
-            if not running:
-                time.sleep(POLL_S)
-            done, _ = wait(running, POLL_S, FIRST_COMPLETED)
-            for future in done:
-                case = running.pop(future)
-                key = case_key(case)
-                try:
-                    content = future.result()
-                    if content is not None:
-                        fetch_results(content, self.path(case), case.config, self._keep)
-                except CancelledError:
-                    waiting.append(case)
-                except ClusterError:
-                    raise
-                except ImportError as error:
-                    raise ClusterError(f"a worker cannot import annelid: install it there too ({error})") from error
-                except Exception as error:
-                    if isinstance(error, RunFileError | OSError | BrokenExecutor) and tries[key] < workers.retries:
-                        tries[key] += 1
-                        waiting.append(case)
-                    else:
-                        yield case, workers.explained(error)
-                else:
-                    yield case, None
+
+        def task_of(number: int) -> Task:
+            case = missing[number]
+            return Task(self.path(case).name, case.config.model_dump_json(), code, home, mark, self._keep)
+
+        def take(number: int, content: bytes | None) -> None:
+            if content is not None:
+                fetch_results(content, self.path(missing[number]), missing[number].config, self._keep)
+
+        for number, error in workers.computed(len(missing), task_of, take):
+            yield missing[number], error
 
 
 def case_key(case: Case) -> str:

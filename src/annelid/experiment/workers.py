@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from collections import Counter, deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, Self
 
-from annelid.errors import ClusterError, RunKilled
-from annelid.experiment.attempt import Task, attempt
+from annelid.errors import ClusterError, RunFileError, RunKilled
+from annelid.experiment.attempt import Work, attempt
 from annelid.experiment.lifeline import end_after
 from annelid.simulation.progress import Interruption
 
 Result = Future[bytes | None]
 
+POLL_S = 0.5
+"""How often workers are looked for that have come or gone, s."""
 STARTS = 5
 """Processes that are tried for one run before they count as unable to start."""
 _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -40,12 +44,54 @@ class Workers(ABC):
         """
 
     @abstractmethod
-    def submit(self, task: Task) -> Result:
+    def submit(self, task: Work) -> Result:
         """Has a run computed; a future that ends cancelled was lost and may be submitted again."""
 
     def explained(self, error: Exception) -> Exception:
         """Returns an error of a run as one that a user can read."""
         return error
+
+    def computed(
+        self, n: int, task_of: Callable[[int], Work], take: Callable[[int, bytes | None], object]
+    ) -> Iterator[tuple[int, Exception | None]]:
+        """Has n tasks computed, and yields the number of each as what it sends is taken, or with its error.
+
+        Args:
+            n: How many there are.
+            task_of: Gives a task by its number, from 0.
+            take: Keeps what a task sent.
+
+        Raises:
+            ClusterError: The workers are lost for good, or have other code.
+        """
+        # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
+        # dies would be counted against the runs behind the one that killed it.
+        waiting, running, tries = deque(range(n)), dict[Result, int](), Counter[int]()
+        while waiting or running:
+            while waiting and len(running) < self.slots():
+                number = waiting.popleft()
+                running[self.submit(task_of(number))] = number
+            if not running:
+                time.sleep(POLL_S)
+            done, _ = wait(running, POLL_S, FIRST_COMPLETED)
+            for future in done:
+                number = running.pop(future)
+                try:
+                    take(number, future.result())
+                except CancelledError:
+                    waiting.append(number)
+                except ClusterError:
+                    raise
+                except ImportError as error:
+                    raise ClusterError(f"a worker cannot import annelid: install it there too ({error})") from error
+                except Exception as error:
+                    if isinstance(error, RunFileError | OSError | BrokenExecutor) and tries[number] < self.retries:
+                        tries[number] += 1
+                        waiting.append(number)
+                    else:
+                        yield number, self.explained(error)
+                else:
+                    yield number, None
 
     @abstractmethod
     def close(self, *, drop: bool) -> None:
@@ -86,7 +132,7 @@ class Processes(Workers):
         """Returns how many runs can be under way."""
         return self._jobs
 
-    def submit(self, task: Task) -> Result:
+    def submit(self, task: Work) -> Result:
         """Has a run computed by a process that is free."""
         # The pool starts its process as it takes work.
         with _single_threaded():

@@ -1,8 +1,7 @@
-"""The measured loop, friction of its cable, the virtual load frame, and a fit that finds what it was given."""
+"""The measured loop, friction of its cable, and the virtual load frame."""
 
 from __future__ import annotations
 
-import json
 from math import exp
 from pathlib import Path
 
@@ -11,11 +10,9 @@ import numpy as np
 import pytest
 
 from annelid.body.actuators.servo import wrap_factors
-from annelid.body.worm import WormBody
-from annelid.config import RunConfig, load_config
+from annelid.config import load_config
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
 from annelid.experiment import load_frame as frame
-from annelid.experiment.calibration import Calibration, calibrate, identifiability, places, write_calibration
 from annelid.experiment.load_frame import Loop, cable_force, load_frame, read_loop
 
 LOADING_N = [4.60, 6.16, 7.46, 9.55, 9.82, 11.49, 11.54, 12.17, 13.64, 14.27]
@@ -155,91 +152,10 @@ def test_a_ring_cannot_be_wound_away() -> None:
         load_frame(load_config("riddle2022-planar"))
 
 
-def line(config: RunConfig) -> Loop:
-    """A stand-in for the engine: elastic force from the modulus and the springs, a constant from friction."""
-    body = config.body
-    assert isinstance(body, WormBody)
-    x = triangle(0.0, 0.0).displacement_m
-    friction = 0.0 if body.joints is None else 100 * body.joints.dry_friction_Nm
-    elastic = (
-        30e-9 * body.strands.one_number("young_modulus_Pa") * x
-        + 0.1 * body.springs.one_number("stiffness_N_per_m") * x**2
-    )
-    return Loop(x, elastic + np.where(np.arange(len(x)) <= x.argmax(), friction, -friction))
-
-
-TRUE = {
-    "body.strands.young_modulus_Pa": 7e8,
-    "body.strands.shear_modulus_Pa": 7e8 / 1.5,
-    "body.joints.dry_friction_Nm": 0.013,
-}
-
-
-def test_a_fit_finds_the_worm_that_made_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.experiment.calibration.load_frame", lambda worm, displacement_m: line(worm))
-    base = load_config("riddle2023-rods")
-    made = cable_force(line(load_config("riddle2023-rods", TRUE)), 0.9)
-    free = ("young_modulus", "dry_friction", "cable_friction")
-    fit = calibrate(base, made, free=free)
-    assert fit.values == pytest.approx([7e8, 0.013, 0.9], rel=0.01)
-    assert fit.rms_N.max() < 0.02
-    assert fit.overrides == pytest.approx(TRUE, rel=0.01)
-    assert (fit.identifiability.relative_error < 0.05).all()
-
-
-def test_a_parameter_at_its_bound_is_named() -> None:
-    loop, at_m = triangle(1.0, 0.9), np.array([0.1, 0.2])
-    force = loop.branches(at_m)
-    names, values = ("young_modulus", "dry_friction", "cable_friction"), np.array([5e9, 0.01, 0.001])
-    fit = Calibration(names, values, at_m, force, force, np.zeros((4, 3)), loop, loop, 1)
-    assert fit.bounded == ("young_modulus", "cable_friction")
-
-
 def test_forces_are_compared_within_the_measured_way() -> None:
-    at = places(triangle(1.0, 1.0))
+    at = triangle(1.0, 1.0).places(20)
     assert np.diff(at) == pytest.approx(np.full(len(at) - 1, 0.3 / 22))
     assert 0.01 < at[0] < at[-1] < 0.28
-
-
-def test_two_parameters_that_do_the_same_are_told() -> None:
-    column = np.linspace(1.0, 2.0, 30)
-    noise = np.where(np.arange(30) % 2, 1e-3, -1e-3)
-    known = identifiability(np.stack([column, column + noise], axis=-1), 0.1)
-    assert known.correlation[0, 1] < -0.999
-    assert known.singular_values_N[1] < 0.01
-    blind = identifiability(np.stack([column, np.zeros(30)], axis=-1), 0.1)
-    assert blind.relative_error[1] == np.inf
-
-
-def test_independent_parameters_have_the_errors_of_a_mean() -> None:
-    jacobian = np.zeros((20, 2))
-    jacobian[:10, 0] = jacobian[10:, 1] = 3.0
-    known = identifiability(jacobian, 0.6)
-    assert known.relative_error == pytest.approx([0.6 / 3.0 / np.sqrt(10)] * 2)
-    assert known.correlation == pytest.approx(np.eye(2), abs=1e-12)
-
-
-def test_an_unknown_parameter_is_refused() -> None:
-    with pytest.raises(ConfigError, match="did you mean 'dry_friction'"):
-        calibrate(load_config("riddle2023-rods"), read_loop(), free=["dry_frictoin"])
-
-
-def test_a_fit_is_written_as_a_worm_to_run(tmp_path: Path) -> None:
-    loop, at_m = triangle(1.0, 0.9), np.array([0.1, 0.2])
-    force = loop.branches(at_m)
-    values, jacobian = np.array([7e8, 0.0131234]), np.arange(8.0).reshape(4, 2) ** 2
-    fit = Calibration(("young_modulus", "dry_friction"), values, at_m, force, force + 0.1, jacobian, loop, loop, 7)
-    changes = {"seed": 4, "body.springs.rest_length_m": 0.065, "body.strands.radius_m": 0.00299}
-    report, written = write_calibration(fit, "riddle2023-rods", changes, tmp_path / "fit.json")
-    config = load_config(written)
-    body = config.body
-    assert isinstance(body, WormBody)
-    assert body.joints is not None
-    assert (config.seed, body.springs.rest_length_m, body.strands.radius_m) == (4, 0.065, 0.00299)
-    assert (body.strands.one_number("young_modulus_Pa"), body.joints.dry_friction_Nm) == (7e8, 0.01312)
-    numbers = json.loads(report.read_text())
-    assert numbers["parameters"]["dry_friction"]["value"] == 0.0131234
-    assert numbers["rms_N"]["both"] == pytest.approx(0.1)
 
 
 HEXAGON = 0.16 * np.array([[0, np.cos(a), np.sin(a)] for a in np.pi / 3 * np.arange(6)])

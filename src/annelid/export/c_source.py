@@ -21,7 +21,6 @@ from annelid.nervous import Network, NetworkState, Scheme
 from annelid.nervous.arrays import NO_GATE
 from annelid.nervous.stepper import Factors
 from annelid.output import write_text
-from annelid.protocols import Sensation
 from annelid.text import numbered
 
 Real = Literal["double", "float"]
@@ -65,11 +64,6 @@ class Firmware:
     sensors: Mapping[str, tuple[int, ...]]
     returned: tuple[str, int]
     neurons: tuple[str, ...]
-
-    @staticmethod
-    def sensed(name: str, sensation: Sensation) -> NDArray[Any]:
-        """Returns what a field of ``sensors`` is given of a sensation."""
-        return SENSED[name].read(sensation)
 
     def paths(self, folder: Path) -> list[Path]:
         """Returns where `write` writes."""
@@ -145,8 +139,7 @@ class Writer:
         header = filled("firmware.h.txt", words)
         body = filled("firmware.c.txt", words | {"includes": "", "macros": "", "functions": ""})
         used = sorted(set(_INTERFACE.findall(body)))
-        if used or "INFINITY" in body:
-            words |= {"includes": "#include <math.h>\n"}
+        words["includes"] = "#include <math.h>\n" if used or "INFINITY" in body else ""
         suffix = "f" if self._real == "float" else ""
         words |= {
             "macros": "".join(f"#define {macro} {macro.lower()}{suffix}\n" for macro in used),

@@ -190,7 +190,7 @@ def test_names_become_identifiers_and_harmless_comments(name: str) -> None:
 
 
 @given(st.lists(NAMES, min_size=4, max_size=4, unique=True), NAMES)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_hostile_names_change_no_code(names: list[str], title: str) -> None:
     """Without comments, names and the title, the code is that of a network with plain names."""
 

@@ -275,14 +275,20 @@ class NeuralController(SegmentController):
 
     def _activation(self, potential: Array) -> Array:
         """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""
-        up, down = (potential[..., self._of_role[role]] for role in _ANTAGONISTS)
-        difference = up - down
-        reach = self._linear_range_mV
-        if reach is not None:
-            activation = 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
-        else:
-            activation = 1.0 / (1.0 + np.exp(-self._slope_per_mV * difference))
+        activation = self._shares(potential)
         return activation if self._muscles_per_segment == 1 else activation.repeat(self._muscles_per_segment, axis=-1)
+
+    def _difference(self, potential: Array) -> Array:
+        """The potentials that activation goes by, mV, ``(.., n_segments)``."""
+        up, down = (potential[..., self._of_role[role]] for role in _ANTAGONISTS)
+        return up - down
+
+    def _shares(self, potential: Array) -> Array:
+        """Activation of every segment, ``(.., n_segments)``."""
+        difference, reach = self._difference(potential), self._linear_range_mV
+        if reach is not None:
+            return 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
+        return 1.0 / (1.0 + np.exp(-self._slope_per_mV * difference))
 
     def _code(self, **parts: Any) -> ControllerCode:
         """The controller as C, with parts that depend on its kind: fields of `ControllerCode`."""
@@ -304,14 +310,19 @@ class NeuralController(SegmentController):
             **parts,
         )
 
-    def _share_code(self) -> tuple[str, dict[str, float]]:
-        """Activation of segment i as an expression of C, and its constants."""
+    def _difference_code(self) -> tuple[str, dict[str, Array]]:
+        """`_difference` of segment i as an expression of C, and its constants."""
         n_roles = len(self._of_role)
         up, down = (f"now.potential_mV[{n_roles} * i + {self._of_role[role].start}]" for role in _ANTAGONISTS)
+        return f"({up} - {down})", {}
+
+    def _share_code(self) -> tuple[str, dict[str, float | Array]]:
+        """`_shares` of segment i as an expression of C, and its constants."""
+        difference, constants = self._difference_code()
         if self._linear_range_mV is not None:
-            share = f"(real)0.5 + clipped({up} - {down}, -linear_range_mV, linear_range_mV) / (2 * linear_range_mV)"
-            return share, {"linear_range_mV": self._linear_range_mV}
-        return f"1 / (1 + EXP(-slope_per_mV * ({up} - {down})))", {"slope_per_mV": self._slope_per_mV}
+            share = f"(real)0.5 + clipped({difference}, -linear_range_mV, linear_range_mV) / (2 * linear_range_mV)"
+            return share, {**constants, "linear_range_mV": self._linear_range_mV}
+        return f"1 / (1 + EXP(-slope_per_mV * {difference}))", {**constants, "slope_per_mV": self._slope_per_mV}
 
     def _activity(self, name: str) -> float:
         """Activity of a neuron: its potential over the range, in [0, 1]."""

@@ -170,12 +170,11 @@ class RobustController(NeuralController):
         self._stepper.advance(self._state, self._full_nA * inputs, n_steps)
         return self._activation(self._state.potential[0])
 
-    def _activation(self, potential: Array) -> Array:
-        """Activation of every muscle, ``(.., n_muscles)``: the motor neurons' activity, if there are any."""
+    def _shares(self, potential: Array) -> Array:
+        """Activation of every segment, ``(.., n_segments)``: the motor neurons' activity, if there are any."""
         if not self._config.let_go_s:
-            return super()._activation(potential)
-        full = robust.MOTOR_SHARE * self._range_mV
-        return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_per_segment, axis=-1)
+            return super()._shares(potential)
+        return np.clip(potential[..., self._motor] / (robust.MOTOR_SHARE * self._range_mV), 0.0, 1.0)
 
     def code(self) -> ControllerCode:
         """Returns what it does as C, as `annelid.control.base.Coded.code`."""
@@ -193,7 +192,7 @@ class RobustController(NeuralController):
         constants |= {"drive_share": drive.drive, "full_pressure_N": drive.full_pressure_N}
         return self._code(senses=("lengthening_m", "touch_N"), inputs=inputs, constants=constants)
 
-    def _share_code(self) -> tuple[str, dict[str, float]]:
+    def _share_code(self) -> tuple[str, dict[str, float | Array]]:
         if not self._config.let_go_s:
             return super()._share_code()
         share = f"clipped(now.potential_mV[{self._motor.start} + i] / motor_full_mV, 0, 1)"

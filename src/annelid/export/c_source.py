@@ -334,8 +334,8 @@ class Writer:
     def _number(self, value: float | bool) -> str:
         if isinstance(value, bool | int):
             return str(int(value))
-        if value == -np.inf:
-            return "-INFINITY"
+        if abs(value) == np.inf:
+            return "INFINITY" if value > 0 else "-INFINITY"
         if self._real == "double":
             return repr(value)
         with np.errstate(over="ignore"):

@@ -12,10 +12,9 @@ from itertools import permutations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
-
 import annelid
 from annelid.analysis import rhythm_score
+from annelid.control import NetworkController, Sense
 from annelid.nervous import Network, Neuron, Synapse
 
 RANGE_mV, GAIN_nA_per_m = 20.0, 400.0
@@ -28,6 +27,7 @@ def baton(n_segments: int) -> Network:
     for name in names:
         awake = Neuron(capacitance_nF=100.0, bias_nA=RANGE_mV)
         network.add_neuron(name, awake, initial_mV=RANGE_mV if name == names[0] else 0.0)
+        network.add_output(name, name)
     for source, target in permutations(names, 2):
         network.add_synapse(source, target, Synapse(conductance_uS=0.6, reversal_mV=-40.0))
     for name, successor in zip(names, names[1:] + names[:1], strict=True):
@@ -37,18 +37,13 @@ def baton(n_segments: int) -> Network:
 
 def main(folder: Path, duration_s: float = 4.0) -> None:
     """Lets the network drive the worm and scores the rhythm."""
-    stepper = baton(6).compile(timestep_ms=1.0)
-    state = stepper.initial_state()
-
-    def drive(sensation: annelid.Sensation) -> np.ndarray:
-        lengthening_m = (sensation.stretch_m - sensation.rest_stretch_m).mean(axis=1)
-        stepper.advance(state, GAIN_nA_per_m * np.maximum(lengthening_m, 0.0))
-        return np.clip(state.potential[0] / RANGE_mV, 0.0, 1.0)
-
+    network = baton(6)
+    stretch = {name: Sense("lengthening_m", place, gain=GAIN_nA_per_m) for place, name in enumerate(network.inputs)}
+    drive = NetworkController(network, stretch, outputs=list(network.outputs), to_mV=RANGE_mV)
     config = annelid.load_config("riddle2025-muscles", {"duration_s": duration_s})
     score = rhythm_score(annelid.simulate(config, folder, controller=drive))
     print(f"{score.verdict or 'too short'}: {score.reason}")
-    print(baton(6).diagram().save(folder / "network.svg"))
+    print(network.diagram().save(folder / "network.svg"))
 
 
 if __name__ == "__main__":

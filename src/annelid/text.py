@@ -28,6 +28,21 @@ def _shown(character: str) -> str:
     return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
 
 
+def numbered(names: Iterable[str]) -> list[str]:
+    """Numbers names that occur again: a, a, b becomes a, a_2, b."""
+    taken: dict[str, int] = {}
+    result: list[str] = []
+    for name in names:
+        candidate, number = name, taken.get(name, 1)
+        while candidate in taken:
+            number += 1
+            candidate = f"{name}_{number}"
+        taken[name] = number
+        taken[candidate] = 1
+        result.append(candidate)
+    return result
+
+
 def is_line(text: str) -> bool:
     """Whether a text is one line without control characters."""
     return "\n" not in text and "\t" not in text and printable(text) == text

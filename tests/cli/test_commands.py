@@ -123,6 +123,23 @@ def test_render_takes_a_background_and_refuses_a_strip_of_a_planar_worm(annelid:
     assert not Path("s.pdf").exists()
 
 
+def test_a_network_file_is_exported_and_kept_without_force(annelid: Command) -> None:
+    from annelid.nervous import peristalsis_network
+
+    Path("network.toml").write_text(peristalsis_network(3).to_toml())
+    words = ("export-network", "network.toml", "-o", "c", "--float", "--timestep-ms", "0.5", "--scheme", "heun")
+    done = annelid(*words)
+    assert done.exit_code == 0, done.err
+    paths = [Path(line) for line in done.out.splitlines()]
+    assert [path.suffix for path in paths] == [".h", ".c", ".c"]
+    assert "typedef float" in paths[0].read_text()
+    assert "0.5 ms (Heun's method)" in paths[0].read_text()
+    assert "exists" in annelid(*words).err
+    assert annelid(*words, "--force").exit_code == 0
+    assert "has no effect on a network" in annelid("export-network", "network.toml", "--segments", "4").err
+    assert "has no effect on a controller" in annelid("export-network", "riddle2022-planar", "--scheme", "heun").err
+
+
 def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> None:
     import mujoco
     import numpy as np

@@ -144,6 +144,7 @@ DONE = {
     "run": typed("run", "riddle2022-planar", "--duration", "0.1", "--no-video"),
     "check": typed("check", "riddle2022-planar"),
     "build": typed("build", "riddle2023-rods"),
+    "export-network": typed("export-network", "riddle2022-planar"),
     "new": typed("new", "mine.toml", "--radius", "0.1"),
     "gallery": typed("gallery", "--list"),
     "runs": typed("runs"),

@@ -10,7 +10,7 @@ import pytest
 
 from annelid.config import StretchSensor, load_config
 from annelid.control import SnsController
-from annelid.control.sns import PressureController, PressureSns
+from annelid.control.pressure import PressureController, PressureSns
 from annelid.errors import ConfigError
 from annelid.nervous import peristalsis_network
 from annelid.nervous.peristalsis import pressure_network

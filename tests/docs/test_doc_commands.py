@@ -98,6 +98,7 @@ ELSEWHERE = {
     ("annelid", "--install-completion"): "it changes the settings of the shell",
     ("annelid", "--show-completion"): "tests/cli/test_commands.py asks for completions",
     ("annelid", "gallery"): "tests/docs/test_gallery.py calls it",
+    ("annelid", "export-network", "network.toml"): "tests/cli/test_commands.py exports such a file",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
     ("annelid", "run", "mine/calibrated.toml"): "the file is what a fit found",

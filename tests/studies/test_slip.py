@@ -9,7 +9,8 @@ import pytest
 
 from annelid.analysis import DetectionScore
 from annelid.control.open_loop import TimedWave
-from annelid.control.sns import PressureSns, Sns
+from annelid.control.pressure import PressureSns
+from annelid.control.sns import Sns
 from annelid.experiment.store import Store
 from annelid_studies.slip import (
     CASES,

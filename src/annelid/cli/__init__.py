@@ -16,7 +16,7 @@ from annelid.cli.studies import (
     sweep_command,
     tune_command,
 )
-from annelid.cli.worm import arenas, build, check, doctor, new, presets
+from annelid.cli.worm import arenas, build, check, doctor, export_network, new, presets
 from annelid.registry import load_extensions, load_home
 
 __all__ = ["app", "main"]
@@ -30,6 +30,7 @@ for _name, _command in (
     ("new", new),
     ("check", check),
     ("build", build),
+    ("export-network", export_network),
     ("runs", runs_command),
     ("show", show),
     ("compare", compare_command),

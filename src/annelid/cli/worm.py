@@ -1,4 +1,4 @@
-"""The commands on what there is before a run: `check`, `build`, `presets`, `arenas` and `doctor`."""
+"""The commands on what there is before a run: `check`, `build`, `export-network`, `presets`, `arenas` and `doctor`."""
 
 from __future__ import annotations
 
@@ -196,3 +196,61 @@ def doctor(
     found = list(examine())
     if not give([asdict(finding) for finding in found]):
         typer.echo("\n".join(finding.line() for finding in found))
+
+
+def export_network(
+    source: Annotated[
+        str, typer.Argument(metavar="PRESET|FILE.toml", help="A preset, a configuration, or a network as TOML.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write to.")] = Path("firmware"),
+    single: Annotated[
+        bool, typer.Option("--float/--double", help="Type of all numbers in the C code.", show_default="double")
+    ] = False,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    timestep_ms: Annotated[
+        float | None, typer.Option("--timestep-ms", help="Step of a network, ms  [default: 1; a preset has its own]")
+    ] = None,
+    scheme: Annotated[
+        str | None, typer.Option(help="Scheme of a network: euler, toolbox or heun  [default: euler]")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write a network, or a worm's whole controller, as C99 for a microcontroller.
+
+    Of a preset or a configuration: the controller with its sensors' thresholds, its start, its turning and the muscles'
+    activation. Of a network as `Network.to_toml` writes it: from the currents of its inputs to the potentials of its
+    outputs. A header, a source file and a self-test, named after the worm or the network.
+
+    \b
+    annelid export-network riddle2022-planar -o firmware
+    annelid export-network riddle2023-rods -o firmware --float
+    annelid export-network network.toml -o firmware --timestep-ms 0.5
+    """
+    from typing import cast
+
+    from annelid.config import preset_names
+    from annelid.export import controller_firmware, network_firmware
+    from annelid.nervous import Network, Scheme
+    from annelid.simulation import build_controller, build_plant
+    from annelid.textfiles import read_text, read_toml
+
+    real = "float" if single else "double"
+    path = Path(source)
+    given = {"--set": assignments, "--segments": segments, "--timestep-ms": timestep_ms, "--scheme": scheme}
+    is_network = source not in preset_names() and path.is_file() and "neuron" in read_toml(path)
+    for option in ("--set", "--segments") if is_network else ("--timestep-ms", "--scheme"):
+        if given[option] is not None:
+            what = "a network" if is_network else "a controller, which has the step and the scheme of its configuration"
+            raise typer.BadParameter(f"{option} has no effect on {what}")
+    if is_network:
+        network = Network.from_toml(read_text(path))
+        chosen = cast(Scheme, scheme or "euler")
+        firmware = network_firmware(network, 1.0 if timestep_ms is None else timestep_ms, chosen, real=real)
+    else:
+        config = config_of(source, overrides_of(assignments), segments).model_copy(update={"trial": None})
+        firmware = controller_firmware(build_controller(config, build_plant(config)), config.name, real=real)
+    for written in firmware.paths(output):
+        if written.exists():
+            refuse_existing(written, force)
+    print_paths(firmware.write(output, overwrite=force))

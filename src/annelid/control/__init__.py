@@ -1,6 +1,7 @@
 """Everything that turns sensation into activation."""
 
 from annelid.control.base import CallableController, OpenLoopController, SegmentController
+from annelid.control.network import NetworkController, Sense
 from annelid.control.open_loop import ProgramController, SineController, TimedController
 from annelid.control.oscillators import HeteroclinicController, PhaseChainController
 from annelid.control.own import own_controller
@@ -12,10 +13,12 @@ __all__ = [
     "CallableController",
     "CopySettings",
     "HeteroclinicController",
+    "NetworkController",
     "OpenLoopController",
     "PhaseChainController",
     "ProgramController",
     "SegmentController",
+    "Sense",
     "SineController",
     "SnsController",
     "StretchSensor",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import fields
-from typing import Annotated, ClassVar, Generic, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +14,9 @@ from pydantic import Field
 
 from annelid.config.kinds import ControllerKind
 from annelid.config.sections import Positive, Section
+from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous import Network, NetworkState, Scheme
+from annelid.nervous import Network, NetworkState, Scheme, Stepper
 from annelid.nervous.half_centre import HalfCentre
 from annelid.protocols import (
     Array,
@@ -34,6 +36,81 @@ Slope = Annotated[float, Field(ge=-100, le=100)]
 TimeConstant = Annotated[float, Field(ge=1e-3, le=1e4)]
 Pattern = TypeVar("Pattern", bound=Section)
 Design = TypeVar("Design", bound=HalfCentre)
+
+
+class Sensed(NamedTuple):
+    """A quantity that a network may sense, and a microcontroller is given."""
+
+    meaning: str
+    read: Callable[[Sensation], Array]
+
+
+def heading_angle(heading: Array) -> float:
+    """Returns the direction of a heading on the floor, rad: 0 towards -x, positive to the worm's left, towards -y."""
+    return math.atan2(-float(heading[1]), -float(heading[0]))
+
+
+SENSED: dict[str, Sensed] = {
+    "lengthening_m": Sensed(
+        "mean length of each segment's stretch sensors beyond that at rest, m",
+        lambda s: lengthening_m(s.stretch_m, s.rest_stretch_m),
+    ),
+    "touch_N": Sensed("force of the ground on belly, left, back and right of each segment, N", lambda s: s.touch_N),
+    "heading_rad": Sensed(
+        "direction from the last ring to the first, 0 towards -x, positive to the left",
+        lambda s: np.array([heading_angle(s.heading)]),
+    ),
+    "front_m": Sensed("x and y of the first ring, m", lambda s: s.front_m[:2]),
+}
+"""What the C code of controllers is given, by the names of its fields."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerCode:
+    """A controller as `annelid.export.firmware` writes it: its network, and C99 for what it does beside it.
+
+    The statements may use the type ``real``, the integers ``i`` and ``j``, the counts ``N_SEGMENTS``, ``N_MUSCLES`` and
+    ``N_INPUTS``, ``sensors->NAME`` of what is sensed, ``now.NAME`` of the state (``now.potential_mV``, ``now.n_steps``
+    and those below), the constants, ``clipped(value, low, high)`` and ``EXP``, ``FMOD`` and ``ATAN2``.
+
+    Attributes:
+        network: The network.
+        stepper: What advances it.
+        network_state: Its present state.
+        n_segments: Segments.
+        n_muscles: Muscles.
+        senses: What it is given, names in `SENSED`.
+        inputs: Statements that set ``input_nA[]`` before the network's step.
+        activation: Statements that set ``activation->activation[]`` after it.
+        constants: Numbers and arrays by name; whole ones are counts of steps.
+        state: Initial values of further variables of the state.
+        helpers: Functions that the statements call.
+    """
+
+    network: Network
+    stepper: Stepper
+    network_state: NetworkState
+    n_segments: int = 0
+    n_muscles: int = 0
+    senses: tuple[str, ...] = ()
+    inputs: str = ""
+    activation: str = ""
+    constants: Mapping[str, ArrayLike] = field(default_factory=dict)
+    state: Mapping[str, ArrayLike] = field(default_factory=dict)
+    helpers: str = ""
+
+
+@runtime_checkable
+class Coded(Controller, Protocol):
+    """The capability of a controller of being written as C99."""
+
+    def code(self) -> ControllerCode:
+        """Returns what it does as C.
+
+        Raises:
+            ConfigError: It cannot be written as C with its present settings.
+        """
+        ...
 
 
 class SegmentController(SavedAndRecorded, ABC):
@@ -137,6 +214,9 @@ def design_of(kind: type[Design], section: Section) -> Design:
     return kind(**{field.name: getattr(section, field.name) for field in fields(kind)})
 
 
+_ANTAGONISTS = ("contraction", "expansion")
+
+
 class NeuralController(SegmentController):
     """A compiled network whose potentials drive the muscles.
 
@@ -195,13 +275,54 @@ class NeuralController(SegmentController):
 
     def _activation(self, potential: Array) -> Array:
         """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""
-        difference = potential[..., self._of_role["contraction"]] - potential[..., self._of_role["expansion"]]
-        reach = self._linear_range_mV
-        if reach is not None:
-            activation = 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
-        else:
-            activation = 1.0 / (1.0 + np.exp(-self._slope_per_mV * difference))
+        activation = self._shares(potential)
         return activation if self._muscles_per_segment == 1 else activation.repeat(self._muscles_per_segment, axis=-1)
+
+    def _difference(self, potential: Array) -> Array:
+        """The potentials that activation goes by, mV, ``(.., n_segments)``."""
+        up, down = (potential[..., self._of_role[role]] for role in _ANTAGONISTS)
+        return up - down
+
+    def _shares(self, potential: Array) -> Array:
+        """Activation of every segment, ``(.., n_segments)``."""
+        difference, reach = self._difference(potential), self._linear_range_mV
+        if reach is not None:
+            return 0.5 + np.minimum(np.maximum(difference, -reach), reach) / (2.0 * reach)
+        return 1.0 / (1.0 + np.exp(-self._slope_per_mV * difference))
+
+    def _code(self, **parts: Any) -> ControllerCode:
+        """The controller as C, with parts that depend on its kind: fields of `ControllerCode`."""
+        share, constants = self._share_code()
+        per_segment = self._muscles_per_segment
+        activation = f"""
+    for (i = 0; i < N_SEGMENTS; i++) {{
+        const real share = {share};
+        for (j = 0; j < {per_segment}; j++) activation->activation[{per_segment} * i + j] = share;
+    }}"""
+        return ControllerCode(
+            self.network,
+            self._stepper,
+            self._state,
+            self._n_segments,
+            self._n_segments * per_segment,
+            activation=activation,
+            constants={**parts.pop("constants", {}), **constants},
+            **parts,
+        )
+
+    def _difference_code(self) -> tuple[str, dict[str, Array]]:
+        """`_difference` of segment i as an expression of C, and its constants."""
+        n_roles = len(self._of_role)
+        up, down = (f"now.potential_mV[{n_roles} * i + {self._of_role[role].start}]" for role in _ANTAGONISTS)
+        return f"({up} - {down})", {}
+
+    def _share_code(self) -> tuple[str, dict[str, float | Array]]:
+        """`_shares` of segment i as an expression of C, and its constants."""
+        difference, constants = self._difference_code()
+        if self._linear_range_mV is not None:
+            share = f"(real)0.5 + clipped({difference}, -linear_range_mV, linear_range_mV) / (2 * linear_range_mV)"
+            return share, {**constants, "linear_range_mV": self._linear_range_mV}
+        return f"1 / (1 + EXP(-slope_per_mV * {difference}))", {**constants, "slope_per_mV": self._slope_per_mV}
 
     def _activity(self, name: str) -> float:
         """Activity of a neuron: its potential over the range, in [0, 1]."""

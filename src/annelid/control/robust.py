@@ -9,7 +9,7 @@ from pydantic import Field
 
 from annelid.config.kinds import Knob
 from annelid.config.sections import Positive, Section, Share
-from annelid.control.base import HalfCentreKind, NeuralController, TimeConstant, design_of
+from annelid.control.base import ControllerCode, HalfCentreKind, NeuralController, TimeConstant, design_of
 from annelid.control.sns import DRIVE_HINT
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
@@ -170,12 +170,33 @@ class RobustController(NeuralController):
         self._stepper.advance(self._state, self._full_nA * inputs, n_steps)
         return self._activation(self._state.potential[0])
 
-    def _activation(self, potential: Array) -> Array:
-        """Activation of every muscle, ``(.., n_muscles)``: the motor neurons' activity, if there are any."""
+    def _shares(self, potential: Array) -> Array:
+        """Activation of every segment, ``(.., n_segments)``: the motor neurons' activity, if there are any."""
         if not self._config.let_go_s:
-            return super()._activation(potential)
-        full = robust.MOTOR_SHARE * self._range_mV
-        return np.clip(potential[..., self._motor] / full, 0.0, 1.0).repeat(self._muscles_per_segment, axis=-1)
+            return super()._shares(potential)
+        return np.clip(potential[..., self._motor] / (robust.MOTOR_SHARE * self._range_mV), 0.0, 1.0)
+
+    def code(self) -> ControllerCode:
+        """Returns what it does as C, as `annelid.control.base.Coded.code`."""
+        drive = self._config.descending
+        constants = {"full_nA": self._full_nA, "full_stretch_m": self._config.full_stretch_m}
+        inputs = """
+    for (i = 0; i < N_SEGMENTS; i++)
+        input_nA[i] = full_nA * clipped(sensors->lengthening_m[i] / full_stretch_m, 0, 1);"""
+        if not drive.lift:
+            return self._code(senses=("lengthening_m",), inputs=inputs, constants=constants)
+        inputs += f"""
+    input_nA[N_SEGMENTS] = full_nA * drive_share;
+    for (i = 0; i < N_SEGMENTS; i++)
+        input_nA[N_SEGMENTS + 1 + i] = full_nA * clipped(sensors->touch_N[i][{BACK}] / full_pressure_N, 0, 1);"""
+        constants |= {"drive_share": drive.drive, "full_pressure_N": drive.full_pressure_N}
+        return self._code(senses=("lengthening_m", "touch_N"), inputs=inputs, constants=constants)
+
+    def _share_code(self) -> tuple[str, dict[str, float | Array]]:
+        if not self._config.let_go_s:
+            return super()._share_code()
+        share = f"clipped(now.potential_mV[{self._motor.start} + i] / motor_full_mV, 0, 1)"
+        return share, {"motor_full_mV": robust.MOTOR_SHARE * self._range_mV}
 
     def _values(self) -> Values:
         stretch = self._state.potential[0, self._of_role["stretch"]]

@@ -1,4 +1,4 @@
-"""The paper's controller, and two that extend its network: by a descending drive, and by feedback from pressure."""
+"""The paper's controller, and one that extends its network by a descending drive."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from annelid.config.kinds import ControllerKind, Knob
 from annelid.config.run import StretchSensor
 from annelid.config.sections import NonNegative, Positive, Share
-from annelid.control.base import HalfCentreKind, NeuralController, Slope, TimeConstant, design_of
+from annelid.control.base import ControllerCode, HalfCentreKind, NeuralController, Slope, TimeConstant, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 Config = TypeVar("Config", bound=ControllerKind)
-Strength = Annotated[float, Field(ge=0, le=5)]
 DRIVE_HINT = "Descending drive: more of it makes the wave faster."
 
 
@@ -210,6 +209,31 @@ class PeristalsisController(NeuralController, Generic[Config]):
     def _values(self) -> Values:
         return {**super()._values(), "sensor_on": self._now["sensor_on"].astype(np.float64)}
 
+    def code(self) -> ControllerCode:
+        """Returns what it does as C, as `annelid.control.base.Coded.code`."""
+        further = self._further_code()
+        inputs = """
+    for (i = 0; i < N_SEGMENTS; i++) {
+        now.sensor_on[i] = sensors->lengthening_m[i] <= tolerance_m + hysteresis_m * now.sensor_on[i];
+        if (i == 0 && now.n_steps < hold_steps) now.sensor_on[i] = 0;
+        input_nA[i] = sensor_current_nA * now.sensor_on[i];
+    }
+    input_nA[N_SEGMENTS] = now.n_steps == 0 ? kick_nA : 0;"""
+        # The first step at which segment 1 is released.
+        hold_steps = max(round(self._sensor.settings.startup_hold_s / self._timestep_s) - 1, 0)
+        while self._sensor.held_at(hold_steps * self._timestep_s):
+            hold_steps += 1
+        return self._code(
+            senses=("lengthening_m", *further.get("senses", ())),
+            inputs=inputs + further.get("inputs", ""),
+            constants={**asdict(self.own), "hold_steps": hold_steps, **further.get("constants", {})},
+            state={"sensor_on": np.zeros(self._n_segments)},
+        )
+
+    def _further_code(self) -> dict[str, Any]:
+        """What `_set_further` does as C, with its senses and constants."""
+        return {}
+
 
 class SnsController(PeristalsisController[Sns]):
     """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023, as `PeristalsisController` does.
@@ -372,92 +396,28 @@ class AdaptiveController(PeristalsisController[AdaptiveSns]):
         leak, reach = self._parameters.leak_conductance_uS, self._parameters.range_mV
         inputs_nA[...] = min(max(drive, 0.0), 1.0) * leak * reach
 
+    def _further_code(self) -> dict[str, Any]:
+        p, config = self._parameters, self._config
+        inputs = """
+    {
+        real sum_m = 0;
+        for (i = 0; i < N_SEGMENTS; i++) sum_m += sensors->lengthening_m[i];
+        input_nA[N_SEGMENTS + 1] = clipped(
+            drive_at_start + drive_slope_per_s * (real)now.n_steps * timestep_s
+            + stretch_gain_per_m * (sum_m / N_SEGMENTS), 0, 1) * leak_uS * range_mV;
+    }"""
+        constants = {
+            "drive_at_start": config.drive,
+            "drive_slope_per_s": config.drive_slope_per_s,
+            "stretch_gain_per_m": config.stretch_gain_per_m,
+            "timestep_s": self._timestep_s,
+            "leak_uS": p.leak_conductance_uS,
+            "range_mV": p.range_mV,
+        }
+        return {"inputs": inputs, "constants": constants}
+
     def _values(self) -> Values:
         return {**super()._values(), "drive": self._activity(peristalsis.DRIVE_NEURON)}
 
     def _attrs(self) -> dict[str, float | int | str]:
         return {"conductance_drive_uS": peristalsis.drive_conductance_uS(self._parameters)}
-
-
-class PressureSns(ControllerKind):
-    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
-
-    A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
-    the contraction two segments before; any of the three strengths may be 0. Lengths and loads are those of the
-    six-segment robot (0.16 m radius, 19 N).
-    """
-
-    sensor_fields = Sns.sensor_fields
-    tuned = (
-        "controller.network.gate_time_constant_ms=80:900:log",
-        "controller.hold=0:2",
-        "controller.release=0:6",
-        "controller.exchange=0:2",
-        "sensor.tolerance_m=0.001:0.03:log",
-    )
-    kind: Literal["sns-pressure"] = "sns-pressure"
-    network: Sns = Sns()
-    light_N: NonNegative = Field(default=2.5, description="load of a segment up to which its pressure neuron rests")
-    full_N: Positive = Field(default=9.0, description="load that drives it to R")
-    extending_m: NonNegative = Field(default=0.045, description="lengthening from which a segment lets the next one go")
-    extended_m: Positive = Field(default=0.055, description="lengthening at which it does so in full")
-    hold: Strength = Field(default=1.0, description="potential over R that full pressure gives its sensory neuron")
-    release: float = Field(
-        default=1.8, ge=0, le=20, description="sensors' currents that a full extension neuron cancels"
-    )
-    exchange: Strength = Field(default=0.8, description="potential over R that a contraction gives the one two before")
-    pressure_time_constant_s: float = Field(
-        default=0.03, ge=1e-3, le=10, description="time constant of the pressure neurons"
-    )
-
-    @model_validator(mode="after")
-    def _scales_rise(self) -> Self:
-        for low, high in (("light_N", "full_N"), ("extending_m", "extended_m")):
-            if not getattr(self, low) < getattr(self, high):
-                raise ValueError(
-                    f"controller.{low} = {getattr(self, low):g} must be less than controller.{high} = "
-                    f"{getattr(self, high):g}"
-                )
-        return self
-
-    def check_with(self, config: RunConfig) -> None:
-        """Checks that the body has a skin that senses pressure."""
-        if not config.body.has_skin:
-            raise ValueError(
-                f"controller.kind = 'sns-pressure' needs the touch of a skin, which body.kind = {config.body.kind!r} "
-                "has not; only the 3D worm ('worm') has"
-            )
-
-    def build(self, config: RunConfig, plant: Plant) -> PressureController:
-        """Builds the controller, as `ControllerKind.build`."""
-        size = plant.n_segments, plant.n_muscles
-        return PressureController(self, config.sensor, *size, config.clock.control_timestep_s)
-
-    def cited(self) -> tuple[tuple[str, str], ...]:
-        """Returns what the network rests on, and the feedback."""
-        return (*self.network.cited(), ("daltorio2013", "the aim of feedback from contact"))
-
-
-class PressureController(PeristalsisController[PressureSns]):
-    """Drives a worm by `annelid.nervous.peristalsis.pressure_network`.
-
-    A segment's load is the sum of the normal forces on its four sides, its length the mean of its stretch sensors, both
-    rising linearly from nothing to R. As long as segment 1's stretch sensor is kept off at the start, so is its load.
-    The rest, errors too, is as for `annelid.control.SnsController`.
-    """
-
-    name = "synthetic nervous system with pressure feedback"
-
-    def _network(self, n_segments: int) -> Network:
-        strengths = self._config.model_dump(include={"hold", "release", "exchange"})
-        tau_ms = 1e3 * self._time_constant_s("pressure_time_constant_s")
-        return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=tau_ms)
-
-    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
-        config, longer_m = self._config, lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
-        loads = (sensation.touch_N.sum(axis=1) - config.light_N) / (config.full_N - config.light_N)
-        extensions = (longer_m - config.extending_m) / (config.extended_m - config.extending_m)
-        inputs_nA[::2] = self._full_nA * np.clip(loads, 0.0, 1.0)
-        inputs_nA[1::2] = self._full_nA * np.clip(extensions, 0.0, 1.0)
-        if self._sensor.held_at(time_s):
-            inputs_nA[0] = 0.0

@@ -17,7 +17,7 @@ from pydantic import Field
 from annelid.clock import SLACK_S
 from annelid.config.kinds import Goals, TurningKind
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.base import Level, SavedWrapper, TimeConstant
+from annelid.control.base import Coded, ControllerCode, Level, SavedWrapper, TimeConstant, heading_angle
 from annelid.errors import ConfigError
 from annelid.protocols import (
     SIDES,
@@ -41,14 +41,19 @@ HALVES = ("left", "right")
 LEFT, RIGHT = SIDES.index("left"), SIDES.index("right")
 
 
-def heading_angle(heading: Array) -> float:
-    """Returns the direction of a heading on the floor, rad: 0 towards -x, positive to the worm's left, towards -y."""
-    return math.atan2(-float(heading[1]), -float(heading[0]))
-
-
 def wrapped(angle_rad: float) -> float:
     """Returns an angle in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+_WRAPPED = """
+static real wrapped(real angle)
+{
+    real rest = FMOD(angle + pi, 2 * pi);
+    if (rest < 0) rest += 2 * pi;
+    return rest - pi;
+}
+"""
 
 
 def half_scales(modulation: ArrayLike) -> Array:
@@ -75,6 +80,10 @@ class SteeringKind(TurningKind):
     @abstractmethod
     def _scales(self, now: Now, n_segments: int) -> Array:
         """What is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
+
+    @abstractmethod
+    def _code(self, timestep_s: float, n_segments: int) -> dict[str, Any]:
+        """Both of these as C: fields of `ControllerCode`, and statements that multiply the activation."""
 
 
 class Descending(SteeringKind):
@@ -113,6 +122,34 @@ class Descending(SteeringKind):
     def _scales(self, now: Now, n_segments: int) -> Array:
         return half_scales(float(now["modulation"]) * np.array(self.shares or [1.0] * n_segments))
 
+    @abstractmethod
+    def _wanted_code(self, timestep_s: float) -> dict[str, Any]:
+        """What sets ``wanted`` as C, as `_code`."""
+
+    def _code(self, timestep_s: float, n_segments: int) -> dict[str, Any]:
+        found = self._wanted_code(timestep_s)
+        statements = f"""
+    {{
+        real wanted = 0;{found.get("statements", "")}
+        now.modulation = wanted + (now.modulation - wanted) * keeps;
+        for (i = 0; i < N_SEGMENTS; i++) {{
+            const real m = now.modulation * share_of_modulation[i];
+            activation->activation[2 * i] *= 1 - (m > 0 ? m : 0);
+            activation->activation[2 * i + 1] *= 1 - (-m > 0 ? -m : 0);
+        }}
+    }}"""
+        constants = {
+            "keeps": math.exp(-timestep_s / self.descending_time_constant_s),
+            "share_of_modulation": np.array(self.shares or [1.0] * n_segments, dtype=float),
+        }
+        state = {"modulation": 0.0, **found.get("state", {})}
+        return {
+            **found,
+            "statements": statements,
+            "constants": {**constants, **found["constants"]},
+            "state": state,
+        }
+
 
 class ConstantTurning(Descending):
     """A constant modulation: the worm crawls in a circle."""
@@ -122,6 +159,12 @@ class ConstantTurning(Descending):
 
     def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
         return self.modulation
+
+    def _wanted_code(self, timestep_s: float) -> dict[str, Any]:
+        return {
+            "statements": "\n        wanted = wanted_modulation;",
+            "constants": {"wanted_modulation": self.modulation},
+        }
 
 
 class Steered(Descending):
@@ -162,6 +205,40 @@ class Steered(Descending):
         modulation = self.gain_per_rad * wrapped(target - angle) - self.rate_gain_s * rate
         return min(max(modulation, -self.largest_modulation), self.largest_modulation)
 
+    @abstractmethod
+    def _target_code(self) -> dict[str, Any]:
+        """What sets ``target``, and ``wanted`` to 1 if there is one, as C, as `_code`."""
+
+    def _wanted_code(self, timestep_s: float) -> dict[str, Any]:
+        found = self._target_code()
+        statements = f"""
+        real target = 0, rate;
+        const real heading = sensors->heading_rad[0];
+        if (now.n_steps == 0)
+            for (i = 0; i < 3; i++) now.headings[i] = heading;
+        now.headings[1] += wrapped(heading - now.headings[1]);
+        rate = (now.headings[1] - now.headings[2]) / rate_time_constant_s;
+        now.headings[2] += rate_share * (now.headings[1] - now.headings[2]);{found["statements"]}
+        if (wanted > 0)
+            wanted = clipped(
+                gain_per_rad * wrapped(target - now.headings[1]) - rate_gain_s * rate,
+                -largest_modulation, largest_modulation);"""
+        constants = {
+            "pi": math.pi,
+            "gain_per_rad": self.gain_per_rad,
+            "rate_gain_s": self.rate_gain_s,
+            "rate_time_constant_s": self.rate_time_constant_s,
+            "rate_share": -math.expm1(-timestep_s / self.rate_time_constant_s),
+            "largest_modulation": self.largest_modulation,
+        }
+        return {
+            "senses": ("heading_rad", *found.get("senses", ())),
+            "statements": statements,
+            "constants": {**constants, **found["constants"]},
+            "state": {"headings": np.zeros(3), **found.get("state", {})},
+            "helpers": _WRAPPED,
+        }
+
 
 class HeadingTurning(Steered):
     """Steering to a heading: the direction from the last ring to the foremost."""
@@ -173,6 +250,10 @@ class HeadingTurning(Steered):
 
     def _target(self, now: Now, sensation: Sensation) -> float:
         return float(now["headings"][0]) + math.radians(self.heading_deg)
+
+    def _target_code(self) -> dict[str, Any]:
+        statements = "\n        target = now.headings[0] + heading_rad;\n        wanted = 1;"
+        return {"statements": statements, "constants": {"heading_rad": math.radians(self.heading_deg)}}
 
 
 class CourseTurning(Steered):
@@ -201,6 +282,20 @@ class CourseTurning(Steered):
                 return heading_angle(away)
             now["n_reached"] += 1
         return None
+
+    def _target_code(self) -> dict[str, Any]:
+        statements = f"""
+        for (; now.n_reached < {len(self.waypoints)}; now.n_reached++) {{
+            const real *waypoint = waypoints_m[(int)now.n_reached];
+            const real x = waypoint[0] - sensors->front_m[0], y = waypoint[1] - sensors->front_m[1];
+            if (x * x + y * y > reach_m * reach_m) {{
+                target = ATAN2(-y, -x);
+                wanted = 1;
+                break;
+            }}
+        }}"""
+        constants = {"waypoints_m": np.array(self.waypoints, dtype=float), "reach_m": self.reach_m}
+        return {"senses": ("front_m",), "statements": statements, "constants": constants, "state": {"n_reached": 0.0}}
 
 
 class TouchTurning(SteeringKind):
@@ -242,6 +337,37 @@ class TouchTurning(SteeringKind):
     def _scales(self, now: Now, n_segments: int) -> Array:
         return np.tile(now["scales"], (n_segments, 1))
 
+    def _code(self, timestep_s: float, n_segments: int) -> dict[str, Any]:
+        statements = f"""
+    {{
+        const real difference_N = sensors->touch_N[0][{RIGHT}] - sensors->touch_N[0][{LEFT}];
+        const real size_N = difference_N < 0 ? -difference_N : difference_N;
+        if (now.timer_s <= slack_s) {{
+            now.latched[0] = now.latched[1] = 1;
+            now.timer_s = size_N > arm_N ? turning_s : 0;
+        }}
+        if (now.timer_s > slack_s) {{
+            real *away = &now.latched[difference_N > 0 ? 0 : 1];
+            if (size_N >= least_N) *away = clipped((touch_full_N - size_N) / touch_full_N, 0, *away);
+            now.timer_s -= step_s;
+        }}
+        for (j = 0; j < 2; j++) {{
+            now.half_scale[j] += clipped(now.latched[j] - now.half_scale[j], -scale_reach, scale_reach);
+            for (i = 0; i < N_SEGMENTS; i++) activation->activation[2 * i + j] *= now.half_scale[j];
+        }}
+    }}"""
+        constants = {
+            "slack_s": SLACK_S,
+            "arm_N": self.arm_N,
+            "turning_s": self.hold_s,
+            "least_N": self.least_N,
+            "touch_full_N": self.full_N,
+            "step_s": timestep_s,
+            "scale_reach": self.rate_per_s * timestep_s,
+        }
+        state = {"timer_s": 0.0, "latched": np.ones(2), "half_scale": np.ones(2)}
+        return {"senses": ("touch_N",), "statements": statements, "constants": constants, "state": state}
+
 
 class Steering(SavedAndRecorded):
     """What is left of the activation of the two halves of every ring, at every control step."""
@@ -262,6 +388,10 @@ class Steering(SavedAndRecorded):
         for _ in range(n_steps):
             self._rule._advance(self._now, sensation, self._timestep_s)
         return self.scales()
+
+    def code(self) -> dict[str, Any]:
+        """Returns a step as C: fields of `ControllerCode`, and statements that multiply the activation."""
+        return self._rule._code(self._timestep_s, self._n_segments)
 
     def scales(self) -> Array:
         """Returns the scales after the latest step, in [0, 1], ``(n_segments, 2)``: left and right half."""
@@ -299,6 +429,20 @@ class TurningController(SavedWrapper):
             raise ConfigError(f"turning needs a pattern whose state can be saved, not {type(pattern).__name__}")
         super().__init__(pattern, section.build(n_segments, control_timestep_s))
         self._timestep_s = control_timestep_s
+
+    def code(self) -> ControllerCode:
+        """Returns what it does as C, as `annelid.control.base.Coded.code`."""
+        if not isinstance(self._inner, Coded):
+            raise ConfigError(f"turning of {self.name} cannot be written as C: its pattern steps no network")
+        pattern, own = self._inner.code(), self._between.code()
+        return replace(
+            pattern,
+            senses=tuple(dict.fromkeys((*pattern.senses, *own.get("senses", ())))),
+            activation=pattern.activation + own["statements"],
+            constants={**pattern.constants, **own["constants"]},
+            state={**pattern.state, **own["state"]},
+            helpers=pattern.helpers + own.get("helpers", ""),
+        )
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; ``seed`` is the pattern's."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Key = TypeVar("Key", bound=tuple)
 # Fills the slots of channels that have fewer gates than others: never moves, and counts as 1.
-_NO_GATE = parts.Gate(slope_per_mV=0.0, power=0.0)
+NO_GATE = parts.Gate(slope_per_mV=0.0, power=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,8 +194,8 @@ def _numbered(keys: Iterable[Key]) -> dict[Key, int]:
 
 def _slots(channels: Sequence[parts.Channel]) -> tuple[tuple[tuple[parts.Gate, ...], ...], int]:
     """Arranges gates as (slot, channel), slow slots first, and returns the number of slow slots."""
-    slow = zip_longest(*(channel.slow_gates for channel in channels), fillvalue=_NO_GATE)
-    instant = zip_longest(*(channel.instant_gates for channel in channels), fillvalue=_NO_GATE)
+    slow = zip_longest(*(channel.slow_gates for channel in channels), fillvalue=NO_GATE)
+    instant = zip_longest(*(channel.instant_gates for channel in channels), fillvalue=NO_GATE)
     slow = tuple(slow)
     return (*slow, *instant), len(slow)
 

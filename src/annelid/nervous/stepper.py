@@ -62,6 +62,19 @@ class Stepper:
         timestep_ms: Step, ms.
         scheme: Integration scheme.
         n_worms: Number of copies.
+        affine_slope: Factors of the potentials in what the terminals of all copies, then the gates, look at,
+            ``(n_worms n_terminals + n_slots n_worms n_channels,)``.
+        affine_offset: What is added to the products, same shape.
+        gate_rate: Step over time constant of the slow gates, 0 in slots that are not used,
+            ``(n_slow, n_worms, n_channels)``.
+        weights: Those of the arrays, times the step over the capacitance of each neuron.
+        leak_step: Leak conductances times that, ``(n_neurons,)``.
+        threshold_rate: Step over time constant of the firing thresholds, ``(n_firing,)``.
+        release_decay: What is left of a release after a step, ``(n_releases,)``.
+        leak_factors: Neurons whose leak is modulated, and the columns of the factors.
+        membrane_factors: Likewise for the capacitance.
+        channel_factors: Channels whose conductance is modulated, and the columns of the factors.
+        gate_factors: Likewise for the time constants of their slow gates.
 
     Raises:
         ConfigError: An unknown scheme, or a step or number of copies that is not positive.
@@ -96,18 +109,18 @@ class Stepper:
             return np.concatenate([np.tile(of_terminals, w), by_slot(of_gates, len(a.gates)).ravel()])
 
         terminal_slope = a.terminal_slope_per_mV
-        self._affine_slope = in_row(terminal_slope, -0.5 * slope)
-        self._affine_offset = in_row(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
+        self.affine_slope = in_row(terminal_slope, -0.5 * slope)
+        self.affine_offset = in_row(-a.terminal_threshold_mV * terminal_slope, 0.5 * (log_factor + slope * midpoint))
         first = len(a.neurons) * np.arange(w)[:, np.newaxis]
         bearers = (first + a.channel_neuron).ravel()
         self._looked_at = np.concatenate([(first + a.terminal_neuron).ravel(), *[bearers] * len(a.gates)])
         self._power = None if (power == 1.0).all() else by_slot(power, len(a.gates))
-        self._gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), a.n_slow)
+        self.gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), a.n_slow)
         membrane_rate = dt / a.capacitance_nF
-        self._weights = a.weights * np.tile(membrane_rate, 2)
-        self._leak_step = a.leak_conductance_uS * membrane_rate
-        self._threshold_rate = dt / a.adaptation_time_constant_ms
-        self._release_decay = np.exp(-dt / a.release_time_constant_ms)
+        self.weights = a.weights * np.tile(membrane_rate, 2)
+        self.leak_step = a.leak_conductance_uS * membrane_rate
+        self.threshold_rate = dt / a.adaptation_time_constant_ms
+        self.release_decay = np.exp(-dt / a.release_time_constant_ms)
 
         def factors(quantity: Modulated, neurons: Iterable[int]) -> Factors:
             column = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
@@ -115,10 +128,10 @@ class Stepper:
             places, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
             return places, columns
 
-        self._leak_factors = factors("leak", range(len(a.neurons)))
-        self._membrane_factors = factors("membrane", range(len(a.neurons)))
-        self._channel_factors = factors("channels", a.channel_neuron.tolist())
-        self._gate_factors = factors("gates", a.channel_neuron.tolist())
+        self.leak_factors = factors("leak", range(len(a.neurons)))
+        self.membrane_factors = factors("membrane", range(len(a.neurons)))
+        self.channel_factors = factors("channels", a.channel_neuron.tolist())
+        self.gate_factors = factors("gates", a.channel_neuron.tolist())
 
         self._drive = drive = np.zeros((w, a.weights.shape[0]))
         drive[:, a.drive["one"]] = 1.0
@@ -220,8 +233,8 @@ class Stepper:
         """Looks at the potentials, for the step of the potentials too, and returns the slow gates' Euler step."""
         seen, y, q = self._seen, self._y, self._q
         potential.take(self._looked_at, None, seen, "clip")
-        np.multiply(seen, self._affine_slope, seen)
-        np.add(seen, self._affine_offset, seen)
+        np.multiply(seen, self.affine_slope, seen)
+        np.add(seen, self.affine_offset, seen)
         np.maximum(self._opening, _ZERO, out=self._opening)
         np.minimum(self._opening, _ONE, out=self._open)
         if self.arrays.modulated:
@@ -231,9 +244,9 @@ class Stepper:
         np.add(q, _ONE, q)
         step = self._q_slow * gate
         np.subtract(_ONE, step, step)
-        np.multiply(step, self._gate_rate / self._y_slow, step)
-        if self._gate_factors[0].size:
-            self._scale(np.divide, step, self._gate_factors)
+        np.multiply(step, self.gate_rate / self._y_slow, step)
+        if self.gate_factors[0].size:
+            self._scale(np.divide, step, self.gate_factors)
         return step
 
     def _potential_step(self, potential: Array, gate: Array) -> Array:
@@ -248,19 +261,19 @@ class Stepper:
             self._potentials[...] = potential
         if self.n_worms == 1:
             # Calls the same routine of BLAS with less ado.
-            self._drive.dot(self._weights, self._total)
+            self._drive.dot(self.weights, self._total)
         else:
             # One product of a vector and the matrix per copy.
-            np.matmul(self._drive[:, np.newaxis], self._weights, self._total[:, np.newaxis])
-        neurons, columns = self._leak_factors
+            np.matmul(self._drive[:, np.newaxis], self.weights, self._total[:, np.newaxis])
+        neurons, columns = self.leak_factors
         if neurons.size:
-            more = self._leak_step[neurons] * (self._modulation[:, columns] - 1.0)
+            more = self.leak_step[neurons] * (self._modulation[:, columns] - 1.0)
             self._conductance[:, neurons] += more
             self._current[:, neurons] += more * a.rest_mV[neurons]
         step = self._conductance * potential
         np.subtract(self._current, step, step)
-        if self._membrane_factors[0].size:
-            self._scale(np.divide, step, self._membrane_factors)
+        if self.membrane_factors[0].size:
+            self._scale(np.divide, step, self.membrane_factors)
         return step
 
     def _open_channels(self, gate: Array) -> None:
@@ -272,8 +285,8 @@ class Stepper:
             if self._power is not None:
                 open_gates **= self._power
             np.multiply.reduce(open_gates, axis=0, out=self._channel_open)
-        if self._channel_factors[0].size:
-            self._scale(np.multiply, self._channel_open, self._channel_factors)
+        if self.channel_factors[0].size:
+            self._scale(np.multiply, self._channel_open, self.channel_factors)
 
     def _scale(self, apply: np.ufunc, values: Array, factors: Factors) -> None:
         """Multiplies or divides columns of values by modulation factors, in place."""
@@ -284,7 +297,7 @@ class Stepper:
         """Takes the thresholds' Euler step, from the potentials before this step."""
         a = self.arrays
         depolarisation = state.potential[:, a.firing_neuron] - a.rest_mV[a.firing_neuron]
-        state.threshold += self._threshold_rate * (a.threshold_mV - state.threshold + a.adaptation * depolarisation)
+        state.threshold += self.threshold_rate * (a.threshold_mV - state.threshold + a.adaptation * depolarisation)
 
     def _fire(self, state: NetworkState) -> None:
         """Resets the neurons at or above their thresholds, and lets their synapses release."""
@@ -292,6 +305,6 @@ class Stepper:
         reached = state.potential[:, a.firing_neuron]
         np.greater_equal(reached, state.threshold, out=state.fired)
         state.potential[:, a.firing_neuron] = np.where(state.fired, a.reset_mV, reached)
-        state.release *= self._release_decay
+        state.release *= self.release_decay
         state.release += a.release_increment * state.fired[:, a.release_source]
         np.minimum(state.release, 1.0, out=state.release)

@@ -19,6 +19,7 @@ import numpy as np
 from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Channel, GapJunction, Gate, Neuron, Synapse
+from annelid.text import numbered
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -57,7 +58,7 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
     with np.errstate(divide="ignore"):  # it divides by a leak of zero
         model = toolbox_network.compile(dt=1.0, backend="numpy")
     populations = [(population["name"], population["number"]) for population in toolbox_network.populations]
-    names = _unique([name if size == 1 else f"{name}_{i}" for name, size in populations for i in range(size)])
+    names = numbered([name if size == 1 else f"{name}_{i}" for name, size in populations for i in range(size)])
     network = Network(title)
     for i, name in enumerate(names):
         leak = float(model.g_m[i])
@@ -85,11 +86,11 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
                 junction = GapJunction(float(model.g_rectified[post, pre]), rectified=True)
                 network.add_gap_junction(names[pre], names[post], junction)
 
-    input_names = _unique([entry["name"] for entry in toolbox_network.inputs for _ in range(entry["size"])])
+    input_names = numbered([entry["name"] for entry in toolbox_network.inputs for _ in range(entry["size"])])
     for column, name in enumerate(input_names):
         network.add_input(name, [names[i] for i in np.flatnonzero(model.input_connectivity[:, column])])
     outputs = [(entry["name"], populations[entry["source"]][1]) for entry in toolbox_network.outputs]
-    output_names = _unique([name for name, size in outputs for _ in range(size)])
+    output_names = numbered([name for name, size in outputs for _ in range(size)])
     for row, name in enumerate(output_names):
         network.add_output(name, names[int(np.argmax(model.output_voltage_connectivity[row]))])
     return network
@@ -224,17 +225,3 @@ def _channel_arguments(name: str, channels: Sequence[Channel], n_channels: int) 
         if letter != "a":
             arguments[f"tau_max_{letter}"] = [gate.time_constant_ms for gate in each]
     return arguments
-
-
-def _unique(names: Sequence[str]) -> list[str]:
-    """Numbers names that occur again: a, a, b becomes a, a_2, b."""
-    taken: set[str] = set()
-    result = []
-    for name in names:
-        candidate, number = name, 1
-        while candidate in taken:
-            number += 1
-            candidate = f"{name}_{number}"
-        taken.add(candidate)
-        result.append(candidate)
-    return result

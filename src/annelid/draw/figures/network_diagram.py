@@ -69,7 +69,9 @@ def run_network_figure(run: Run, path: str | Path) -> Path:
         RunFileError: As of `network_figure`, or the run holds the potentials of no network.
     """
     neurons = [str(name) for name in run.data["neuron"].values] if "potential" in run.data else []
-    network = network_of(run.config, neurons) if neurons else None
+    # A network of a user's own, which the configuration does not describe, is in the file itself.
+    text = run.data.attrs.get("network")
+    network = Network.from_toml(text) if isinstance(text, str) else network_of(run.config, neurons) if neurons else None
     if network is None:
         raise RunFileError(f"{run.path} holds no network to draw: its controller is {run.config.controller.kind}")
     return network_figure(network, path)

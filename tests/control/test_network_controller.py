@@ -1,0 +1,151 @@
+"""A user's own network in closed loop: the same as stepped by hand, recorded by name, resumed, batched, and in C."""
+
+from __future__ import annotations
+
+import shutil
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import annelid
+from annelid.control import NetworkController, Sense
+from annelid.errors import ConfigError
+from annelid.nervous import Firing, GapJunction, ModulatorySynapse, Network, Neuron, SpikingSynapse, Synapse
+from annelid.nervous import persistent_sodium as sodium
+
+N = 6
+NAMES = [f"segment{number}" for number in range(1, N + 1)]
+
+
+def baton() -> Network:
+    network = Network("baton")
+    for name in NAMES:
+        network.add_neuron(name, Neuron(100.0, bias_nA=20.0), 20.0 if name == NAMES[0] else 0.0)
+        network.add_output(name, name)
+    for source, target in permutations(NAMES, 2):
+        network.add_synapse(source, target, Synapse(0.6, -40.0))
+    for name, following in zip(NAMES, NAMES[1:] + NAMES[:1], strict=True):
+        network.add_input(f"stretch of {name}", following)
+    return network
+
+
+def controller(**options: object) -> NetworkController:
+    inputs = {f"stretch of {name}": Sense("lengthening_m", place, gain=400.0) for place, name in enumerate(NAMES)}
+    return NetworkController(baton(), inputs, NAMES, **options)  # type: ignore[arg-type]
+
+
+def sensed(longer_m: np.ndarray, step: int = 0) -> annelid.Sensation:
+    n = len(longer_m)
+    zeros = np.zeros(n)
+    rest = np.ones((n, 1))
+    touch = np.arange(4.0 * n).reshape(n, 4)
+    return annelid.Sensation(
+        step * 1e-3, rest + longer_m[:, None], rest, zeros, zeros, np.zeros((n, 3)), np.zeros(3), touch
+    )
+
+
+def test_it_is_the_network_stepped_by_hand() -> None:
+    ours, stepper = controller(), baton().compile(1.0)
+    state, rng = stepper.initial_state(), np.random.default_rng(0)
+    for step in range(300):
+        longer_m = rng.uniform(-0.02, 0.06, N)
+        activation = ours.step(sensed(longer_m, step))
+        # As the body measures it, rounded.
+        read = (1.0 + longer_m) - 1.0
+        stepper.advance(state, 400.0 * np.maximum(read, 0.0))
+        assert activation == pytest.approx(np.clip(state.potential[0] / 20.0, 0.0, 1.0), abs=1e-15)
+    assert ours.read(False)["potential"] == pytest.approx(state.potential[0], abs=0.0)
+
+
+def test_a_stride_is_so_many_steps() -> None:
+    by_step, by_stride, longer_m = controller(), controller(), np.linspace(0.0, 0.05, N)
+    for step in range(20):
+        last = by_step.step(sensed(longer_m, step))
+    assert (by_stride.stride(sensed(longer_m), 20) == last).all()
+
+
+def test_currents_and_gates_are_recorded_by_name_and_add_up() -> None:
+    """The rate of each potential times its capacitance is the sum of leak, bias and the currents that are recorded."""
+    network = Network("all")
+    network.add_neuron("a", Neuron(8.0, bias_nA=14.0, firing=Firing(10.0, 0.0)))
+    network.add_neuron("b", Neuron(9.0, 0.8, rest_mV=1.0), 3.0)
+    network.add_neuron("c", Neuron(7.0, channels=(sodium(0.4),)), 4.0)
+    network.add_synapse("a", "b", SpikingSynapse(0.5, 60.0, 20.0))
+    network.add_synapse("b", "a", Synapse(0.4, -40.0))
+    network.add_synapse("b", "a", Synapse(0.2, 50.0, 1.0, 5.0))
+    network.add_gap_junction("a", "b", GapJunction(0.1, rectified=True))
+    network.add_synapse("b", "c", ModulatorySynapse("gates", 2.0))
+    network.add_output("b", "b")
+    driven = NetworkController(network, {}, ["b"])
+    names = driven.recordable().coords
+    assert names["connection"] == ["a -> b", "b -> a", "b -> a_2", "a -> b_2"]
+    assert names["gate"] == ["c"]
+    for step in range(200):
+        before = driven.read(False)
+        driven.step(sensed(np.zeros(1), step))
+        after = driven.read(False)
+        potential, current = np.asarray(before["potential"]), np.asarray(before["synaptic_current"])
+        expected = -0.8 * (potential[1] - 1.0) + current[0] + current[3]
+        assert 9.0 * (np.asarray(after["potential"])[1] - potential[1]) == pytest.approx(expected, abs=1e-9)
+    assert np.asarray(after["gate"]).shape == (1,)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "outputs", "words"),
+    [
+        ({"stretch of segment9": 1.0}, NAMES, "did you mean"),
+        ({}, ["segment9"], "the network has no output 'segment9'"),
+    ],
+)
+def test_unknown_names_are_refused(inputs: dict[str, float], outputs: list[str], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        NetworkController(baton(), inputs, outputs)
+
+
+def test_what_cannot_be_sensed_or_does_not_fit_is_refused() -> None:
+    with pytest.raises(ConfigError, match="unknown quantity 'stretch'"):
+        Sense("stretch", 0, 1.0)
+    driven = NetworkController(baton(), {"stretch of segment1": Sense("lengthening_m", 7, 1.0)}, NAMES)
+    with pytest.raises(ConfigError, match="senses no lengthening_m at 7"):
+        driven.step(sensed(np.zeros(N)))
+    late = controller(control_timestep_s=0.002)
+    late.step(sensed(np.zeros(N)))
+    with pytest.raises(ConfigError, match=r"clock\.control_timestep_s"):
+        late.stride(sensed(np.zeros(N), 20), 1)
+
+
+def test_a_run_goes_on_bit_for_bit_and_its_network_can_be_drawn(tmp_path: Path) -> None:
+    preset, changes = "riddle2025-muscles", {"duration_s": 0.06}
+    whole = annelid.simulate(annelid.load_config(preset, changes), tmp_path / "whole", controller=controller())
+    half = annelid.load_config(preset, {"duration_s": 0.03})
+    first = annelid.simulate(half, tmp_path / "first", controller=controller())
+    longer = annelid.load_config(preset, changes)
+    rest = annelid.simulate(longer, tmp_path / "rest", resume=first, controller=controller())
+    assert (whole.data["potential"].values[-1] == rest.data["potential"].values[-1]).all()
+    assert (whole.data["synaptic_current"].values[-1] == rest.data["synaptic_current"].values[-1]).all()
+    assert list(whole.data["neuron"].values) == NAMES
+    from annelid.draw.figures.network_diagram import run_network_figure
+
+    assert run_network_figure(whole, tmp_path / "network.png").stat().st_size > 1000
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
+@pytest.mark.parametrize("slope", [None, 0.3])
+def test_it_is_the_same_in_c(slope: float | None, tmp_path: Path) -> None:
+    from annelid.export import HostFirmware, controller_firmware
+
+    inputs = {
+        "stretch of segment1": Sense("lengthening_m", 0, gain=400.0),
+        "stretch of segment2": Sense("touch_N", (2, 1), gain=0.3, threshold=2.0, most_nA=1.5),
+        "stretch of segment3": 2.5,
+    }
+    ours = NetworkController(baton(), inputs, NAMES, n_muscles=2 * N, slope_per_mV=slope)
+    code = HostFirmware(controller_firmware(ours, "baton"), tmp_path)
+    rng = np.random.default_rng(0)
+    for step in range(500):
+        now = sensed(rng.uniform(-0.02, 0.06, N), step)
+        assert code.step(now) == pytest.approx(ours.step(now), abs=1e-12)
+    with pytest.raises(ConfigError, match="is set by a function of Python"):
+        controller_firmware(NetworkController(baton(), {"stretch of segment1": lambda s: s.time_s}, NAMES))

@@ -39,6 +39,7 @@ QUICK = {
     ("annelid", "runs"): (),
     ("annelid", "check"): (),
     ("annelid", "new"): ("--force",),
+    ("annelid", "export-network"): ("--force",),
     ("annelid", "build"): ("--force",),
     ("annelid", "presets"): (),
     ("annelid", "arenas"): (),

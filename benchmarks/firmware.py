@@ -4,7 +4,7 @@ Prints the numbers of docs/firmware.md. Needs a C compiler, and without --host-o
 libnewlib-arm-none-eabi and qemu-system-arm. Takes ten minutes.
 
     python benchmarks/firmware.py --csv docs/results/firmware.csv
-    python benchmarks/firmware.py --random 100 --steps 2000 --csv docs/results/firmware_random.csv
+    python benchmarks/firmware.py --random 59 --steps 2000 --csv docs/results/firmware_random.csv
 """
 
 from __future__ import annotations

@@ -39,6 +39,7 @@ QUICK = {
     ("annelid", "runs"): (),
     ("annelid", "check"): (),
     ("annelid", "new"): ("--force",),
+    ("annelid", "export-network"): ("--force",),
     ("annelid", "build"): ("--force",),
     ("annelid", "presets"): (),
     ("annelid", "arenas"): (),
@@ -129,7 +130,11 @@ NAMED = {command for page in PAGES for command in commands_of(page)}
 BENCHMARKS = sorted((one for one in NAMED if starts_with(one.words, ("python", "benchmarks/"))), key=str)
 """Benchmarks that pages name, with their arguments."""
 
-BENCHMARKS_NEED = {"warp_probe": find_spec("mujoco_warp"), "instructions": shutil.which("valgrind")}
+BENCHMARKS_NEED = {
+    "warp_probe": find_spec("mujoco_warp"),
+    "instructions": shutil.which("valgrind"),
+    "firmware": shutil.which("cc") and shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
+}
 """What is not installed with the tests."""
 
 READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n'}

@@ -67,7 +67,8 @@ def compiled_self_test(firmware: Firmware, folder: Path) -> subprocess.Completed
 
 
 def controller_of(worm: str) -> Any:
-    config = annelid.load_config(*WORMS[worm])
+    preset, changes = WORMS[worm]
+    config = annelid.load_config(preset, changes)
     return annelid.build_controller(config, annelid.build_plant(config))
 
 
@@ -101,7 +102,8 @@ def test_a_self_test_fails_for_a_wrong_network(tmp_path: Path) -> None:
 @pytest.mark.parametrize("worm", WORMS)
 def test_a_controller_in_c_returns_what_it_returns_in_python(worm: str, tmp_path: Path) -> None:
     """With noisy lengths and touch that change at every step, over the hold of the start."""
-    config = annelid.load_config(*WORMS[worm])
+    preset, changes = WORMS[worm]
+    config = annelid.load_config(preset, changes)
     plant = annelid.build_plant(config)
     controller: Any = annelid.build_controller(config, plant)
     code = HostFirmware(controller_firmware(controller, worm), tmp_path)
@@ -171,7 +173,7 @@ def test_numbers_too_large_for_float_and_controllers_without_a_network_are_refus
     with pytest.raises(ConfigError, match="too large for float"):
         network_firmware(network, real="float")
     with pytest.raises(ConfigError, match="only controllers that step a network"):
-        controller_firmware(annelid.build_controller(*_built("riddle2025-3x1")))  # type: ignore[arg-type]
+        controller_firmware(annelid.build_controller(*_built("riddle2025-3x1")))
 
 
 def _built(preset: str) -> Any:

@@ -10,7 +10,7 @@ from annelid.control.base import SENSED, Coded, ControllerCode
 from annelid.errors import ConfigError
 from annelid.export.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer
 from annelid.nervous import Network, Scheme
-from annelid.protocols import Sensation
+from annelid.protocols import Controller, Sensation
 
 
 def network_firmware(
@@ -44,7 +44,7 @@ def network_firmware(
     return writer.firmware("output_mV", max(n_outputs, 1))
 
 
-def controller_firmware(controller: Coded, name: str = "controller", *, real: Real = "double") -> Firmware:
+def controller_firmware(controller: Controller, name: str = "controller", *, real: Real = "double") -> Firmware:
     """Writes a controller as C99, with its network, its sensors, its start, its turning and its activation.
 
     Args:

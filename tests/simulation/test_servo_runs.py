@@ -57,7 +57,7 @@ def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
 
 
 def errors_in_turns(example: str, tmp_path: Path, **changes: Any) -> np.ndarray:
-    """Relative errors of the four elongations over four turns, and that of the interior's mean."""
+    """Relative errors of the four elongations over the first cycle, and that of the interior's mean."""
     config = load_config(EXAMPLES / f"{example}.toml", {"duration_s": 34.0} | changes)
     numbers = summary(simulate(config, tmp_path, progress=False))
     assert numbers.order == [1, 2, 3, 4]
@@ -67,7 +67,7 @@ def errors_in_turns(example: str, tmp_path: Path, **changes: Any) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("timestep_s", [0.01, 0.005])
-def test_in_turns_the_robot_elongates_as_measured_with_equal_servos(tmp_path: Path, timestep_s: float) -> None:
+def test_in_its_first_turns_the_robot_elongates_as_measured_with_equal_servos(tmp_path: Path, timestep_s: float) -> None:
     errors = errors_in_turns("robot_in_turns", tmp_path, **{"clock.physics_timestep_s": timestep_s})
     assert errors[[0, 3, 4]].max() <= 0.05
     assert errors[[1, 2]].max() <= 0.15

@@ -22,7 +22,7 @@ AUTHORS_MESH: dict[str, Any] = {
     "body.strands.shear_modulus_Pa": 1.33e9,
     "body.springs.stiffness_N_per_m": 24.5,
     "body.springs.rest_length_m": 0.065,
-    "body.joints": None,
+    "body.joints.dry_friction_Nm": 0.0,
     "body.pins.mass_kg": 0.0135,
     "body.rings.length_range_m": [0.62, 0.96],
     "body.rings.force_limit_N": 13.2,

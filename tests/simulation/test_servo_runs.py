@@ -69,9 +69,7 @@ def errors_in_turns(example: str, tmp_path: Path, **changes: Any) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("timestep_s", [0.01, 0.005])
-def test_in_its_first_turns_the_robot_elongates_as_measured_with_equal_servos(
-    tmp_path: Path, timestep_s: float
-) -> None:
+def test_in_its_first_turns_the_robot_with_equal_servos_is_as_measured(tmp_path: Path, timestep_s: float) -> None:
     errors = errors_in_turns("robot_in_turns", tmp_path, **{"clock.physics_timestep_s": timestep_s})
     assert errors[[0, 3, 4]].max() <= 0.05
     assert errors[[1, 2]].max() <= 0.15

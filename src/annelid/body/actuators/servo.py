@@ -168,7 +168,7 @@ def motor_power_W(
         stall_force_N: Force F0 at which a motor stands still, one for all or in that shape.
         no_load_speed_m_per_s: Speed v0 without load.
     """
-    return (force_N * speed_m_per_s + force_N**2 * no_load_speed_m_per_s / stall_force_N).clip(0.0)
+    return (force_N * speed_m_per_s + force_N**2 * no_load_speed_m_per_s / np.asarray(stall_force_N)).clip(0.0)
 
 
 def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:

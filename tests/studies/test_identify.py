@@ -39,7 +39,7 @@ TUBE: dict[str, Any] = {
 STRAND: dict[str, Any] = {"kind": "ring-down", "name": "strand", "data": "strand.csv", "length_m": 1.2}
 WORM = {"body.strands.radius_m": 0.00299, "body.strands.linear_density_kg_per_m": 0.01605}
 TRUTH = {"young_modulus": 0.3e9, "softening_strain": 0.008, "damping_time": 0.06}
-Table = dict[str, NDArray[np.float64]]
+Table = dict[str, NDArray[Any]]
 
 
 def study_of(parameters: dict[str, Any], *experiments: dict[str, Any]) -> dict[str, Any]:

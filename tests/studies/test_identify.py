@@ -181,9 +181,8 @@ def test_several_experiments_are_fitted_at_once(tmp_path: Path) -> None:
     assert ((ends[:, 0] < truth) & (truth < ends[:, 1])).all()
     assert (ends[:, 1] / ends[:, 0] < 1.25).all()
     # Profile and linear theory agree, since the model is nearly linear over so short a way.
-    linear = np.exp(
-        found.fit.logs[:, None] + np.outer(found.intervals.relative_error, [-1, 1]) * found.intervals.quantile
-    )
+    reach = found.intervals.quantile * found.intervals.relative_error
+    linear = np.exp(found.fit.logs[:, None] + np.outer(reach, [-1.0, 1.0]))
     assert ends == pytest.approx(linear, rel=0.03)
     assert not found.intervals.confused
     assert found.fit.n_tests == 0

@@ -9,6 +9,7 @@ the secant at its change of curvature in the material frame. Also prints the str
 from __future__ import annotations
 
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from annelid import load_config
+from annelid import load_config, simulate
+from annelid.body import build_spec, compile_spec
 from annelid.body.damping import twist_name
 from annelid.experiment import SHEAR_OVER_YOUNG, load_frame
 from annelid.experiment.identify.kinds.tensile import bending_secant
@@ -145,8 +147,37 @@ def fitted(measured: Loop, young_Pa: float | None, springs: dict[str, Any], *, s
     }
 
 
+def walking_strains(preset: str = "wang") -> Array:
+    """Lets a worm walk; returns the changes of the amount of curvature as outer strains, ``(n_frames, n_vertices)``.
+
+    They are less than the changes in the material frame, which a run does not record.
+    """
+    config = load_config(preset, {"duration_s": 9.0, "record.frames_interval_s": 0.1})
+    with tempfile.TemporaryDirectory() as folder:
+        postures = simulate(config, folder, progress=False).data["qpos"].values
+    model = compile_spec(build_spec(config, for_plant=True))
+    data = mujoco.MjData(model)
+    bodies = model.flex_vertbodyid.reshape(model.nflex, -1)
+
+    def curvature(qpos: Array) -> Array:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        edge = np.diff(data.xpos[bodies], axis=1)
+        length = np.linalg.norm(edge, axis=-1, keepdims=True)
+        t0, t1 = (edge / length)[:, :-1], (edge / length)[:, 1:]
+        bend = 4 * np.cross(t0, t1) / (1 + (t0 * t1).sum(axis=-1, keepdims=True)) / (length[:, :-1] + length[:, 1:])
+        return np.linalg.norm(bend, axis=-1).ravel()
+
+    return OUTER_M * np.abs(np.stack([curvature(each) for each in postures]) - curvature(model.qpos0))
+
+
 def main(path: Path) -> None:
     """Writes a row for each strand and each pair of springs."""
+    walked = walking_strains()
+    worst = walked[walked.max(axis=1).argmax()]
+    print(
+        f"walking: outer strain {worst.max():.2%} at most, {(worst**3).sum() / (worst**2).sum():.2%} in the mean there"
+    )
     measured = read_loop()
     _, strains = loop_of(0.29e9, 0.0053, {}, softens=False)
     print(

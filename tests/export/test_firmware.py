@@ -150,8 +150,8 @@ def test_a_small_full_network_is_dense_and_a_large_one_sparse() -> None:
     full = Network("full")
     for name in "ab":
         full.add_neuron(name, Neuron())
-    for pair in ("ab", "ba", "aa", "bb"):
-        full.add_synapse(*pair, Synapse(0.5, -40.0))
+    for source, target in ("ab", "ba", "aa", "bb"):
+        full.add_synapse(source, target, Synapse(0.5, -40.0))
     assert "a dense table" in network_firmware(full).header
     assert "a sparse table" in network_firmware(peristalsis_network(6)).header
 

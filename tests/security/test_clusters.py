@@ -23,7 +23,7 @@ from annelid.cli import app
 from annelid.config import find_cluster
 from annelid.config.cluster import Slurm
 from annelid.errors import ClusterError, ConfigError
-from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, attempt, own_code
+from annelid.experiment.attempt import MOST_BYTES, OUTCOME_NAME, Task, Work, attempt, own_code
 from annelid.experiment.case import Case
 from annelid.experiment.cluster import slurm_cluster
 from annelid.experiment.store import Store, case_key
@@ -217,7 +217,7 @@ class Away(Workers):
     def slots(self) -> int:
         return 1
 
-    def submit(self, task: Task) -> Result:
+    def submit(self, task: Work) -> Result:
         future = Future[Any]()
         future.set_result(self.sent)
         return future

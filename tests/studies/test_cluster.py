@@ -24,6 +24,7 @@ from annelid.experiment.attempt import (
     DRAFTS,
     OUTCOME_NAME,
     Task,
+    Work,
     attempt,
     fetch_results,
     new_draft,
@@ -74,7 +75,8 @@ class Here(Workers):
             raise ClusterError("the scheduler is gone")
         return 2
 
-    def submit(self, task: Task) -> Result:
+    def submit(self, task: Work) -> Result:
+        assert isinstance(task, Task)
         self.tasks.append(task)
         future = Future[bytes | None]()
         what = self._script.pop(0) if self._script else ""

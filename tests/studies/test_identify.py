@@ -39,7 +39,7 @@ TUBE: dict[str, Any] = {
 STRAND: dict[str, Any] = {"kind": "ring-down", "name": "strand", "data": "strand.csv", "length_m": 1.2}
 WORM = {"body.strands.radius_m": 0.00299, "body.strands.linear_density_kg_per_m": 0.01605}
 TRUTH = {"young_modulus": 0.3e9, "softening_strain": 0.008, "damping_time": 0.06}
-Table = dict[str, NDArray[np.float64]]
+Table = dict[str, NDArray[Any]]
 
 
 def study_of(parameters: dict[str, Any], *experiments: dict[str, Any]) -> dict[str, Any]:
@@ -181,9 +181,8 @@ def test_several_experiments_are_fitted_at_once(tmp_path: Path) -> None:
     assert ((ends[:, 0] < truth) & (truth < ends[:, 1])).all()
     assert (ends[:, 1] / ends[:, 0] < 1.25).all()
     # Profile and linear theory agree, since the model is nearly linear over so short a way.
-    linear = np.exp(
-        found.fit.logs[:, None] + np.outer(found.intervals.relative_error, [-1, 1]) * found.intervals.quantile
-    )
+    reach = found.intervals.quantile * found.intervals.relative_error
+    linear = np.exp(found.fit.logs[:, None] + np.outer(reach, [-1.0, 1.0]))
     assert ends == pytest.approx(linear, rel=0.03)
     assert not found.intervals.confused
     assert found.fit.n_tests == 0

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -153,8 +154,9 @@ class Model:
         changes: dict[str, float] = {}
         for (_, one), value in zip(self.study.parameters.items(), np.exp(logs).tolist(), strict=True):
             for field, share in one.fields.items():
-                changes |= dict.fromkeys(self.study.paths(field), share * value)
-        worm = {path: value for path, value in changes.items() if not path.startswith("experiments.")}
+                for path in self.study.paths(field):
+                    changes[path] = share * value
+        worm: dict[str, Any] = {p: value for p, value in changes.items() if not p.startswith("experiments.")}
         own: list[dict[str, float]] = [
             {p.rsplit(".", 1)[1]: v for p, v in changes.items() if p.startswith(f"experiments.{one.name}.")}
             for one in self.study.experiments

@@ -9,6 +9,7 @@ from math import exp, sqrt
 import numpy as np
 
 from annelid.errors import SimulationStopped
+from annelid.experiment.identify.base import Data
 from annelid.experiment.identify.fit import SINGULAR, Fit, Model, Part, bounds, prior_rows, relative_gain
 from annelid.experiment.identify.noise import whitened
 from annelid.protocols import Array
@@ -17,8 +18,8 @@ LEVEL = 0.95
 """Of the intervals."""
 REPLICATES = 2000
 """Of the bootstrap."""
-FEWEST_FREE = 3.0
-"""Degrees of freedom at least, of the residuals."""
+FEWEST_FREE = 2.0
+"""Degrees of freedom at least, of the errors of an experiment."""
 WIDEST = 3.0
 """How many times as wide as the linear interval a profile is followed."""
 UNKNOWN = 0.3
@@ -38,7 +39,7 @@ class Intervals:
         correlation: Of these, ``(p, p)``.
         errors: Relative standard errors of independent combinations of the parameters, greatest first, ``(p,)``.
         directions: The combinations, a row each, in relative changes, ``(p, p)``.
-        quantile: Standard errors from the value to the end of an interval.
+        quantile: Standard errors from the value to the end of an interval, ``(p,)``.
         confused: What the data cannot tell apart, a sentence each.
         held_out: Points that were held out, and how many of them lie in the intervals predicted, by experiment.
     """
@@ -49,35 +50,66 @@ class Intervals:
     correlation: Array
     errors: Array
     directions: Array
-    quantile: float
+    quantile: Array
     confused: tuple[str, ...]
     held_out: dict[str, tuple[int, int]]
 
 
 def intervals(fit: Fit, model: Model) -> Intervals:
     """Finds the intervals of a fit; the profile takes two tests of each experiment for every parameter."""
-    from scipy.stats import t
-
-    free = sum(part.noise.effective_points(part.data) for part in fit.parts) + len(fit.prior[0]) - len(fit.logs)
-    quantile = float(t.ppf(0.5 + LEVEL / 2, max(free, FEWEST_FREE)))
+    quantile = _quantiles(fit)
     error = np.sqrt(np.diag(fit.covariance))
     values, vectors = np.linalg.eigh(fit.information)
     correlation = fit.covariance / np.outer(error, error)
     errors = 1.0 / np.sqrt(np.maximum(values, SINGULAR * values[-1]))
     return Intervals(
         profile=_profile(fit, model, error, quantile),
-        bootstrap=np.exp(fit.logs + np.quantile(replicates(fit), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)).T,
+        bootstrap=np.exp(
+            fit.logs[:, None] + np.quantile(replicates(fit), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0).T
+        ),
         relative_error=error,
         correlation=correlation,
         errors=errors,
         directions=vectors.T,
         quantile=quantile,
         confused=confused(fit.names, correlation, errors, vectors.T),
-        held_out={part.experiment.name: _inside(fit, part, quantile) for part in fit.parts if len(part.held.at)},
+        held_out={part.experiment.name: _inside(fit, part) for part in fit.parts if len(part.held.at)},
     )
 
 
-def _profile(fit: Fit, model: Model, error: Array, quantile: float) -> Array:
+def _freedom(fit: Fit, part: Part) -> float:
+    """Degrees of freedom of an experiment's errors, less the parameters that it determines."""
+    fitted_away = float(np.trace(fit.covariance @ part.information))
+    return max(part.noise.freedom(part.data) - fitted_away, FEWEST_FREE)
+
+
+def _quantiles(fit: Fit) -> Array:
+    """Student's quantile of each parameter, ``(p,)``.
+
+    The degrees of freedom are Satterthwaite's: those of the experiments, each by its share of the parameter's variance.
+    """
+    from scipy.stats import t
+
+    shares = [np.einsum("pn,nm,pm->p", gain, part.root @ part.root.T, gain) for part, gain in _gains(fit)]
+    total = np.maximum(np.diag(fit.covariance), 1e-300)
+    slack = sum((share / total) ** 2 / _freedom(fit, part) for share, part in zip(shares, fit.parts, strict=True))
+    return t.ppf(0.5 + LEVEL / 2, 1.0 / np.maximum(slack, 1e-9))
+
+
+def band(fit: Fit, part: Part, data: Data, jacobian: Array) -> Array:
+    """Half of the interval that the fit predicts for points of an experiment, ``(n,)``."""
+    from scipy.stats import t
+
+    quantile = float(t.ppf(0.5 + LEVEL / 2, _freedom(fit, part)))
+    variance = np.einsum("np,pq,nq->n", jacobian, fit.covariance, jacobian)
+    return quantile * np.sqrt(variance + np.diag(part.noise.covariance(data)))
+
+
+def _gains(fit: Fit) -> list[tuple[Part, Array]]:
+    return list(zip(fit.parts, relative_gain(fit), strict=True))
+
+
+def _profile(fit: Fit, model: Model, error: Array, quantile: Array) -> Array:
     """Ends of the profile likelihood's intervals, ``(p, 2)``.
 
     Each parameter is moved to the end of its linear interval and the others with it as the linear model says; there all
@@ -86,7 +118,8 @@ def _profile(fit: Fit, model: Model, error: Array, quantile: float) -> Array:
     """
     low, high = bounds(fit.study)
     p = len(fit.logs)
-    ways = np.array([sign * quantile * error[i] for i in range(p) for sign in (-1.0, 1.0)])
+    reach = quantile * error
+    ways = np.array([sign * reach[i] for i in range(p) for sign in (-1.0, 1.0)])
     along = np.repeat(fit.covariance / np.diag(fit.covariance), 2, axis=1).T
     moved = np.clip(fit.logs + ways[:, None] * along, low, high)
     ways = (moved - fit.logs)[np.arange(2 * p), np.repeat(np.arange(p), 2)]
@@ -96,12 +129,12 @@ def _profile(fit: Fit, model: Model, error: Array, quantile: float) -> Array:
         there = model.predicted(list(moved), "profile likelihood")
     except SimulationStopped:
         # A worm at an end gives way: the linear intervals stand.
-        return np.exp(np.clip(fit.logs[:, None] + quantile * error[:, None] * [-1.0, 1.0], low[:, None], high[:, None]))
+        return np.exp(np.clip(fit.logs[:, None] + reach[:, None] * [-1.0, 1.0], low[:, None], high[:, None]))
     for k in range(2 * p):
         i = k // 2
         fitted = [one[~held] for one, held in zip(there[k], model.rows, strict=True)]
         rise = _misfit(fit, fitted, moved[k], i) - base
-        stretch = quantile / sqrt(rise) if rise > (quantile / WIDEST) ** 2 else WIDEST
+        stretch = quantile[i] / sqrt(rise) if rise > (quantile[i] / WIDEST) ** 2 else WIDEST
         # A way that was cut at a bound counts as far as it went.
         ends[k] = np.clip(fit.logs[i] + ways[k] * stretch, low[i], high[i])
     return np.exp(ends.reshape(p, 2))
@@ -129,7 +162,9 @@ def replicates(fit: Fit, n: int = REPLICATES, seed: int = 0) -> Array:
     """
     rng = np.random.default_rng(seed)
     total = np.zeros((n, len(fit.logs)))
-    for part, gain in zip(fit.parts, relative_gain(fit), strict=True):
+    for part, gain in _gains(fit):
+        # What the parameters have fitted away makes residuals smaller than errors.
+        size = sqrt(part.noise.noise**2 + part.noise.discrepancy**2) / max(part.rms, 1e-300)
         for one in np.unique(part.data.series):
             mine = np.flatnonzero(part.data.series == one)
             residual = part.residual[mine] - part.residual[mine].mean() * (part.noise.discrepancy == 0.0)
@@ -143,17 +178,14 @@ def replicates(fit: Fit, n: int = REPLICATES, seed: int = 0) -> Array:
             order = (starts[..., None] + np.arange(length)).reshape(n, -1)[:, :m]
             # Blocks change their signs: a series with a mean of its own would else shift every replicate alike.
             signs = np.repeat(rng.choice([-1.0, 1.0], (n, blocks)), length, axis=1)[:, :m]
-            total += (residual[order] * signs) @ gain[:, mine].T
+            total += size * (residual[order] * signs) @ gain[:, mine].T
     priors = fit.covariance @ fit.prior[1].T
     return total + rng.normal(size=(n, priors.shape[1])) @ priors.T
 
 
-def _inside(fit: Fit, part: Part, quantile: float) -> tuple[int, int]:
+def _inside(fit: Fit, part: Part) -> tuple[int, int]:
     """Points held out, and how many lie in the intervals that the fit predicts for them."""
-    noise = part.noise
-    variance = np.einsum("np,pq,nq->n", part.held_jacobian, fit.covariance, part.held_jacobian)
-    width = quantile * np.sqrt(variance + noise.noise**2 + noise.discrepancy**2)
-    inside = np.abs(part.held.values - part.held_fitted) <= width
+    inside = np.abs(part.held.values - part.held_fitted) <= band(fit, part, part.held, part.held_jacobian)
     return len(inside), int(inside.sum())
 
 

@@ -47,6 +47,11 @@ class Noise:
         """Lower root of the covariance: what it divides is independent with a standard deviation of 1."""
         return cholesky(self.covariance(data), lower=True)
 
+    def freedom(self, data: Data) -> float:
+        """How many independent points would give the size of the errors as well as these do."""
+        total = self.noise**2 + self.discrepancy**2
+        return float(len(data.at) ** 2 / ((self.covariance(data) / total) ** 2).sum())
+
     def effective_points(self, data: Data) -> float:
         """How many independent points would give the mean of the points as well as these do."""
         total = self.noise**2 + self.discrepancy**2
@@ -87,8 +92,9 @@ def estimated(data: Data, residual: Array, jacobian: Array, elsewhere: Array, st
         gone = solve_triangular(known, j.T @ r, lower=True)
         return float(2 * np.log(np.diag(root)).sum() + 2 * np.log(np.diag(known)).sum() + r @ r - gone @ gone)
 
-    # A discrepancy as long as the data would be told apart from no parameter: the fit would follow slopes only.
-    bounds = [(log(LEAST * size), log(10 * size)), (log(spacing / 2), log(max(reach / 4, spacing)))]
+    # A discrepancy as long as the data would be told apart from no parameter, a shorter one than two points not from
+    # noise.
+    bounds = [(log(LEAST * size), log(10 * size)), (log(2 * spacing), log(max(reach / 4, 3 * spacing)))]
     if stated is None:
         bounds.append((log(LEAST * scale), log(10 * size)))
     shares = ((0.7, 5 * spacing, 0.7), (0.05, 2 * spacing, 1.0), (0.9, reach / 3, 0.2))

@@ -14,7 +14,7 @@ from rich.table import Table
 from annelid.draw.figures.identify import Drawn, identify_figure
 from annelid.experiment.case import write_worm
 from annelid.experiment.identify.fit import Fit, fitted
-from annelid.experiment.identify.intervals import LEVEL, Intervals, intervals
+from annelid.experiment.identify.intervals import LEVEL, Intervals, band, intervals
 from annelid.experiment.identify.simulations import Simulations
 from annelid.experiment.identify.study import IdentifyStudy
 from annelid.output import write_json
@@ -172,8 +172,7 @@ def _figure(found: Identified, stem: Path) -> Path:
     fit = found.fit
     drawn: list[Drawn] = []
     for part in fit.parts:
-        variance = np.einsum("np,pq,nq->n", part.jacobian, fit.covariance, part.jacobian)
-        width = found.intervals.quantile * np.sqrt(variance + part.noise.noise**2 + part.noise.discrepancy**2)
+        width = band(fit, part, part.data, part.jacobian)
         held = (part.held.at, part.held.values, part.held_fitted)
         data = part.data
         one = Drawn(part.experiment.name, data.labels, data.series, data.at, data.values, part.fitted, width, held)

@@ -58,7 +58,7 @@ class RingDown(Experiment):
                 f"experiments.{self.name}: a ring-down needs strands with a damping of the material: set "
                 "body.strands.damping_time_s"
             )
-        density = strands.linear_density_kg_per_m
+        density = strands.one_number("linear_density_kg_per_m")
         root = first_root(self.tip_mass_kg / (density * self.length_m))
         frequency = root**2 * sqrt(strands.bending_rigidity_Nm2 / density) / self.length_m**2
         return frequency, frequency**2 * strands.material_damping_s / 2.0

@@ -28,7 +28,6 @@ WAITING = (
     "results/arena_contacts.csv",
     "results/batch_throughput.csv",
     "results/environments.csv",
-    "results/weak_middle.csv",
 )
 """Result files that do not exist yet: their tables have the numbers of earlier runs."""
 

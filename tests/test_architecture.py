@@ -38,7 +38,7 @@ MAY_IMPORT = {
     "nervous": {"errors", "text", "textfiles"},
     "config": {"errors", "text", "textfiles", "registry"},
     "references": {"config"},
-    "arena": {"config"} | BASE,
+    "arena": {"config", "morphology"} | BASE,
     "body": {"config", "morphology", "arena", "engine"} | BASE,
     "control": {"config", "nervous"} | BASE,
     "planar": {"config", "morphology"} | BASE,

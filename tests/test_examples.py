@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -198,6 +199,14 @@ def test_slip_is_told_for_each_metre(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert speed > 0
     assert 0 < slip_J_per_m < work_J_per_m
     assert 0 <= afloat <= 1
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_the_worm_crawls_alike_with_its_controller_in_c(tmp_path: Path) -> None:
+    ours, theirs = (annelid.summary(run) for run in example("firmware_in_the_loop").main(tmp_path))
+    assert ours.order == theirs.order
+    assert ours.period_s == pytest.approx(theirs.period_s, rel=1e-6)
+    assert ours.elongation_mean_max_m == pytest.approx(theirs.elongation_mean_max_m, rel=0.01)
 
 
 def test_every_example_is_run_here() -> None:

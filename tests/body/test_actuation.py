@@ -222,8 +222,8 @@ def test_a_worm_feels_the_springs_that_have_sensors() -> None:
     ("changes", "words"),
     [
         ({"body.rings.peak_force_N": 20.0}, "body.rings.peak_force_N"),
-        ({"body.rings.force_limit_N": [1.0, 2.0]}, "2 values for 4 segments"),
-        ({"body.rings.force_limit_N": []}, "one number for all segments or one for each"),
+        ({"body.rings.force_limit_N": [1.0, 2.0]}, "2 numbers for 4 segments"),
+        ({"body.rings.force_limit_N": []}, "a number, or a list of numbers, one per segment"),
         ({"body.rings.speed_limit_m_per_s": 0.0}, "body.rings.speed_limit_m_per_s = 0"),
         ({"body.rings.length_range_m": [0.96, 0.62]}, "lower bound below its upper bound"),
         ({"body.rings.kind": "rope"}, "body.rings.kind = 'rope'"),
@@ -237,7 +237,7 @@ def test_what_a_servo_cannot_be_is_refused_by_the_field_s_name(changes: dict[str
 
 @pytest.mark.parametrize(
     ("forces", "words"),
-    [([31.0, 16.0], "2 values for 3 segments"), ([], "one number for all segments")],
+    [([31.0, 16.0], "2 numbers for 3 segments"), ([], "a number, or a list of numbers, one per segment")],
 )
 def test_muscles_have_one_peak_force_or_one_per_segment(forces: list[float], words: str) -> None:
     with pytest.raises(ConfigError, match=words):

@@ -32,7 +32,7 @@ from annelid.errors import SimulationStopped
         (("run", "--resume", "nothere"), "there is no run file nothere"),
         (("build", "riddle2022-planar"), "has no MuJoCo model"),
         (("export-network", "nothere.toml"), "cannot read the configuration file nothere.toml"),
-        (("export-network", "riddle2025-muscles"), "only controllers that step a network can"),
+        (("export-network", "crawler-timed"), "only controllers that step a network can"),
         (
             ("build", "riddle2023-rods", "-o", "no/such/worm.xml"),
             "cannot be written: there is no folder no/such",

@@ -57,7 +57,8 @@ NO_WORM = {
     "firmware_random.csv": "the same",
     "lateral_damping.csv": "rods with and without the damping that it is about",
     "calibration_default.json": "a fit with a body of its own",
-    "identify_recovery_table.csv": "synthetic robots",
+    "identify_recovery.csv": "synthetic robots",
+    "identify_recovery_table.csv": "the same",
     "tube_law.csv": "fits to the load frame, each with a body of its own",
     "material.csv": "the swept materials are its rows",
 }

@@ -133,19 +133,6 @@ def test_a_controller_in_c_returns_what_it_returns_in_python(worm: str, tmp_path
     assert largest < 1e-9
 
 
-@COMPILER
-def test_the_worm_crawls_alike_with_its_controller_in_c(tmp_path: Path) -> None:
-    spec = importlib.util.spec_from_file_location("loop", ROOT / "examples" / "firmware_in_the_loop.py")
-    assert spec is not None
-    assert spec.loader is not None
-    loop = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(loop)
-    ours, theirs = (annelid.summary(run) for run in loop.main(tmp_path))
-    assert ours.order == theirs.order
-    assert ours.period_s == pytest.approx(theirs.period_s, rel=1e-6)
-    assert ours.elongation_mean_max_m == pytest.approx(theirs.elongation_mean_max_m, rel=0.01)
-
-
 def test_a_small_full_network_is_dense_and_a_large_one_sparse() -> None:
     full = Network("full")
     for name in "ab":

@@ -107,6 +107,8 @@ def test_a_turned_run_is_told_forwards_and_goes_on_to_the_last_bit(tmp_path: Pat
     changes: dict[str, Any] = {
         "controller": WAVE,
         "duration_s": 1.2,
+        "body.rings.speed_limit_m_per_s": 0.4,
+        "body.rings.force_limit_N": 8.9,
         "arena.contact_time_constant_s": 0.06,
         "body.formulation.solver_tolerance": 1e-10,
     }

@@ -195,7 +195,7 @@ def test_a_ring_that_collapses_stops_the_run(preset: str, changes: dict[str, Any
 def test_a_setup_that_can_mean_nothing_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     thin = load_config("wang", {"body.mesh.radius_m": 0.05})
     for run in (lambda: simulate(thin, tmp_path / "run"), lambda: simulate_batch(thin, tmp_path / "run", n_worms=2)):
-        with pytest.raises(ConfigError, match=r"even the shortest cable of 0\.62 m pulls 0 N; set \[0\.195, 0\.3\]"):
+        with pytest.raises(ConfigError, match=r"even the shortest cable of 0\.45 m pulls 0 N; set \[0\.195, 0\.3\]"):
             run()
     assert list(tmp_path.iterdir()) == []
 

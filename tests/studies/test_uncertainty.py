@@ -455,7 +455,7 @@ def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> Non
     assert "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)" in str(table.title)
     words = str(table.caption)
     assert "20 ms against 10 and 5 ms; elements a side: 3 against 4 and 5" in words
-    assert f"dry_friction, spring_rest_length, viscous_friction ({ABSENT})" in words
+    assert f"dry_friction, softening_strain, spring_rest_length, viscous_friction ({ABSENT})" in words
 
 
 def files(folder: Path) -> dict[Path, int]:

@@ -106,6 +106,7 @@ def test_longer_worms_walk_two_ordered_cycles(tmp_path: Path, preset: str, n_seg
     assert_wave(result, n_segments, period, 0.02)
 
 
+@pytest.mark.slow
 def test_a_longer_rod_worm_walks_in_order(tmp_path: Path) -> None:
     """A cheap representative of the slow runs above: four segments, one cycle, coarse steps and strands."""
     changes = {

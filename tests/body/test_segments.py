@@ -237,6 +237,7 @@ def test_strands_are_stiffened_one_by_one(weightless: dict[str, Any]) -> None:
     assert doubled[1] < one[1] < elongation(weightless, WEAK)[1]
 
 
+@pytest.mark.slow
 def test_a_batch_of_tapering_worms_is_their_single_runs(tmp_path: Path) -> None:
     changes = {**TAPERED, "body.strands.young_modulus_Pa": [3e8, 6e8, 3e8], "body.relative_friction": [1.0, 0.5, 2.0]}
     configs = [load_config(RODS, {**changes, "duration_s": 0.2, "seed": seed}) for seed in (0, 1)]

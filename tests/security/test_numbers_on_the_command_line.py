@@ -39,6 +39,8 @@ WITH: dict[str, tuple[str, ...]] = {
     "paper": ("--only", "nothing"),
     "robustness": ("--controller", "nothing"),
     "challenge": ("nothing",),
+    "calibrate": ("nothere.toml",),
+    "export-network": ("riddle2023-rods", "-o", "c"),
     "experiment": ("--cluster", "nothing"),
     "experiment load-frame": ("riddle2022-planar",),
 }

@@ -133,6 +133,7 @@ COMMANDS = {
     "sweep": ["sweep", "study.toml", "--jobs", "2"],
     "paper": ["paper", "--quick", "--jobs", "2"],
     "tune": ["tune", "riddle2025-muscles", "--duration", "100", "--jobs", "2"],
+    "calibrate": ["calibrate", "--jobs", "2"],
     "robustness": ["robustness", "--points", "6", "--jobs", "2"],
     "challenge": ["challenge", "--quick", "--jobs", "2"],
     "gallery": ["gallery", "arenas.png", "-o", "out", "--jobs", "2"],

@@ -235,6 +235,7 @@ def test_a_cable_that_stays_slack_is_told(tmp_path: Path) -> None:
     assert any(warning.startswith("the actuators of segment 1 pulled nothing") for warning in run.warnings)
 
 
+@pytest.mark.slow
 def test_a_batch_and_a_resumed_run_have_the_warnings_of_a_single_one(tmp_path: Path) -> None:
     others: tuple[dict[str, Any], ...] = ({}, {"sensor.tolerance_m": 0.05}, {"body.rings.length_range_m": [0.62, 0.96]})
     configs = [load_config("wang", SLACK | other) for other in others]

@@ -146,6 +146,7 @@ def slow_points(rng: np.random.Generator, noise: Noise, n: int = 150) -> Data:
     return Data(at, noise.root(data) @ rng.normal(size=n), data.series, data.labels, "1")
 
 
+@pytest.mark.slow
 def test_noise_and_discrepancy_are_found_again() -> None:
     truth = Noise(0.3, 1.0, 0.5)
     found = []
@@ -188,6 +189,7 @@ def test_several_experiments_are_fitted_at_once(tmp_path: Path) -> None:
     assert found.fit.n_tests == 0
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_about_as_often_as_they_say(tmp_path: Path) -> None:
     """The cheap representative of benchmarks/identify_recovery.py: no test of a worm is simulated."""
     inside = [

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium h
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-SIZES = ((1280, "light"), (400, "dark"))
+SIZES = (pytest.param((1280, "light"), marks=pytest.mark.slow), (400, "dark"))
 PAGES = ("index.html", "gait.html", "explanation/equations.html", "live_view.html", "reference/api/control.html")
 
 

@@ -250,7 +250,10 @@ def stand_in(test: FrameTest, config: RunConfig) -> dict[str, NDArray[np.float64
     assert isinstance(body, WormBody)
     x = np.concatenate([np.linspace(0, 0.3, 400), np.linspace(0.3, 0, 400)[1:]])
     friction = 0.0 if body.joints is None else 100 * body.joints.dry_friction_Nm
-    elastic = 30e-9 * body.strands.young_modulus_Pa * x + 0.1 * body.springs.stiffness_N_per_m * x**2
+    elastic = (
+        30e-9 * body.strands.one_number("young_modulus_Pa") * x
+        + 0.1 * body.springs.one_number("stiffness_N_per_m") * x**2
+    )
     return {"displacement_m": x, "tension_N": elastic + np.where(np.arange(len(x)) < 400, friction, -friction)}
 
 

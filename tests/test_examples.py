@@ -41,6 +41,7 @@ def test_setae_make_travel_of_breathing(tmp_path: Path) -> None:
     assert setae > 3.0 * abs(even)
 
 
+@pytest.mark.slow
 def test_a_wave_that_feels_the_ground_goes_round(tmp_path: Path) -> None:
     config = annelid.load_config("riddle2025-muscles", {"duration_s": 6.0})
     run = annelid.simulate(config, tmp_path, controller=example("felt_ground").Wave())
@@ -56,6 +57,7 @@ def test_the_course_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "after 1 s" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_way_through_a_taper_is_laid_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     example("through_a_taper").main(tmp_path, 1.0)
     table = capsys.readouterr().out
@@ -63,6 +65,7 @@ def test_the_way_through_a_taper_is_laid_side_by_side(tmp_path: Path, capsys: py
     assert "0.183" in table, "the bore and the clearance where the worm starts"
 
 
+@pytest.mark.slow
 def test_a_worm_learns_to_do_better_than_at_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     body = {"body.mesh.n_segments": 3, "body.mesh.n_helices": 6, "body.rings.peak_force_N": 16.0}
     cheap = {"changes": body | {"clock.physics_timestep_s": 0.04}, "episode_s": 2.4}
@@ -72,6 +75,7 @@ def test_a_worm_learns_to_do_better_than_at_first(tmp_path: Path, capsys: pytest
     assert (tmp_path / "learning_curve.png").stat().st_size > 5_000
 
 
+@pytest.mark.slow
 def test_the_best_gate_of_every_friction_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     module = example("sweep_friction_and_gate")
     vary = [
@@ -83,6 +87,7 @@ def test_the_best_gate_of_every_friction_is_told(tmp_path: Path, capsys: pytest.
     assert (tmp_path / "sweep.nc").exists()
 
 
+@pytest.mark.slow
 def test_the_body_sets_the_pace_of_a_stretch_controller(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     example("stretch_controller").main(tmp_path, 0.8)
     contractions = [int(line.split()[2]) for line in capsys.readouterr().out.splitlines()]
@@ -201,6 +206,7 @@ def test_slip_is_told_for_each_metre(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert 0 <= afloat <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_the_worm_crawls_alike_with_its_controller_in_c(tmp_path: Path) -> None:
     ours, theirs = (annelid.summary(run) for run in example("firmware_in_the_loop").main(tmp_path))

@@ -23,6 +23,8 @@ HOLDS: dict[str, Callable[[list[str]], bool]] = {
     "own_outputs": lambda lines: all(Path(line).stat().st_size > 20 for line in lines[-2:]),
 }
 """What an example's output must say, beyond that it runs."""
+FAST = ("own_arena", "own_outputs")
+"""Examples that run in a few seconds; only the slow tests run the others."""
 
 
 def number(line: str, pattern: str) -> float:
@@ -40,7 +42,7 @@ def answer(*command: str, path: Path | None = None) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("name", HOLDS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in FAST)) for name in HOLDS])
 def test_one_file_is_enough(name: str, tmp_path: Path) -> None:
     option = [OUTPUT[name]] if name in OUTPUT else []
     lines = answer(str(EXTEND / f"{name}.py"), *option, str(tmp_path)).splitlines()
@@ -85,6 +87,7 @@ def test_a_package_adds_a_kind_by_its_entry_point(installed: Path, monkeypatch: 
     assert told.splitlines() == ["1.0 [1.0, 0.0, 1.0]", "True"]
 
 
+@pytest.mark.slow
 def test_the_code_of_another_package_s_kind_is_part_of_a_kept_run_s_key(installed: Path) -> None:
     code = (
         "from annelid.experiment.case import Case\n"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import pi, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from annelid.analysis import lengthening_score, rhythm_score, summary
 from annelid.body import mesh_of
+from annelid.body.assemble import MOST_ORDERED_BODIES
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
-from annelid.experiment.similar import BASE, similar_worm, worm_text
+from annelid.experiment.similar import BASE, LARGEST_ANGLE_RAD, similar_worm, worm_text
 from annelid.plausibility import check
 from annelid.simulation.loop import simulate
 
@@ -78,6 +79,11 @@ def test_every_worm_passes_the_checks(
     length_m = stretched and stretched * mesh_length(worm(radius_m, n_segments, n_helices))
     config = worm(radius_m, n_segments, n_helices, length_m)
     assert check(config) == []
+    assert isinstance(config.body, WormBody)
+    strands_turn_rad = 2.0 * pi / n_helices / config.body.mesh.elements_per_side
+    assert strands_turn_rad <= LARGEST_ANGLE_RAD + 1e-9
+    # A vertex and an edge's twist of each element move.
+    assert 2 * len(mesh_of(config.body.mesh).vertices_m) < MOST_ORDERED_BODIES
     if length_m:
         assert mesh_length(config) == pytest.approx(length_m, rel=0.001)
 

@@ -124,6 +124,7 @@ def test_kicks_measure_what_the_adjoint_says():
     np.testing.assert_allclose(measured, cycle.phase_response[phases], atol=0.01 * np.abs(cycle.phase_response).max())
 
 
+@pytest.mark.slow
 def test_located_switches_carry_their_saltation_and_steps_lose_it():
     flow = Thermostat()
     period = np.log((3 - 1) / (3 - 2)) + np.log(2 / 1)

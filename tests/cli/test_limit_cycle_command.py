@@ -7,6 +7,7 @@ import pytest
 from outcome import Command
 
 
+@pytest.mark.slow
 def test_prints_period_and_multipliers_and_draws(annelid: Command) -> None:
     done = annelid("limit-cycle", "riddle2022-planar", "--segments", "4", "--time", "located", "-o", "cycle.png")
     assert done.exit_code == 0, done.err

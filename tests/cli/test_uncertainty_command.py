@@ -17,6 +17,7 @@ RODS = "riddle2023-rods"
 TINY = ("--duration", "0.1", "--no-video", "--jobs", "1")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("undrawn")
 def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command) -> None:
     command = ("run", RODS, "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")

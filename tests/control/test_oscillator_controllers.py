@@ -278,6 +278,7 @@ def quick_body(drive_level: float) -> RunConfig:
     return load_config("riddle2022-planar", {"controller": {"kind": "adaptive", "drive": drive_level}, **fast})
 
 
+@pytest.mark.slow
 def test_the_whole_worm_keeps_its_order_and_quickens_2_5_fold_with_the_drive(tmp_path: Path) -> None:
     periods = []
     for i, level in enumerate((0.0, 0.1, 0.4, 1.0)):

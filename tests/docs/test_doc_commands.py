@@ -108,7 +108,7 @@ ELSEWHERE = {
 }
 """Commands that are not executed here, and why."""
 
-FAST = ("README.md", "docs/start.md", "docs/how_to/continue_a_run.md", "docs/how_to/read_a_run.md")
+FAST = ("README.md", "docs/how_to/read_a_run.md")
 """Pages whose commands the fast tests execute; those of the others are understood there, and executed by the slow."""
 
 SCRIPTS_ELSEWHERE = {

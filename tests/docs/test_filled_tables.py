@@ -224,6 +224,7 @@ def test_a_table_of_numbers_without_markers_is_found() -> None:
     assert list(unfilled(PAGE.replace("-->\n\n", f"-->\n\n{table}\n"))) == []
 
 
+@pytest.mark.slow
 def test_a_list_of_runs_is_measured(tmp_path: Path) -> None:
     path = tmp_path / "planar.toml"
     path.write_text(

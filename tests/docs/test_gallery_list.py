@@ -79,6 +79,7 @@ def test_pictures_of_numbers_are_redrawn(tmp_path: Path, monkeypatch: pytest.Mon
     assert {path.read_bytes()[1:4] for path in (tmp_path / "made").iterdir()} == {b"PNG"}
 
 
+@pytest.mark.slow
 def test_a_worm_is_drawn_once_its_run_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     short = {"command": "annelid run riddle2022-planar --duration 0.2", "minutes": 0.1, "pages": []}
     listed = {"walk.png": short | {"maker": "frame", "time_s": 0.1}, "figure7.png": short | {"maker": "figure7"}}

@@ -66,6 +66,7 @@ def test_frequency_stays_monotone_when_the_constants_change(parameters: Peristal
     assert mean[0] / mean[-1] > 2.0
 
 
+@pytest.mark.slow
 def test_without_capacitance_the_period_is_that_of_slow_motion() -> None:
     """The gap to the limit closes in proportion to a power of the capacitance; at 1 % of it, within 1.5 %."""
     drives = np.array([0.2, 0.5, 1.0])

@@ -65,6 +65,7 @@ def chain_of(frequency_Hz: np.ndarray, amplitude: float, coupling: float, lag: f
 
 
 @settings(max_examples=15)
+@pytest.mark.slow
 @given(
     frequency=st.lists(st.floats(0.8, 1.2), min_size=2, max_size=5),
     amplitude=st.floats(0.5, 1.0),

@@ -153,6 +153,7 @@ def neighbour_s_share(build, stiffness: float) -> float:
     return float(drop[1] / drop[0])
 
 
+@pytest.mark.slow
 def test_contraction_spreads_to_the_neighbours_the_more_the_stiffer_daltorio_s_springs() -> None:
     shares = [neighbour_s_share(daltorio, stiffness) for stiffness in (0.0, 0.05, 0.2, 1.0)]
     assert shares[0] == pytest.approx(0.0, abs=1e-3)
@@ -186,6 +187,7 @@ def test_in_the_pipe_it_crawls_against_the_wave(changed: dict[str, Any]) -> None
     assert felt[-1].center_of_mass_m[0] < felt[0].center_of_mass_m[0] - 0.003
 
 
+@pytest.mark.slow
 def test_the_mirrored_wave_moves_the_worm_as_far_the_other_way() -> None:
     travelled = []
     for order in (slice(None), slice(None, None, -1)):

@@ -73,7 +73,7 @@ def test_published_periods(n, tau_ms, gain, scheme, period_ms):
     assert last_periods == pytest.approx([period_ms] * n, abs=3.0)
 
 
-@pytest.mark.parametrize("n", [4, 12])
+@pytest.mark.parametrize("n", [4, pytest.param(12, marks=pytest.mark.slow)])
 def test_other_numbers_of_segments_are_ordered_at_875_ms_a_segment(n):
     times = contraction_times_ms(n, 300, 1.3, 3.2 * n * 0.875)
     assert_ordered_cycles(times, 2)

@@ -86,6 +86,7 @@ def test_a_full_device_is_a_sentence(arguments: list[str]) -> None:
     assert "No space left on device" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_back_end_of_matplotlib_that_is_not_there_does_no_harm(tmp_path: Path) -> None:
     done = subprocess.run(
         [

@@ -101,6 +101,7 @@ def left_after(process: subprocess.Popen[str], number: signal.Signals) -> tuple[
     return [str(one) for one in left], time.monotonic() - began
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_killed_sweep(tmp_path: Path) -> None:
     with sweeping(tmp_path, "--cluster", "processes") as process:
         left, _ = left_after(process, signal.SIGKILL)

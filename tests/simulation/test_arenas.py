@@ -142,6 +142,7 @@ def breathing(arena: str, **changes: object) -> float:
     return places[-1] - places[0]
 
 
+@pytest.mark.slow
 def test_setae_rectify_a_breath_without_a_wave() -> None:
     forwards = breathing("setae")
     alike = breathing("setae", arena__backward_friction=0.3)

@@ -122,6 +122,7 @@ def test_each_worm_is_bit_for_bit_the_worm_that_runs_alone(variant: str, tmp_pat
         assert all(np.array_equal(expected[name], actual[name]) for name in expected)
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_and_of_worms_changes_nothing(tmp_path: Path) -> None:
     configs = [config(**own) for own in DIFFERENT[1:]] * 2
     one = simulate_batch(configs, tmp_path / "one", threads=1, progress=False)
@@ -198,6 +199,7 @@ def interrupt_at(time_s: float) -> Any:
     return interrupt
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_all_worms_and_each_can_be_continued_bit_for_bit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -102,6 +102,7 @@ def test_worms_of_all_headings_share_a_batch_and_a_model_and_are_their_single_ru
         assert_equal(result[number], simulate(one, tmp_path / f"alone-{number}", progress=False))
 
 
+@pytest.mark.slow
 def test_a_turned_run_is_told_forwards_and_goes_on_to_the_last_bit(tmp_path: Path) -> None:
     """Travel, speed and slip of worms that lead along x and along y, and back."""
     changes: dict[str, Any] = {

@@ -46,6 +46,7 @@ def test_a_continued_run_is_the_whole_run_bit_for_bit(turning: dict[str, Any], t
     assert_equal(rest, whole, len(open_run(tmp_path / "first").data["time"]))
 
 
+@pytest.mark.slow
 def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
     configs = [small_config(**turning) for turning in ({}, LEFT, HEADING)]
     result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)

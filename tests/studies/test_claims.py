@@ -74,7 +74,7 @@ def test_no_time_of_computing_enters_a_verdict(made: Outcome) -> None:
         assert cost_claim(Told({}, "quick", timed, fast)).verdict == "not testable here"
 
 
-@pytest.mark.parametrize("effort", ["quick", "full"])
+@pytest.mark.parametrize("effort", ["quick", pytest.param("full", marks=pytest.mark.slow)])
 def test_claims_find_their_numbers_and_miss_none_silently(
     effort: Effort, made: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

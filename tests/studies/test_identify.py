@@ -283,6 +283,7 @@ def test_a_study_of_one_loop_finds_the_worm_that_made_it(tmp_path: Path, monkeyp
     assert again.computed == 0
 
 
+@pytest.mark.slow
 def test_a_walk_identifies_the_gates_of_a_planar_worm(tmp_path: Path) -> None:
     from annelid.simulation.loop import simulate
 

@@ -473,6 +473,7 @@ def test_no_error_of_the_parameters_is_no_error_bar_and_costs_no_run(tiny: Uncer
         assert (ours.time_step, ours.discretization) == (theirs.time_step, theirs.discretization)
 
 
+@pytest.mark.slow
 def test_a_worm_without_weight_feels_its_strands_and_not_the_floor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -105,6 +105,7 @@ def test_mirror_segments_elongate_alike(bench: Bench) -> None:
     assert last.ring_length_m == pytest.approx(first.ring_length_m, rel=0.01)
 
 
+@pytest.mark.slow
 def test_without_weight_the_neighbours_stiffness_alone_holds_the_middle_back(bench: Bench) -> None:
     four = {"body.mesh.n_segments": 4, **weight_changes(0)}
     weightless = bench.deficit(force_limited(FORCE_N), **four)
@@ -122,6 +123,7 @@ def test_weight_on_a_rough_ground_weakens_the_middle_further(bench: Bench) -> No
     assert bench.deficit(usual, **{"body.pins.mass_kg": 0.02}) > base
 
 
+@pytest.mark.slow
 def test_a_force_limited_ring_stands_at_its_force_and_a_length_limited_one_at_its_length(bench: Bench) -> None:
     for segment in (1, 2):
         stalled = bench(segment, force_limited(FORCE_N))

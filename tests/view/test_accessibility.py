@@ -24,7 +24,11 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 SIZES = (pytest.param((1280, "light"), marks=pytest.mark.slow), (400, "dark"))
-PAGES = ("index.html", "gait.html", "explanation/equations.html", "live_view.html", "reference/api/control.html")
+LONG_PAGES = ("explanation/equations.html", "reference/api/control.html")
+PAGES = (
+    *("index.html", "gait.html", "live_view.html"),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in LONG_PAGES),
+)
 
 
 class QuietHandler(SimpleHTTPRequestHandler):
@@ -59,12 +63,12 @@ def too_wide(page: Page) -> list[str]:
     return [f"{wide} px wide in a window of {window} px"] if wide > window else []
 
 
-def test_the_site(page: Page, site: Path) -> None:
-    for name in PAGES:
-        page.goto((site / name).as_uri())
-        page.wait_for_timeout(300)
-        assert serious(page) == [], name
-        assert too_wide(page) == [], name
+@pytest.mark.parametrize("name", PAGES)
+def test_the_site(page: Page, site: Path, name: str) -> None:
+    page.goto((site / name).as_uri())
+    page.wait_for_timeout(300)
+    assert serious(page) == []
+    assert too_wide(page) == []
 
 
 def test_a_report(page: Page, tmp_path: Path) -> None:

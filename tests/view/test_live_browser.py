@@ -142,6 +142,7 @@ def test_a_clip_is_recorded_and_saved(live: tuple[Show, Page], tmp_path: Path) -
     assert (tmp_path / "clip.webm").read_bytes()[:4] == bytes.fromhex("1a45dfa3")
 
 
+@pytest.mark.slow
 def test_a_narrow_dark_screen_shows_worm_and_panel_side_by_side_and_sharp(
     live: tuple[Show, Page], browser: Browser
 ) -> None:
@@ -214,6 +215,7 @@ def test_another_page_gets_no_websocket_even_with_the_token(live: tuple[Show, Pa
     page.close()
 
 
+@pytest.mark.slow
 def test_a_run_is_played_the_same_way(browser: Browser, short_run: Run) -> None:
     with open_show(short_run) as show:
         page = browser.new_page(viewport=VIEW)  # type: ignore[arg-type]

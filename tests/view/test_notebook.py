@@ -132,6 +132,7 @@ def test_the_quick_start_is_a_notebook_without_outputs() -> None:
     assert nbformat.read(QUICK_START, as_version=4) == notebook
 
 
+@pytest.mark.slow
 def test_the_quick_start_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     cells = json.loads(QUICK_START.read_text(encoding="utf-8"))["cells"]

@@ -139,6 +139,7 @@ def test_a_still_is_on_white_and_its_rings_are_red_or_as_active() -> None:
     assert red(None) > 50
 
 
+@pytest.mark.slow
 @needs_gl
 def test_figures_4_and_8_are_rendered(rods_run: Run, tmp_path: Path) -> None:
     captions = [

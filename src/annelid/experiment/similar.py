@@ -23,6 +23,8 @@ BASE = "riddle2023-rods"
 """The preset that new worms are similar to."""
 LARGEST_ANGLE_RAD = pi / 6
 """Largest angle by which a strand may turn in one element."""
+MOST_ELEMENTS = 3900
+"""Most elements of all strands: two moving bodies each, and the engine is slow above 8,192."""
 LEAST_SHAPE, MOST_SHAPE = 1.2, 4.0
 """Turn of a strand along one radius of the axis, rad, within which a length is accepted; the base's is 2.24."""
 CYCLES = 4
@@ -66,7 +68,8 @@ def similar_worm(
     slower = sqrt(scale)
     planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m)
     turn = pi / (n_helices // 2)
-    elements = max(known.mesh.elements_per_side, ceil(turn / LARGEST_ANGLE_RAD - 1e-9))
+    sides = n_helices * (planes * (n_segments + 1))
+    elements = max(ceil(turn / LARGEST_ANGLE_RAD - 1e-9), min(known.mesh.elements_per_side, MOST_ELEMENTS // sides))
     shape, own = rhombus_of(known), rhombus(n_helices, radius_m, rate, elements)
     # Of a rhombus of strands as thick as the side asks for, the weight goes with side^3 and the force that bends them
     # with E side^2: a modulus in proportion to the side keeps their ratio.
@@ -81,7 +84,10 @@ def similar_worm(
     of_length = "the length asked for" if length_m else "rhombi of the base's shape"
     fields: Fields = {f"body.mesh.{name}": (value, "as asked") for name, value in geometry.items()} | {
         "body.mesh.angular_rate_rad_per_m": (rate, of_length),
-        "body.mesh.elements_per_side": (elements, "a strand turns by 30 degrees in an element at most"),
+        "body.mesh.elements_per_side": (
+            elements,
+            "the base's; a strand turns by 30 degrees in one at most, and the engine slows above 3,900",
+        ),
         "body.mesh.planes_between_rings": (planes, "rhombi close to the base's shape"),
         "body.mesh.free_planes_at_ends": (planes - 1, "one less than between rings"),
         "body.mesh.rear_overhang_m": (turn / rate / 2.0, "half the distance of two planes"),

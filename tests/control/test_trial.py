@@ -241,7 +241,7 @@ def test_a_push_is_to_the_left_and_ends(tmp_path: Path) -> None:
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"trial.weak_segment = 4: must be in 1 .. 3"):
         load_config("riddle2023-rods", {"trial.weak_segment": 4})
-    with pytest.raises(ConfigError, match=r"trial.push_N = 1: a planar worm"):
+    with pytest.raises(ConfigError, match=r"trial.push_N = 1: body.kind = 'riddle2022' cannot be pushed"):
         load_config("riddle2022-planar", {"trial.push_N": 1.0})
     with pytest.raises(ConfigError, match=r"trial.loss.*1.5"):
         load_config("riddle2023-rods", {"trial.loss": 1.5})

@@ -101,6 +101,9 @@ ELSEWHERE = {
     ("annelid", "gallery"): "tests/docs/test_gallery.py calls it",
     ("annelid", "export-network", "network.toml"): "tests/cli/test_commands.py exports such a file",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
+    ("annelid", "run", "my_robot.xml"): "a robot of the reader's own; tests/body/test_mjcf.py runs some",
+    ("annelid", "run", "robot.xml"): "the same",
+    ("annelid", "build", "my_robot.xml"): "the same",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
     ("annelid", "run", "mine/calibrated.toml"): "the file is what a fit found",
     ("annelid", "render", "course", "--time"): "its run is that of the page's example, which takes minutes",
@@ -183,7 +186,7 @@ def check_annelid(command: Command) -> None:
         assert words[1] in ANNELID.commands
         return
     name, given = parsed(words[1:])
-    if "preset" in given and not given.get("resume") and not str(given["preset"]).endswith(".toml"):
+    if "preset" in given and not given.get("resume") and not str(given["preset"]).endswith((".toml", ".xml")):
         options = {"duration_s": given.get("duration"), "seed": given.get("seed")}
         overrides = overrides_of(given.get("assignments"), **options)
         arena = given.get("arena")

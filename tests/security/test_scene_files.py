@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from annelid.arena.mjcf import MOST_BYTES, MOST_FILE_BYTES, read_scene
+from annelid.arena.grammar import MOST_BYTES, MOST_FILE_BYTES
+from annelid.arena.mjcf import read_mjcf
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
 
@@ -113,7 +114,7 @@ def test_the_text_of_a_configuration_opens_no_file(tmp_path: Path, monkeypatch: 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "m.obj").write_text(OBJ)
     (tmp_path / "scene.xml").write_text(meshed("m.obj"))
-    assert "file=" not in read_scene(tmp_path / "scene.xml")
+    assert "file=" not in read_mjcf(tmp_path / "scene.xml")
     with pytest.raises(ConfigError, match="cannot have this attribute"):
         load_config("crawler", {"arena": {"kind": "scene", "xml": meshed("m.obj")}})
     for field in ("file", "path", "source"):
@@ -171,13 +172,13 @@ def test_a_link_within_the_folder_and_a_folder_of_meshes_are_fine(tmp_path: Path
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "real.obj").write_text(OBJ)
     (tmp_path / "scene.xml").write_text(meshed("real.obj", "meshes"))
-    there = read_scene(tmp_path / "scene.xml")
+    there = read_mjcf(tmp_path / "scene.xml")
     assert there.count("face=") == 1
     assert "meshdir" not in there
     if sys.platform != "win32":
         (tmp_path / "m.obj").symlink_to(tmp_path / "meshes" / "real.obj")
         (tmp_path / "scene.xml").write_text(meshed("m.obj"))
-        assert "face=" in read_scene(tmp_path / "scene.xml")
+        assert "face=" in read_mjcf(tmp_path / "scene.xml")
 
 
 def stl(n: int, said: int | None = None) -> bytes:

@@ -96,7 +96,7 @@ def track_of(run: Run) -> Track:
     """
     body, data = run.config.body, run.data
     if not isinstance(body, WormBody):
-        raise RunFileError(f"{run.path} holds a planar worm, which crawls along a line and has no track")
+        raise RunFileError(f"{run.path} has no track: only the 3D worm (body.kind = 'worm') records one")
     if data.sizes.get("frame", 0) < 2 or "crossing_position" not in data:
         raise RunFileError(f"{run.path} holds fewer than two recorded postures, and so no track")
     mesh = body.mesh

@@ -104,28 +104,33 @@ def add_box(spec: mujoco.MjSpec, arena: ArenaKind, place_m: Array, half_size_m: 
     )
 
 
-def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
-    """Adds the arena to look at, below a sky and a light, to the spec of a worm of a length.
-
-    Floors have a faint checkerboard of 10 cm squares, and walls of pipes are seen through. Floors and guard rails are
-    unbounded planes, posts cylinders; relief and pipes are shapes to see, and hidden panels that can be touched.
-    """
+def add_looks(spec: mujoco.MjSpec, length_m: float, *, shadows: bool = True, prefix: str = "") -> None:
+    """Adds a sky, a light and the material ``floor``, a faint checkerboard of 10 cm squares, named with a prefix."""
     kinds, looks = mujoco.mjtTexture, mujoco.mjtBuiltin
     for name, kind, look, (first, second), size in (
-        ("sky", kinds.mjTEXTURE_SKYBOX, looks.mjBUILTIN_GRADIENT, SKY, 64),
-        ("floor", kinds.mjTEXTURE_2D, looks.mjBUILTIN_CHECKER, CHECKER, 128),
+        (f"{prefix}sky", kinds.mjTEXTURE_SKYBOX, looks.mjBUILTIN_GRADIENT, SKY, 64),
+        (f"{prefix}floor", kinds.mjTEXTURE_2D, looks.mjBUILTIN_CHECKER, CHECKER, 128),
     ):
         spec.add_texture(name=name, type=kind, builtin=look, rgb1=first, rgb2=second, width=size, height=size)
-    material = spec.add_material(name="floor", texrepeat=[5.0, 5.0], texuniform=True)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "floor"
+    material = spec.add_material(name=f"{prefix}floor", texrepeat=[5.0, 5.0], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"{prefix}floor"
     spec.worldbody.add_light(
-        name="lamp",
+        name=f"{prefix}lamp",
         pos=[length_m / 2, -1.0, 2.5],
         dir=[0.0, 0.35, -1.0],
         diffuse=[0.7, 0.7, 0.7],
-        # The engine would let walls that are seen through cast the shadow of solid ones.
-        castshadow=not arena.is_closed and arena.walls == Walls(),
+        castshadow=shadows,
     )
+
+
+def add_scenery(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
+    """Adds the arena to look at, below a sky and a light, to the spec of a worm of a length.
+
+    Walls of pipes are seen through. Floors and guard rails are unbounded planes, posts cylinders; relief and pipes are
+    shapes to see, and hidden panels that can be touched.
+    """
+    # The engine would let walls that are seen through cast the shadow of solid ones.
+    add_looks(spec, length_m, shadows=not arena.is_closed and arena.walls == Walls())
     if arena.is_scene:
         arena.add_own(spec)
         return

@@ -1,8 +1,9 @@
-"""Reads a scene, the static ground and the movable things of an MJCF file, as data: what may be in it is listed here.
+"""Reads MJCF, a scene or a whole robot, as data: what may be in it is listed here.
 
-A scene is one text without references: what its file takes from other files is written into the text when it is read
-(`read_scene`), and whatever comes out of a configuration or a run file is checked again before the engine sees it
-(`checked`). The engine parses no text that has not passed, and opens no file.
+A scene is static ground and movable things, a robot has actuators and sensors too. Either is one text without
+references: what its file takes from other files is written into the text when it is read (`read_mjcf`), and whatever
+comes out of a configuration or a run file is checked again before the engine sees it (`checked`). The engine parses no
+text that has not passed, and opens no file.
 """
 
 from __future__ import annotations
@@ -17,97 +18,52 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.cables import write_out
+from annelid.arena.grammar import (
+    CHOICES,
+    INSTEAD,
+    LARGEST,
+    LARGEST_OF,
+    MOST_BYTES,
+    MOST_FILE_BYTES,
+    MOST_OBJECTS,
+    MOST_PIXELS,
+    MOST_SAMPLES,
+    MOST_VERTICES,
+    NAMES,
+    ROBOT,
+    SCENE,
+    SINGLE,
+    WITHIN,
+    Grammar,
+)
 from annelid.errors import ConfigError, listed, shortened, shown
 from annelid.protocols import Array
 from annelid.text import is_line
 from annelid.textfiles import read_bytes
 
-MOST_BYTES = 1_000_000
-"""Of a scene as one text."""
-MOST_FILE_BYTES = 4_000_000
-"""Of a mesh or a picture that it takes from a file."""
-MOST_ELEMENTS, MOST_LEVELS = 2_000, 24
-MOST_VERTICES, MOST_SAMPLES, MOST_PIXELS = 20_000, 250_000, 1024
-"""Of all meshes together, of all height fields together, and along the side of a texture, or of all as one square."""
-MOST_OBJECTS = 16
-"""Things that move: the force of the worm on each is measured at every part of its skin."""
-LARGEST = 1e6
-"""Of any number: beyond it nothing is a length, a mass or a stiffness in SI units."""
-
-_TURN = "quat axisangle euler xyaxes zaxis"
-_GEOM = (
-    f"name class type size pos fromto {_TURN} mass density friction solref solimp solmix priority condim contype "
-    "conaffinity group rgba material mesh hfield shellinertia fitscale"
-)
-_JOINT = (
-    "name class type pos axis range limited stiffness springref damping frictionloss armature ref solreflimit "
-    "solimplimit solreffriction solimpfriction"
-)
-_MESH = "name class vertex face scale refpos refquat inertia smoothnormal maxhullvert"
-_MATERIAL = "name class texture texrepeat texuniform rgba emission specular shininess reflectance"
-_THINGS = "body geom frame"
-_ALLOWED = {
-    "mujoco": ("compiler default asset worldbody", "model"),
-    "compiler": ("", "angle eulerseq autolimits"),
-    "default": ("default geom joint mesh material", "class"),
-    "asset": ("mesh hfield texture material", ""),
-    "mesh": ("", _MESH),
-    "hfield": ("", "name nrow ncol size elevation"),
-    "texture": ("", "name type builtin rgb1 rgb2 mark markrgb random width height"),
-    "material": ("", _MATERIAL),
-    "worldbody": (_THINGS, ""),
-    "frame": (_THINGS, f"name childclass pos {_TURN}"),
-    "body": (f"{_THINGS} inertial joint freejoint", f"name childclass pos {_TURN}"),
-    "inertial": ("", f"pos {_TURN} mass diaginertia fullinertia"),
-    "joint": ("", _JOINT),
-    "freejoint": ("", "name"),
-    "geom": ("", _GEOM),
-}
-"""Elements, each with those that may be in it and its attributes."""
 _FILES = {"mesh": ("file", (".obj", ".stl")), "hfield": ("file", (".png",))}
 _FOLDERS = ("meshdir", "assetdir")
-_NAMES = frozenset(["name", "class", "childclass", "mesh", "hfield", "material", "texture", "model"])
-_WORDS = ["type", "builtin", "mark", "inertia", "angle", "eulerseq"]
-_CHOICES = frozenset([*_WORDS, "autolimits", "limited", "smoothnormal", "texuniform", "shellinertia"])
-_SINGLE = frozenset(["stiffness", "mass", "density", "nrow", "ncol", "width", "height", "maxhullvert"])
-_INSTEAD = {
-    "include": "write its content into the file",
-    "option": "gravity, step and friction cone are fields of the configuration (arena.gravity_m_per_s2, "
-    "clock.physics_timestep_s, arena.friction_cone)",
-    "size": "the engine finds the sizes itself",
-    "extension": "plug-ins are code",
-    "plugin": "plug-ins are code",
-    "light": "pictures have a light of their own",
-    "camera": "pictures have views of their own (--camera)",
-    "visual": "pictures have a look of their own",
-    "statistic": "pictures have a scale of their own",
-    "actuator": "nothing drives the things of a scene but the worm, gravity and springs",
-    "keyframe": "a scene starts as it is written",
-    "sensor": "annelid records the things that move itself",
-    "replicate": "write out what it repeats",
-    "tendon": "use the stiffness of joints",
-    "equality": "use joints",
-    "contact": "use contype and conaffinity",
-}
-"""What to do without an element that MJCF has and a scene has not."""
 
 
 class _Builder(ET.TreeBuilder):
     """Builds the tree of a text that is bounded in elements and depth and has no document type, hence no entities."""
 
-    def __init__(self) -> None:
+    def __init__(self, grammar: Grammar) -> None:
         super().__init__()
+        self._grammar = grammar
         self._elements = self._level = 0
 
     def doctype(self, *_: object) -> None:
-        raise ConfigError("has a document type (<!DOCTYPE ..>), which a scene cannot have: remove it")
+        raise ConfigError(f"has a document type (<!DOCTYPE ..>), which {self._grammar.what} cannot have: remove it")
 
     def start(self, tag: str, attrs: dict[str, str]) -> ET.Element:  # pyright: ignore[reportIncompatibleMethodOverride]
         self._elements, self._level = self._elements + 1, self._level + 1
-        if self._elements > MOST_ELEMENTS:
-            raise ConfigError(f"has more than {MOST_ELEMENTS:,} elements, the most of a scene")
-        if self._level > MOST_LEVELS:
-            raise ConfigError(f"is nested deeper than {MOST_LEVELS} levels, the most of a scene")
+        what, most, deepest = self._grammar.what, self._grammar.most_elements, self._grammar.most_levels
+        if self._elements > most:
+            raise ConfigError(f"has more than {most:,} elements, the most of {what}")
+        if self._level > deepest:
+            raise ConfigError(f"is nested deeper than {deepest} levels, the most of {what}")
         return super().start(tag, attrs)
 
     def end(self, tag: str) -> ET.Element:
@@ -115,37 +71,42 @@ class _Builder(ET.TreeBuilder):
         return super().end(tag)
 
 
-def read_scene(path: Path) -> str:
+def read_mjcf(path: Path, grammar: Grammar = SCENE) -> str:
     """Reads an MJCF file and the files that it names, beside it or below its folder, as one text without references.
 
     Raises:
-        ConfigError: A file cannot be read, lies elsewhere or is too large, or the scene is not what `checked` allows.
+        ConfigError: A file cannot be read, lies elsewhere or is too large, or the text is not what `checked` allows.
     """
-    content = read_bytes(path, "the scene", MOST_BYTES)
+    content = read_bytes(path, f"the file of {grammar.what}", MOST_BYTES)
     try:
-        root = _parsed(content)
+        root = _parsed(content, grammar)
         folder = _take_folder(root)
+        if grammar is ROBOT:
+            write_out(root, _given)
+        _leave_out(root, grammar)
         for element in root.iterfind("asset/*"):
             if element.tag in _FILES and "file" in element.attrib:
                 _write_in(element, path.parent, folder)
-        return checked(ET.tostring(root, encoding="unicode"))
+        return checked(ET.tostring(root, encoding="unicode"), grammar)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
 
 
-def checked(text: str) -> str:
-    """Checks a scene and returns it as the engine gets it: its elements and attributes alone, and movable bodies named.
+def checked(text: str, grammar: Grammar = SCENE) -> str:
+    """Checks a text and returns it as the engine gets it: elements and attributes alone, a scene's objects named.
 
     Raises:
-        ConfigError: It is too long, no XML, or has an element, an attribute or a value that a scene cannot have.
+        ConfigError: It is too long, no XML, or has an element, an attribute or a value that it cannot have.
     """
     if len(text) > MOST_BYTES:
-        raise ConfigError(f"is too long: more than {MOST_BYTES / 1e6:g} MB of text, meshes included, are no scene")
-    root = _parsed(text)
+        raise ConfigError(f"is too long: {grammar.what} has at most {MOST_BYTES / 1e6:g} MB of text, meshes included")
+    root = _parsed(text, grammar)
     if root.tag != "mujoco":
         raise ConfigError(f"begins with <{shortened(root.tag)}>: an MJCF file begins with <mujoco>")
-    _check(root)
+    _check(root, grammar)
     _check_sizes(root)
+    if grammar is not SCENE:
+        return ET.tostring(root, encoding="unicode")
     for world in root.iterfind("worldbody"):
         _check_motion(world, moving=False)
     objects = list(_movable(root))
@@ -157,6 +118,19 @@ def checked(text: str) -> str:
         if "name" not in body.attrib:
             body.set("name", next(free))
     return ET.tostring(root, encoding="unicode")
+
+
+def names_in(text: str, grammar: Grammar, section: str) -> tuple[str, ...]:
+    """Returns the names of the elements of a section (``actuator``) of a text that is `checked`, in its order."""
+    root = _parsed(text, grammar)
+    return tuple(element.attrib["name"] for element in root.iterfind(f"{section}/*") if "name" in element.attrib)
+
+
+def stated_in(text: str, grammar: Grammar, section: str, name: str) -> str | None:
+    """Returns what a text that is `checked` states last as an attribute of a section; None where it does not."""
+    return next(
+        (one.attrib[name] for one in reversed(_parsed(text, grammar).findall(section)) if name in one.attrib), None
+    )
 
 
 def object_names(text: str) -> tuple[str, ...]:
@@ -178,8 +152,8 @@ def with_contact(text: str, contact: dict[str, str]) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def _parsed(text: str | bytes) -> ET.Element:
-    parser = ET.XMLParser(target=_Builder())
+def _parsed(text: str | bytes, grammar: Grammar = SCENE) -> ET.Element:
+    parser = ET.XMLParser(target=_Builder(grammar))
     try:
         parser.feed(text)
         return parser.close()
@@ -187,42 +161,57 @@ def _parsed(text: str | bytes) -> ET.Element:
         raise ConfigError(f"is not valid XML: {shortened(str(error))}") from None
 
 
-def _check(element: ET.Element) -> None:
-    inner, attributes = (names.split() for names in _ALLOWED[element.tag])
+def _leave_out(root: ET.Element, grammar: Grammar) -> None:
+    """Takes out what the engine needs not: looks, and sensors that nothing reads."""
+    for parent in list(root.iter()):
+        unread = grammar is ROBOT and parent.tag == "sensor"
+        for child in list(parent):
+            if child.tag in grammar.ignored or (unread and child.tag not in grammar.allowed["sensor"][0].split()):
+                parent.remove(child)
+
+
+def _check(element: ET.Element, grammar: Grammar, above: tuple[str, ...] = ()) -> None:
+    here = (*above, element.tag)
+    within = next((names for end, names in WITHIN.items() if grammar is ROBOT and here[-len(end) :] == end), None)
+    inner, attributes = ("", within) if within is not None else grammar.allowed[element.tag]
     for name, value in element.attrib.items():
-        if name not in attributes:
+        if name not in attributes.split():
             raise ConfigError(
-                f"<{element.tag} {shortened(name)}=..>: a scene cannot have this attribute; valid: "
-                f"{listed(sorted(attributes)) or 'none'}"
+                f"<{element.tag} {shortened(name)}=..>: {grammar.what} cannot have this attribute; valid: "
+                f"{listed(sorted(attributes.split())) or 'none'}"
             )
-        _check_value(element.tag, name, value)
+        _check_value(element.tag, name, value, grammar)
     # What stands between the elements means nothing to the engine.
     element.text = element.tail = None
     for child in element:
-        if child.tag not in inner:
-            instead = f"; {_INSTEAD[child.tag]}" if child.tag in _INSTEAD else ""
+        if child.tag not in inner.split():
+            instead = f"; {INSTEAD[child.tag]}" if child.tag in INSTEAD and child.tag not in grammar.allowed else ""
             raise ConfigError(
-                f"<{element.tag}> has <{shortened(child.tag)}>, which a scene cannot have{instead}. Valid there: "
-                f"{listed(sorted(inner)) or 'nothing'}"
+                f"<{element.tag}> has <{shortened(child.tag)}>, which {grammar.what} cannot have{instead}. Valid "
+                f"there: {listed(sorted(inner.split())) or 'nothing'}"
             )
-        _check(child)
+        _check(child, grammar, here)
 
 
-def _check_value(tag: str, name: str, value: str) -> None:
-    if name in _NAMES:
-        if not is_line(value) or len(value) > 100 or "/" in value:
+def _check_value(tag: str, name: str, value: str, grammar: Grammar) -> None:
+    if name in NAMES or name == "body":
+        # A flex names the body of each of its vertices.
+        if any(
+            not is_line(one) or len(one) > 100 or "/" in one for one in (value.split() if name == "body" else [value])
+        ):
             raise ConfigError(f"<{tag} {name}={shown(value)}>: must be at most 100 printable characters without '/'")
-    elif name in _CHOICES:
+    elif name in CHOICES or (tag, name) == ("flag", "gravity"):
         if not value.isalnum() or len(value) > 20 or value == "sdf":
-            raise ConfigError(f"<{tag} {name}={shown(value)}>: a scene cannot have this value")
+            raise ConfigError(f"<{tag} {name}={shown(value)}>: {grammar.what} cannot have this value")
     else:
-        numbers = _numbers(value)
-        if numbers is None or not len(numbers) or (len(numbers) > 1 and name in _SINGLE):
-            wanted = "one number" if name in _SINGLE else "numbers"
-            raise ConfigError(f"<{tag} {name}={shown(value)}>: must be {wanted} of at most {LARGEST:g}")
+        largest = LARGEST_OF.get(name, LARGEST)
+        numbers = _numbers(value, largest)
+        if numbers is None or not len(numbers) or (len(numbers) > 1 and name in SINGLE):
+            wanted = "one number" if name in SINGLE else "numbers"
+            raise ConfigError(f"<{tag} {name}={shown(value)}>: must be {wanted} of at most {largest:g}")
 
 
-def _numbers(value: str) -> list[float] | None:
+def _numbers(value: str, largest: float = LARGEST) -> list[float] | None:
     """Returns the numbers of an attribute, None where it has anything else."""
     try:
         numbers = [float(word) for word in value.split()]
@@ -230,7 +219,16 @@ def _numbers(value: str) -> list[float] | None:
         return None
     # Python also reads 1_000 and digits of other scripts, the engine does not.
     plain = value.isascii() and "_" not in value
-    return numbers if plain and all(isfinite(number) and abs(number) <= LARGEST for number in numbers) else None
+    return numbers if plain and all(isfinite(number) and abs(number) <= largest for number in numbers) else None
+
+
+def _given(element: ET.Element, name: str, default: str) -> list[float]:
+    """Returns the numbers of an attribute that is read here and not by the engine."""
+    value = element.get(name, default)
+    numbers = _numbers(value, LARGEST_OF.get(name, LARGEST))
+    if not numbers:
+        raise ConfigError(f"<{element.tag} {name}={shown(value)}>: must be numbers")
+    return numbers
 
 
 def _check_sizes(root: ET.Element) -> None:

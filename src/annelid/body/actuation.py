@@ -59,7 +59,7 @@ def add_springs(spec: mujoco.MjSpec, geometry: MeshGeometry, springs: Springs) -
         )
         for crossing in ends:
             tendon.wrap_site(crossing_site(crossing))
-        _add_length_sensor(spec, f"spring_{index}")
+        add_length_sensor(spec, f"spring_{index}")
 
 
 def stretch_sensors(geometry: MeshGeometry, springs: Springs) -> Indices:
@@ -89,7 +89,7 @@ def add_ring_actuators(spec: mujoco.MjSpec, geometry: MeshGeometry, rings: Actua
             for crossing in path:
                 tendon.wrap_site(crossing_site(crossing))
             rings.add(spec, name, [bound / len(paths) for bound in span], force)
-            _add_length_sensor(spec, name)
+            add_length_sensor(spec, name)
             sensor, actuator = mujoco.mjtSensor.mjSENS_ACTUATORFRC, mujoco.mjtObj.mjOBJ_ACTUATOR
             spec.add_sensor(name=f"{name}_force", type=sensor, objtype=actuator, objname=name)
 
@@ -106,10 +106,10 @@ def _ring_paths(geometry: MeshGeometry, segment: int, rings: ActuatorKind) -> li
     return sorted(halves, key=lambda path: geometry.crossings_m[path, 1].mean())
 
 
-def _add_length_sensor(spec: mujoco.MjSpec, tendon: str) -> None:
+def add_length_sensor(spec: mujoco.MjSpec, tendon: str, name: str | None = None) -> None:
     """Adds the engine's own sensor of a tendon's length, for users of the written MJCF."""
     sensor = mujoco.mjtSensor.mjSENS_TENDONPOS
-    spec.add_sensor(name=f"{tendon}_length", type=sensor, objtype=mujoco.mjtObj.mjOBJ_TENDON, objname=tendon)
+    spec.add_sensor(name=name or f"{tendon}_length", type=sensor, objtype=mujoco.mjtObj.mjOBJ_TENDON, objname=tendon)
 
 
 def add_joint_friction(spec: mujoco.MjSpec, geometry: MeshGeometry, joints: Joints) -> None:

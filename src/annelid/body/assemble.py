@@ -11,7 +11,13 @@ import numpy as np
 
 from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
 from annelid.arena.surface import gravity_of
-from annelid.body.actuation import add_joint_friction, add_ring_actuators, add_springs
+from annelid.body.actuation import (
+    add_joint_friction,
+    add_length_sensor,
+    add_ring_actuators,
+    add_springs,
+    stretch_sensors,
+)
 from annelid.body.damping import stiffen
 from annelid.body.elimination import order_elimination
 from annelid.body.worm import Mesh, WormBody
@@ -124,6 +130,8 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
         ConfigError: The body is planar or starts with a heading, friction depends on the direction, or the engine
             refuses the model.
     """
+    if config.body.own_model is not None:
+        return config.body.own_model.xml
     if config.arena is not None and config.arena.has_setae:
         raise ConfigError(
             f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
@@ -141,6 +149,10 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             f"body.heading_deg = {config.body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
             "frames of turned rods: set it to 0, or run the worm with annelid"
         )
+    # The springs that annelid senses, by the names under which it drives a robot of one's own.
+    for segment, springs in enumerate(stretch_sensors(mesh_of(config.body.mesh), config.body.springs)):
+        for number, spring in enumerate(springs):
+            add_length_sensor(spec, f"spring_{spring}", f"stretch_{segment}_{number}")
     at_rest = config.body.rings.act_at_rest(spec)
     rest = [{"name": "rest", "act": at_rest}] if len(at_rest) else []
     for keyframe in (*rest, *keyframes):

@@ -220,6 +220,7 @@ class WormBody(BodyKind):
         ("wang", "the robot that the 3D worm is a model of"),
     )
     needs_arena: ClassVar[bool] = True
+    can_be_pushed: ClassVar[bool] = True
     has_skin: ClassVar[bool] = True
     segment_fields: ClassVar[tuple[str, ...]] = ("relative_friction",)
     heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(

@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
 """What runs where no preset is named: the paper's worm with its soft crossings, or the one with rigid crossings."""
+WORM = "Name of a preset, a TOML file, or a robot as MJCF (.xml)."
 
 Preset = Annotated[
     str | None,
     typer.Argument(
-        help=f"Name of a preset, or a TOML file.  [default: {FIRST_PRESET}; with --segments, --fidelity or"
-        f" --uncertainty {RIGID_PRESET}]",
+        help=f"{WORM}  [default: {FIRST_PRESET}; with --segments, --fidelity or --uncertainty {RIGID_PRESET}]",
         metavar="[PRESET|FILE.toml]",
     ),
 ]
-NamedPreset = Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.", metavar="[PRESET|FILE.toml]")]
+NamedPreset = Annotated[str, typer.Argument(help=WORM, metavar="[PRESET|FILE.toml]")]
 Assignments = Annotated[
     list[str] | None,
     typer.Option(

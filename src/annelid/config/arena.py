@@ -12,8 +12,6 @@ from annelid.config.sections import Impedance, NonNegative, Positive
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import mujoco
 
     from annelid.arena.course import Bore, Course
@@ -43,14 +41,12 @@ class ArenaKind(Kind):
     Attributes:
         is_closed: Whether its walls surround the worm; they are drawn so that one sees through them.
         is_scene: Whether all that the skin touches comes from `add_own`, as geoms that the engine collides with it.
-        suffix: Ending of the files that it is read from by `read`; empty for none.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("arena.kind", "annelid.arena.kinds")
     default: ClassVar[str] = "floor"
     is_closed: ClassVar[bool] = False
     is_scene: ClassVar[bool] = False
-    suffix: ClassVar[str] = ""
 
     friction: Friction = Field(default=1.0, description="coefficient of sliding friction")
     backward_friction: Friction | None = Field(
@@ -66,15 +62,6 @@ class ArenaKind(Kind):
         description="elliptic: friction is alike in every direction of sliding; pyramidal: it is weaker by 16 % at 45 "
         "degrees to the world's axes",
     )
-
-    @classmethod
-    def read(cls, path: Path) -> dict[str, Any]:
-        """Reads the fields of the section from a file of the kind's `suffix` that the user has named.
-
-        Raises:
-            ConfigError: The file cannot be read, or is no such arena.
-        """
-        raise NotImplementedError
 
     @property
     def has_setae(self) -> bool:

@@ -21,6 +21,8 @@ from annelid.errors import ConfigError
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from annelid.config.run import RunConfig
     from annelid.control.open_loop import Contraction
     from annelid.control.turning import Steering
@@ -70,6 +72,7 @@ class Kind(Section):
         default: Kind of the family that is meant where none is named.
         cites: Publications that it rests on: keys of ``annelid/data/references.bib`` or of `bibtex`, and what for.
         bibtex: Entries of its own, BibTeX, separated by empty lines.
+        suffix: Ending of the files that it is read from by `from_file`; empty for none.
         kind: Its name: a subclass makes it ``Literal["name"] = "name"``.
 
     Raises:
@@ -80,6 +83,7 @@ class Kind(Section):
     default: ClassVar[str]
     cites: ClassVar[tuple[tuple[str, str], ...]] = ()
     bibtex: ClassVar[str] = ""
+    suffix: ClassVar[str] = ""
     kind: Any
 
     @classmethod
@@ -88,6 +92,15 @@ class Kind(Section):
         name = cls.model_fields["kind"].default if "kind" in get_annotations(cls) else None
         if isinstance(name, str):
             cls.registry.add(name, cls)
+
+    @classmethod
+    def from_file(cls, path: Path) -> dict[str, Any]:
+        """Reads tables of a configuration, by name, from a file of the kind's `suffix` that the user has named.
+
+        Raises:
+            ConfigError: The file cannot be read, or describes no such thing.
+        """
+        raise NotImplementedError
 
     def check_with(self, config: RunConfig) -> None:
         """Checks the section against the rest of a configuration.
@@ -178,6 +191,18 @@ class TurningKind(Kind):
         """
 
 
+class OwnModel(NamedTuple):
+    """A robot that a file describes whole.
+
+    Attributes:
+        xml: The robot and its ground as MJCF.
+        actuators: Names of the actuators of its segments, segment by segment.
+    """
+
+    xml: str
+    actuators: tuple[str, ...]
+
+
 class BodyKind(Kind):
     """Base of the bodies' sections.
 
@@ -186,15 +211,19 @@ class BodyKind(Kind):
         is_planar: Whether it is a planar worm: rhombi in a row.
         has_skin: Whether the sides of its segments feel touch.
         touches_ground: Whether anything of the body bears on a ground or a wall.
+        can_be_pushed: Whether a trial may push it.
         n_segments: Actuated segments.
     """
 
-    registry: ClassVar[Registry[type[Any]]] = Registry("body.kind", "annelid.body.worm", "annelid.planar")
+    registry: ClassVar[Registry[type[Any]]] = Registry(
+        "body.kind", "annelid.body.worm", "annelid.body.mjcf", "annelid.planar"
+    )
     default: ClassVar[str] = "worm"
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
     touches_ground: ClassVar[bool] = True
+    can_be_pushed: ClassVar[bool] = False
 
     def refuse_fidelity(self, level: str) -> None:
         """Refuses a level of fidelity (`annelid.config.fidelity`) where it was not measured.
@@ -209,6 +238,11 @@ class BodyKind(Kind):
     @property
     def wall_distance_m(self) -> float | None:
         """Distance of the walls that a planar worm crawls between; None where there are none."""
+        return None
+
+    @property
+    def own_model(self) -> OwnModel | None:
+        """The model of a robot that a file describes whole; None where annelid builds it."""
         return None
 
     if TYPE_CHECKING:
@@ -243,6 +277,11 @@ def kinds_of(family: type[Family]) -> dict[str, type[Family]]:
     kinds = sorted(family.registry.all().items(), key=lambda known: known[0] != family.default)
     # A field may admit one kind alone.
     return {name: kind for name, kind in kinds if issubclass(kind, family)}
+
+
+def kind_of_file(family: type[Family], path: str | Path) -> type[Family] | None:
+    """Returns the kind of a family that is read from files of a path's ending; None where there is none."""
+    return next((kind for kind in kinds_of(family).values() if kind.suffix and str(path).endswith(kind.suffix)), None)
 
 
 def every_kind() -> list[type[Kind]]:

@@ -13,7 +13,7 @@ from typing import Any
 from annelid.config.arena import SHARED, ArenaKind
 from annelid.config.checking import check_config, field_value, whole_path
 from annelid.config.fidelity import HOME, RESOLUTION, find_level
-from annelid.config.kinds import kinds_of
+from annelid.config.kinds import BodyKind, kind_of_file
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
@@ -104,7 +104,7 @@ def load_config(
     """Loads a preset, a TOML file or a mapping, applies overrides, and checks all of it.
 
     Args:
-        source: Name of a preset, path of a TOML file (recognised by its suffix ``.toml``), or nested mapping.
+        source: Name of a preset, path of a TOML file or of a robot as MJCF (``.toml``, ``.xml``), or nested mapping.
             A file or mapping may name a preset or another file to start from with ``extends``; a file that
             neither does so nor states ``body.kind`` starts from ``riddle2023-rods``.
         overrides: Values by dotted path, for example ``{"body.mesh.n_segments": 4}``; whole sections too. The
@@ -166,11 +166,9 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
 
 def _arena_instead(present: Any, name: str | Path) -> dict[str, Any]:
     """Returns the table of another arena, with the fields of every arena from the present one where it has none."""
-    reader = next(
-        (kind for kind in kinds_of(ArenaKind).values() if kind.suffix and str(name).endswith(kind.suffix)), None
-    )
+    reader = kind_of_file(ArenaKind, name)
     if reader is not None:
-        stated = reader.read(Path(name))
+        stated = reader.from_file(Path(name)).get("arena")
     elif str(name).endswith(".toml"):
         stated = read_toml(Path(name)).get("arena")
     else:
@@ -213,6 +211,9 @@ def _layers(
     if isinstance(source, Mapping):
         check_depth(source, "the configuration")
         name, own = "", dict(source)
+    elif (reader := kind_of_file(BodyKind, source)) is not None:
+        path = Path(source)
+        return [(shown(path.name), {"name": path.stem, **reader.from_file(path)})]
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
         # Without line breaks, so that it stands in a comment.
@@ -232,7 +233,7 @@ def _layers(
     if base is None:
         return [(name, own)]
     if not isinstance(base, str):
-        raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML file")
+        raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML or MJCF file")
     return [*_layers(base, above), (name, own)]
 
 

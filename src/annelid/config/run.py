@@ -122,8 +122,10 @@ class Trial(Section):
                 f"trial.weak_segment = {self.weak_segment}: must be in 1 .. {config.body.n_segments}, the segments of "
                 "the body"
             )
-        if self.push_N and config.body.is_planar:
-            raise ValueError(f"trial.push_N = {self.push_N:g}: a planar worm cannot be pushed; leave it at 0")
+        if self.push_N and not config.body.can_be_pushed:
+            raise ValueError(
+                f"trial.push_N = {self.push_N:g}: body.kind = {config.body.kind!r} cannot be pushed; leave it at 0"
+            )
 
     def blinded(self, config: RunConfig) -> RunConfig:
         """Returns what a blind controller may know of a configuration."""

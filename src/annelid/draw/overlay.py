@@ -102,11 +102,11 @@ class Overlay:
                     )
                 )
                 still.append(_bar(figure, right - share, right, over, ink))
-                legend = _legend(figure, entries, len(entries), look, plate)
+                legend = _legend(figure, entries, max(1, len(entries)), look, plate)
                 if legend.get_window_extent(drawn.get_renderer()).width > width:
                     legend.remove()
                     legend = _legend(figure, entries, math.ceil(len(entries) / 2), look, plate)
-                still.append(legend)
+                still += [legend] if entries else []
             drawn.draw()
         self._height = height
         self._still = [self._cut(artist) for artist in still]

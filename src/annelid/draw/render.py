@@ -25,8 +25,20 @@ if TYPE_CHECKING:
     from annelid.draw.planar_scene import PlanarScene
     from annelid.draw.scene import WormScene
 
-FRAME_SIZE = {"worm": (1280, 800), "riddle2022": (1280, 560), "daltorio2013": (1280, 320), "boxerbaum2012": (1280, 320)}
-VIDEO_SIZE = {"worm": (960, 544), "riddle2022": (960, 432), "daltorio2013": (960, 256), "boxerbaum2012": (960, 256)}
+FRAME_SIZE = {
+    "worm": (1280, 800),
+    "mjcf": (1280, 800),
+    "riddle2022": (1280, 560),
+    "daltorio2013": (1280, 320),
+    "boxerbaum2012": (1280, 320),
+}
+VIDEO_SIZE = {
+    "worm": (960, 544),
+    "mjcf": (960, 544),
+    "riddle2022": (960, 432),
+    "daltorio2013": (960, 256),
+    "boxerbaum2012": (960, 256),
+}
 """Width and height in pixels by the kind of body; a video's are multiples of 16, as its codec likes them."""
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 STRIP_SUFFIXES = (".png", ".pdf", ".svg")

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site
 from annelid.body.formulations.rods.net import STRAND_RGBA
@@ -37,6 +38,9 @@ DRAWN_WIDTH = 1 / 0.16  # tendons have the width that they are built with where 
 LARGEST_BALL = 0.005 / 0.16  # radius of the ball that is drawn at a crossing, in radii of the worm at rest
 SMALLEST_BALL = 1.4  # the same, in radii of the strands, which would hide it
 LINK = 0.45  # radius of the bars in a soft crossing, in radii of its ball
+FACETS = (28, 16)  # round parts of a robot may be large
+LOOKS = "annelid/"
+"""What the names of sky, light and floor begin with in a robot's model, as none of its file does."""
 WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
 WAYPOINT_HALF_HEIGHT_M = 1e-3
 
@@ -88,7 +92,7 @@ class DrawnWorm:
     def add_links(self, scene: mujoco.MjvScene) -> None:
         """Adds a bar for each soft connection of a crossing, from one of its ends to the other."""
         model, posture = self.model, self.posture
-        radius_m = LINK * float(model.geom_size[self._balls, 0].min())
+        radius_m = LINK * float(model.geom_size[self._balls, 0].min(initial=math.inf))
         capsule, rgba = mujoco.mjtGeom.mjGEOM_CAPSULE.value, np.array(self._behind.ball, dtype=np.float32)
         for link in self._links.tolist():
             ends = [
@@ -128,6 +132,56 @@ class DrawnWorm:
         middles, axes = posture.geom_xpos[parts], posture.geom_xmat[parts].reshape(-1, 3, 3)[:, :, 2]
         reach = half_lengths[:, None] * axes
         return np.concatenate([middles - reach, middles + reach])
+
+
+class DrawnRobot(DrawnWorm):
+    """A robot of one's own likewise; what its file gives no look has the looks of a worm and its ground."""
+
+    def __init__(self, config: RunConfig, background: str = "floor") -> None:
+        robot = config.body.own_model
+        assert robot is not None
+        self._behind, self.upright = background_of(background), np.eye(3)
+        spec = mujoco.MjSpec.from_string(robot.xml)
+        alone = spec.copy().compile()
+        add_looks(spec, float(alone.stat.extent), prefix=LOOKS)
+        for geom, moves in zip(spec.geoms, alone.body_weldid[alone.geom_bodyid] > 0, strict=True):
+            if geom.material or not np.allclose(geom.rgba, PLAIN_RGBA):
+                continue
+            if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+                geom.material = f"{LOOKS}floor"
+            else:
+                geom.rgba = STRAND_RGBA[0] if moves else GROUND_RGBA
+        colours = [list(tendon.rgba) for tendon in spec.tendons]
+        _light(spec, self._behind, f"{LOOKS}floor")
+        spec.visual.quality.numslices, spec.visual.quality.numstacks = FACETS
+        for tendon, rgba in zip(spec.tendons, colours, strict=True):
+            tendon.rgba = SPRING_RGBA if np.allclose(rgba, PLAIN_RGBA) else rgba
+        self.model = model = spec.compile()
+        self.posture = mujoco.MjData(model)
+        self._links = self._balls = np.zeros(0, dtype=np.int64)
+        self._in_scene = model.body_weldid == 0
+        pulled = [(model.actuator(name).trntype[0], model.actuator(name).trnid[0]) for name in robot.actuators]
+        by_tendon = all(kind == mujoco.mjtTrn.mjTRN_TENDON.value for kind, _ in pulled)
+        self._rings = [int(tendon) for _, tendon in pulled] if by_tendon else []
+        self._widths = model.tendon_width[self._rings]
+
+    def pose(self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None = None) -> None:
+        """Brings all that is drawn into a posture, as `DrawnWorm.pose`; joints that contract have no colour."""
+        super().pose(qpos, activation if self._rings else None)
+
+    def part_ends(self, qpos: NDArray[np.floating]) -> Array:
+        """Corners of boxes about all parts in a posture, m, ``(point, 3)``."""
+        model, posture = self.model, self.posture
+        parts = np.flatnonzero(~self._in_scene[model.geom_bodyid])
+        posture.qpos[:] = qpos
+        mujoco.mj_kinematics(model, posture)
+        reach = np.vstack([np.eye(3), -np.eye(3)])[:, None] * model.geom_rbound[parts][None, :, None]
+        return (posture.geom_xpos[parts] + reach).reshape(-1, 3)
+
+    def legend(self) -> list[Entry]:
+        """What the colours of rings mean, where there are any."""
+        states = (("relaxed", 0), ("contracted", 1)) if self._rings else ()
+        return [(f"ring, {name}", activation_color(at), "line") for name, at in states]
 
 
 class _Scene(Canvas):
@@ -182,15 +236,16 @@ class WormScene(_Scene):
         background: str = "floor",
         words: bool = True,
     ) -> None:
-        assert isinstance(run.config.body, WormBody)
-        angles = view_angles(camera, run.config.body.heading_deg)
-        worm = DrawnWorm(run.config, background)
+        body = run.config.body
+        angles = view_angles(camera, body.heading_deg if isinstance(body, WormBody) else 0.0)
+        worm = DrawnWorm(run.config, background) if isinstance(body, WormBody) else DrawnRobot(run.config, background)
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
         self._activation = run.data["activation"]
         points = np.stack([worm.part_ends(qpos) for qpos in self._qpos])
         box_middle = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
-        self._target = run.data["crossing_position"].values.mean(axis=1)
+        seen = run.data["crossing_position"].values if "crossing_position" in run.data else points
+        self._target = seen.mean(axis=1)
         self._target[:, 2] = box_middle[2]
         if camera in FIXED:
             self._target[:] = box_middle
@@ -375,7 +430,7 @@ def _set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
     model.vis.map.fogstart, model.vis.map.fogend = start_m / model.stat.extent, end_m / model.stat.extent
 
 
-def _light(spec: mujoco.MjSpec, behind: Background) -> None:
+def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> None:
     """Gives a model a picture's lens and light, and its floor a colour."""
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
@@ -386,7 +441,7 @@ def _light(spec: mujoco.MjSpec, behind: Background) -> None:
         setattr(visual.quality, name, number)
     visual.rgba.fog = [*behind.haze, 1.0]
     if behind.floor is not None:
-        floor = spec.material("floor")
+        floor = spec.material(material)
         floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = ""
         floor.rgba = [*behind.floor, 1.0]
     visual.map.fogstart, visual.map.fogend = 4.0, 12.0

@@ -105,7 +105,7 @@ def write_mjcf(run: Run, path: Path) -> Path:
     from annelid.simulation.worm import WormPlant
 
     keyframes: list[dict[str, Any]] = []
-    if not run.config.body.is_planar:
+    if not run.config.body.is_planar and run.config.body.own_model is None:
         plant = WormPlant(run.config)
         try:
             plant.set_state(read_checkpoint(run.path).plant)

@@ -79,7 +79,7 @@ def _figures(run: Run, folder: Path, progress: Progress) -> list[str]:
         ("frame.png", lambda run, path: render_frame(run, middle, path), f"The worm at {middle:g} s."),
         ("figure7.png", figure7, "Potentials of the half-centres, contractions, and lengths of the stretch sensors."),
     ]
-    if not run.config.body.is_planar:
+    if "crossing_position" in run.data:
         pictures.append(("track.png", track_figure, "Where it crawled, seen from above."))
     blocks = ["## Figures"]
     for done, (name, draw, caption) in enumerate(pictures, start=1):

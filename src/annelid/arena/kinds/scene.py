@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
 from annelid.arena.course import UP
-from annelid.arena.mjcf import checked, object_names, read_scene, with_contact
+from annelid.arena.mjcf import checked, object_names, read_mjcf, with_contact
 from annelid.arena.surface import Plane, Surface
 from annelid.config.arena import ArenaKind
 from annelid.config.sections import NonNegative
@@ -32,7 +32,7 @@ def _scene(text: str) -> str:
 class Scene(ArenaKind):
     """Ground and movable things of an MJCF file.
 
-    The text is the whole scene: it refers to no file. What the file has from others, `read` has written into it.
+    The text is the whole scene: it refers to no file. What the file has from others, `from_file` has written into it.
     """
 
     kind: Literal["scene"] = "scene"
@@ -46,9 +46,9 @@ class Scene(ArenaKind):
     )
 
     @classmethod
-    def read(cls, path: Path) -> dict[str, str]:
+    def from_file(cls, path: Path) -> dict[str, Any]:
         """Reads a scene and the files that it names beside it."""
-        return {"kind": "scene", "xml": read_scene(path)}
+        return {"arena": {"kind": "scene", "xml": read_mjcf(path)}}
 
     @property
     def has_moving_planes(self) -> bool:

@@ -1,0 +1,106 @@
+"""Cables of MJCF that was written for MuJoCo up to version 3, as chains of bodies, which version 4 takes.
+
+Those versions had a macro for a row of bodies (``<composite type="cable">``) and a plug-in that bends and twists it.
+Here it becomes the same row: capsules between the vertices, each on three hinges whose springs are those of a round rod
+of the plug-in's moduli E and G, E pi r^4 / (4 L) and G pi r^4 / (2 L), straight in the posture of the file.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
+
+from annelid.errors import ConfigError, shown
+from annelid.protocols import Array
+
+PLUGIN = "mujoco.elasticity.cable"
+MOST_VERTICES = 2_000
+"""Of one cable."""
+Numbers = Callable[[ET.Element, str, str], list[float]]
+"""Reads the numbers of an attribute, or of a default in its place; `ConfigError` where it has anything else."""
+
+
+def write_out(root: ET.Element, numbers: Numbers) -> None:
+    """Replaces every cable of a model by its bodies, named ``<prefix>B_first``, ``B_1`` .. ``B_last`` as the macro did.
+
+    Raises:
+        ConfigError: A composite is no cable with vertices, or a number is missing or none.
+    """
+    for parent in list(root.iter()):
+        for place, child in enumerate(list(parent)):
+            if child.tag == "composite":
+                parent.remove(child)
+                parent.insert(place, _row(child, numbers))
+    for extension in root.findall("extension"):
+        if all(plugin.get("plugin") == PLUGIN for plugin in extension):
+            root.remove(extension)
+
+
+def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
+    prefix, initial = cable.get("prefix", ""), cable.get("initial", "none")
+    if cable.get("type") != "cable" or not cable.get("vertex") or initial not in ("none", "free"):
+        raise ConfigError(
+            f"<composite prefix={shown(prefix)}>: only a cable can be read, type='cable' with vertex=.. and "
+            "initial='none' or 'free'"
+        )
+    given = numbers(cable, "vertex", "")
+    if len(given) % 3 or not 9 <= len(given) <= 3 * MOST_VERTICES:
+        raise ConfigError(
+            f"<composite prefix={shown(prefix)}>: vertex must have three numbers of each of 3 to {MOST_VERTICES:,} "
+            "places"
+        )
+    joint, geom = (_only(cable, tag) for tag in ("joint", "geom"))
+    config = {one.get("key", ""): one for one in cable.iterfind("plugin/config")}
+    bend_Pa, twist_Pa = (numbers(config[key], "value", "")[0] if key in config else 0.0 for key in ("bend", "twist"))
+    radius_m = numbers(geom, "size", "0.005")[0]
+    look = {name: value for name, value in geom.attrib.items() if name not in ("type", "size")}
+    friction = {name: joint.attrib[name] for name in ("armature", "damping", "frictionloss") if name in joint.attrib}
+    vertices, offset = np.array(given).reshape(-1, 3), np.array(numbers(cable, "offset", "0 0 0"))
+    edges = np.diff(vertices, axis=0)
+    if offset.shape != (3,) or not np.linalg.norm(edges, axis=1).all():
+        raise ConfigError(
+            f"<composite prefix={shown(prefix)}>: offset must be three numbers, and no two vertices alike"
+        )
+    places = [vertices[0] + offset, *edges[:-1]]
+    first = element = None
+    for number, (place, edge) in enumerate(zip(places, edges, strict=True)):
+        name = "B_first" if number == 0 else "B_last" if number == len(edges) - 1 else f"B_{number}"
+        body = ET.Element("body", {"name": f"{prefix}{name}", "pos": _text(place)})
+        if element is None:
+            first = body
+            if initial == "free":
+                ET.SubElement(body, "freejoint")
+        else:
+            element.append(body)
+            length_m = float(np.linalg.norm(edge))
+            bend, twist = bend_Pa * pi * radius_m**4 / 4 / length_m, twist_Pa * pi * radius_m**4 / 2 / length_m
+            for axis, spring in zip(_axes(edge / length_m), (twist, bend, bend), strict=True):
+                hinge = {"type": "hinge", "axis": _text(axis), "stiffness": f"{spring:.9g}"}
+                ET.SubElement(body, "joint", {**hinge, **friction})
+        ET.SubElement(
+            body, "geom", {**look, "type": "capsule", "fromto": f"0 0 0 {_text(edge)}", "size": f"{radius_m:g}"}
+        )
+        element = body
+    assert first is not None
+    return first
+
+
+def _only(cable: ET.Element, tag: str) -> ET.Element:
+    found = cable.findall(tag)
+    return found[0] if found else ET.Element(tag)
+
+
+def _axes(along: Array) -> tuple[Array, Array, Array]:
+    """A unit vector and two across it, all at right angles."""
+    least = np.eye(3)[np.argmin(np.abs(along))]
+    across = least - along * (along @ least)
+    across /= np.linalg.norm(across)
+    x, y = along, across
+    return along, across, np.array([x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]])
+
+
+def _text(numbers: Array) -> str:
+    return " ".join(f"{number:.9g}" for number in numbers)

@@ -248,6 +248,7 @@ def test_every_command_is_executed_somewhere() -> None:
 def test_what_takes_seconds_is_executed(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(ROOT / "examples")
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
     # Runs draw nothing here: what they would draw has tests of its own, and takes longer than the run.
     monkeypatch.setattr("annelid.draw.gallery.draw_all", lambda *_, **__: [])
     for name, text in READERS_FILES.items():

@@ -98,5 +98,5 @@ def test_rings_of_a_run_are_those_of_its_mesh(tmp_path: Path) -> None:
 
 def test_planar_worms_have_no_track(tmp_path: Path) -> None:
     run = simulate(load_config("riddle2022-planar", {"duration_s": 0.1}), tmp_path / "run", progress=False)
-    with pytest.raises(RunFileError, match="holds a planar worm"):
+    with pytest.raises(RunFileError, match="has no track: only the 3D worm"):
         track_of(run)

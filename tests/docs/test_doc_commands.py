@@ -101,7 +101,7 @@ ELSEWHERE = {
     ("annelid", "gallery"): "tests/docs/test_gallery.py calls it",
     ("annelid", "export-network", "network.toml"): "tests/cli/test_commands.py exports such a file",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
-    ("annelid", "run", "my_robot.xml"): "a robot of the reader's own; tests/body/test_mjcf.py runs some",
+    ("annelid", "run", "my_robot.xml"): "a robot of the reader's own; tests/body/test_own_robot.py runs some",
     ("annelid", "run", "robot.xml"): "the same",
     ("annelid", "build", "my_robot.xml"): "the same",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",

@@ -32,7 +32,7 @@ def test_the_track_has_the_worm_its_front_and_its_waypoints(tmp_path: Path, pict
 
 
 def test_it_refuses_what_has_no_track(rods_run: Run, planar_run: Run, picture: Path) -> None:
-    with pytest.raises(RunFileError, match="planar worm"):
+    with pytest.raises(RunFileError, match="only the 3D worm"):
         track_figure(planar_run, picture)
     short = replace(rods_run, data=rods_run.data.isel(frame=slice(1)))
     with pytest.raises(RunFileError, match="fewer than two recorded postures"):

@@ -92,7 +92,7 @@ def track_of(run: Run) -> Track:
     """Reads the track of a 3D worm from its run.
 
     Raises:
-        RunFileError: A planar worm, or fewer than two recorded postures.
+        RunFileError: The run is of another body than the 3D worm, or has fewer than two recorded postures.
     """
     body, data = run.config.body, run.data
     if not isinstance(body, WormBody):

@@ -103,10 +103,9 @@ def test_activation_goes_from_rest_to_the_hardest_pull(motor: str, joint: str, f
     assert pulled.stretch_m[0, 0] < 0.0
 
 
-def test_the_ground_carries_every_segment_at_rest() -> None:
+def test_the_ground_carries_the_robot_at_rest() -> None:
     plant = plant_of(robot())
     sensed = held(plant, 0.0, 2000)
-    # Four balls in a row hang on one beam; the first two are the first segment's.
     assert sensed.contact_force_N[:, 2].sum() == pytest.approx(0.8 * 9.81, rel=0.01)
     assert plant.alarm() is None
 
@@ -159,7 +158,7 @@ REFUSED = {
     ),
     "no sensor": (EXAMPLE, {"sensors": ["s_{segment}"]}, "no sensor named 's_1'; it has stretch_1"),
     "no place": (EXAMPLE, {"actuators": ["ring"]}, r"must have \{segment\} once"),
-    "nothing moves": (
+    "no actuator": (
         '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>',
         {},
         "no actuator named ring_1; it has none",
@@ -199,6 +198,9 @@ def test_an_actuator_that_is_no_ring_is_refused(xml: str, words: str) -> None:
         ('<composite type="cable" prefix="c" vertex="0 0 0 1 1"/>', "three numbers"),
         (f'<composite type="cable" prefix="c" vertex="{"1 " * 9}"/>', "no two vertices alike"),
         (f'<composite type="cable" prefix="c" vertex="{"x " * 9}"/>', "must be numbers"),
+        (f'<composite type="cable" prefix="c" vertex="{"1 " * 900}"/>', "of each of 3 to 180 places"),
+        ('<composite type="cable" prefix="c" vertex="0" quat="1 0 0 0"/>', "<composite quat=..>: a cable cannot"),
+        ('<composite type="cable" prefix="c" vertex="0"><plugin plugin="x"/></composite>', "others are code"),
     ],
 )
 def test_a_composite_that_is_no_cable_is_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -13,12 +13,18 @@ from math import pi
 
 import numpy as np
 
-from annelid.errors import ConfigError, shown
+from annelid.errors import ConfigError, listed, shortened, shown
 from annelid.protocols import Array
 
 PLUGIN = "mujoco.elasticity.cable"
-MOST_VERTICES = 2_000
-"""Of one cable."""
+MOST_VERTICES = 180
+"""Of one cable, whose bodies lie within one another."""
+TAKEN = {
+    "composite": frozenset(["type", "prefix", "initial", "vertex", "offset"]),
+    "joint": frozenset(["kind", "armature", "damping", "frictionloss"]),
+    "plugin": frozenset(["plugin"]),
+}
+"""Attributes of a cable's elements that are understood; those of its geom are the capsules'."""
 Numbers = Callable[[ET.Element, str, str], list[float]]
 """Reads the numbers of an attribute, or of a default in its place; `ConfigError` where it has anything else."""
 
@@ -46,6 +52,16 @@ def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
             f"<composite prefix={shown(prefix)}>: only a cable can be read, type='cable' with vertex=.. and "
             "initial='none' or 'free'"
         )
+    for element in cable.iter():
+        if unknown := element.attrib.keys() - TAKEN.get(element.tag, element.attrib.keys()):
+            name, valid = sorted(unknown)[0], listed(sorted(TAKEN[element.tag]))
+            raise ConfigError(
+                f"<{element.tag} {shortened(name)}=..>: a cable cannot have this attribute; valid: {valid}"
+            )
+    if any(plugin.get("plugin") != PLUGIN for plugin in cable.iterfind("plugin")):
+        raise ConfigError(
+            f"<composite prefix={shown(prefix)}>: the one plug-in of a cable is {PLUGIN}; others are code"
+        )
     given = numbers(cable, "vertex", "")
     if len(given) % 3 or not 9 <= len(given) <= 3 * MOST_VERTICES:
         raise ConfigError(
@@ -57,7 +73,7 @@ def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
     bend_Pa, twist_Pa = (numbers(config[key], "value", "")[0] if key in config else 0.0 for key in ("bend", "twist"))
     radius_m = numbers(geom, "size", "0.005")[0]
     look = {name: value for name, value in geom.attrib.items() if name not in ("type", "size")}
-    friction = {name: joint.attrib[name] for name in ("armature", "damping", "frictionloss") if name in joint.attrib}
+    friction = {name: value for name, value in joint.attrib.items() if name != "kind"}
     vertices, offset = np.array(given).reshape(-1, 3), np.array(numbers(cable, "offset", "0 0 0"))
     edges = np.diff(vertices, axis=0)
     if offset.shape != (3,) or not np.linalg.norm(edges, axis=1).all():

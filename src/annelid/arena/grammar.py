@@ -49,7 +49,11 @@ _ALLOWED = {
 }
 """Elements, each with those that may be in it and its attributes."""
 _SOFTNESS = "solref solimp"
-_POINTS = "site geom pulley"
+_TENDON = (
+    "class limited range stiffness damping frictionloss springlength margin solreflimit solimplimit solreffriction "
+    "solimpfriction"
+)
+_ONE_TENDON = "name group armature actuatorfrcrange actuatorfrclimited"
 _TRANSMISSION = "name class group joint tendon site refsite gear ctrllimited ctrlrange forcelimited forcerange"
 _ACTIVE = f"{_TRANSMISSION} lengthrange actlimited actrange dyntype dynprm actdim actearly"
 _MUSCLE = "timeconst tausmooth range force scale lmin lmax vmax fpmax fvmax"
@@ -85,21 +89,9 @@ _ROBOT = _ALLOWED | {
     "equality": ("connect weld joint tendon flex", _SOFTNESS),
     "connect": ("", f"name class active body1 body2 anchor site1 site2 {_SOFTNESS}"),
     "weld": ("", f"name class active body1 body2 anchor relpose torquescale site1 site2 {_SOFTNESS}"),
-    "tendon": (
-        "spatial fixed",
-        "class limited range width rgba stiffness damping frictionloss springlength margin solreflimit solimplimit "
-        "solreffriction solimpfriction",
-    ),
-    "spatial": (
-        _POINTS,
-        "name class group limited range width rgba material stiffness damping frictionloss springlength armature "
-        "margin solreflimit solimplimit solreffriction solimpfriction actuatorfrcrange actuatorfrclimited",
-    ),
-    "fixed": (
-        "joint",
-        "name class group limited range stiffness damping frictionloss springlength armature margin solreflimit "
-        "solimplimit solreffriction solimpfriction actuatorfrcrange actuatorfrclimited",
-    ),
+    "tendon": ("spatial fixed", f"{_TENDON} width rgba"),
+    "spatial": ("site geom pulley", f"{_TENDON} {_ONE_TENDON} width rgba material"),
+    "fixed": ("joint", f"{_TENDON} {_ONE_TENDON}"),
     "pulley": ("", "divisor"),
     "actuator": ("general motor position muscle", ""),
     "general": ("", f"{_ACTIVE} gaintype gainprm biastype biasprm"),

@@ -1,4 +1,4 @@
-"""Reads MJCF, a scene or a whole robot, as data: what may be in it is listed here.
+"""Reads MJCF, a scene or a whole robot, as data: what may be in it is listed in `annelid.arena.grammar`.
 
 A scene is static ground and movable things, a robot has actuators and sensors too. Either is one text without
 references: what its file takes from other files is written into the text when it is read (`read_mjcf`), and whatever
@@ -9,7 +9,7 @@ text that has not passed, and opens no file.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from itertools import pairwise
 from math import isfinite
@@ -118,6 +118,18 @@ def checked(text: str, grammar: Grammar = SCENE) -> str:
         if "name" not in body.attrib:
             body.set("name", next(free))
     return ET.tostring(root, encoding="unicode")
+
+
+def validator(grammar: Grammar) -> Callable[[str], str]:
+    """Returns `checked` for a field of a configuration, which raises ValueError."""
+
+    def valid(text: str) -> str:
+        try:
+            return checked(text, grammar)
+        except ConfigError as error:
+            raise ValueError(str(error)) from None
+
+    return valid
 
 
 def names_in(text: str, grammar: Grammar, section: str) -> tuple[str, ...]:

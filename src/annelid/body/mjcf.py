@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from annelid.arena.grammar import ROBOT
-from annelid.arena.mjcf import checked, names_in, read_mjcf, stated_in
+from annelid.arena.mjcf import names_in, read_mjcf, stated_in, validator
 from annelid.config.kinds import BodyKind, OwnModel
 from annelid.config.sections import Line
-from annelid.errors import ConfigError, listed, shown
+from annelid.errors import listed, shown
 
 if TYPE_CHECKING:
     from annelid.config.run import RunConfig
@@ -34,13 +34,6 @@ EXAMPLE = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" 
 PLACE = "{segment}"
 
 
-def _robot(text: str) -> str:
-    try:
-        return checked(text, ROBOT)
-    except ConfigError as error:
-        raise ValueError(str(error)) from None
-
-
 def _pattern(text: str) -> str:
     if text.count(PLACE) != 1:
         raise ValueError(f"{shown(text)}: must have {PLACE} once, where the number of the segment stands")
@@ -59,7 +52,7 @@ class MjcfBody(BodyKind):
 
     suffix: ClassVar[str] = ".xml"
     kind: Literal["mjcf"] = "mjcf"
-    xml: Annotated[str, AfterValidator(_robot)] = Field(
+    xml: Annotated[str, AfterValidator(validator(ROBOT))] = Field(
         default=EXAMPLE, description="the robot and its ground as MJCF, at most 1 MB; annelid run robot.xml reads one"
     )
     actuators: Annotated[tuple[Pattern, ...], Field(min_length=1, max_length=2)] = Field(

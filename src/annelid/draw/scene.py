@@ -59,6 +59,8 @@ class DrawnWorm:
         self._behind = background_of(background)
         spec = build_spec(config)
         _light(spec, self._behind)
+        for tendon in spec.tendons:
+            tendon.rgba = SPRING_RGBA
         _mark_waypoints(spec, config)
         self.model = model = spec.compile()
         self._has_waypoints = config.turning is not None and bool(config.turning.goals.points_m)
@@ -142,20 +144,22 @@ class DrawnRobot(DrawnWorm):
         assert robot is not None
         self._behind, self.upright = background_of(background), np.eye(3)
         spec = mujoco.MjSpec.from_string(robot.xml)
+        for number, geom in enumerate(spec.geoms):
+            geom.name = geom.name or f"{LOOKS}{number}"
         alone = spec.copy().compile()
         add_looks(spec, float(alone.stat.extent), prefix=LOOKS)
-        for geom, moves in zip(spec.geoms, alone.body_weldid[alone.geom_bodyid] > 0, strict=True):
+        for geom in spec.geoms:
             if geom.material or not np.allclose(geom.rgba, PLAIN_RGBA):
                 continue
             if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
                 geom.material = f"{LOOKS}floor"
             else:
+                moves = alone.body_weldid[alone.geom(geom.name).bodyid[0]] > 0
                 geom.rgba = STRAND_RGBA[0] if moves else GROUND_RGBA
-        colours = [list(tendon.rgba) for tendon in spec.tendons]
         _light(spec, self._behind, f"{LOOKS}floor")
         spec.visual.quality.numslices, spec.visual.quality.numstacks = FACETS
-        for tendon, rgba in zip(spec.tendons, colours, strict=True):
-            tendon.rgba = SPRING_RGBA if np.allclose(rgba, PLAIN_RGBA) else rgba
+        for tendon in spec.tendons:
+            tendon.rgba = SPRING_RGBA if np.allclose(tendon.rgba, PLAIN_RGBA) else tendon.rgba
         self.model = model = spec.compile()
         self.posture = mujoco.MjData(model)
         self._links = self._balls = np.zeros(0, dtype=np.int64)
@@ -449,8 +453,6 @@ def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> 
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         light.diffuse = [0.4] * 3
         light.specular = [0.1] * 3
-    for tendon in spec.tendons:
-        tendon.rgba = SPRING_RGBA
 
 
 def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:

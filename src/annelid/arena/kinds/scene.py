@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from annelid.arena.course import UP
-from annelid.arena.mjcf import checked, object_names, read_mjcf, with_contact
+from annelid.arena.grammar import SCENE
+from annelid.arena.mjcf import object_names, read_mjcf, validator, with_contact
 from annelid.arena.surface import Plane, Surface
 from annelid.config.arena import ArenaKind
 from annelid.config.sections import NonNegative
-from annelid.errors import ConfigError
 
 if TYPE_CHECKING:
     import mujoco
@@ -20,13 +20,6 @@ if TYPE_CHECKING:
     from annelid.config.run import RunConfig
 
 FLOOR = '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1" /></worldbody></mujoco>'
-
-
-def _scene(text: str) -> str:
-    try:
-        return checked(text)
-    except ConfigError as error:
-        raise ValueError(str(error)) from None
 
 
 class Scene(ArenaKind):
@@ -38,7 +31,7 @@ class Scene(ArenaKind):
     kind: Literal["scene"] = "scene"
     suffix: ClassVar[str] = ".xml"
     is_scene: ClassVar[bool] = True
-    xml: Annotated[str, AfterValidator(_scene)] = Field(
+    xml: Annotated[str, AfterValidator(validator(SCENE))] = Field(
         default=FLOOR, description="the scene as MJCF without files, at most 1 MB; --arena scene.xml reads one"
     )
     floor_gap_m: NonNegative = Field(

@@ -82,6 +82,30 @@ def test_a_servo_winds_below_its_force_limit_holds_at_it_and_lets_go_at_once(sla
     assert speed(0.0, slack_m, taut_m + load * stretch_m) == SPEED_M_PER_S
 
 
+@given(backlash_m=st.floats(0.0, 0.05), commands=st.lists(activations, min_size=1, max_size=20))
+def test_backlash_is_play_between_command_and_cable(backlash_m: float, commands: list[float]) -> None:
+    """A servo that keeps up follows its command as a pin in a slot of that width; the cable is never taut here."""
+    rings = ServoRings(backlash_m=backlash_m, speed_limit_m_per_s=1e3)
+    state = slot = 0.48
+    for activation in commands:
+        state += speed(activation, state, 0.3, 0.01, rings) * 0.01
+        commanded = 0.48 - 0.17 * activation
+        slot = min(max(slot, commanded - backlash_m / 2), commanded + backlash_m / 2)
+        assert state == pytest.approx(slot, abs=1e-12)
+
+
+def test_the_servos_of_a_worm_stand_still_while_a_command_turns_back_within_the_backlash() -> None:
+    """With slack cables, which no tension stalls."""
+    slack = {"body.rings.length_range_m": [0.62, 1.3], "body.rings.speed_limit_m_per_s": 1.0}
+    plant = worm(**slack, **{"body.rings.backlash_m": 0.04})
+    shortest, longest = plant.model.actuator_actrange[0]
+    wound = longest + 0.2 * (shortest - longest) + 0.02
+    for activation, expected in ((0.2, wound), (0.15, wound), (0.0, longest - 0.02)):
+        for _ in range(20):
+            plant.step(np.full(plant.n_muscles, activation))
+        assert plant.data.act == pytest.approx(expected, abs=1e-9)
+
+
 @pytest.mark.parametrize("layout", ["whole", "halves"])
 def test_without_load_a_cable_moves_at_the_speed_limit(layout: str) -> None:
     """A cable that is longer than its way round the body is slack; until it is taut its force is zero."""

@@ -11,11 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from annelid.analysis.agreement import compare_with_log
+from annelid.analysis.measured import LogMap, read_measured, run_series
 from annelid.config import load_config, preset_names
 from annelid.draw.scene import Skeleton, upright
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
-from annelid.live.panel import plots_of
+from annelid.live.panel import MOST_SAMPLES, measured_plots, plots_of
 from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
 from annelid.live.things import triangles
@@ -250,7 +252,26 @@ def test_plots_name_what_the_controller_has() -> None:
     assert list(plots_of(["activation_1"])) == ["activation"]
 
 
-def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
+def test_a_log_is_drawn_beside_the_run_that_it_was_aligned_with(planar_run: Run, tmp_path: Path) -> None:
+    """A log of the run itself, in mm and begun later: both curves of its plot are one, at the run's times."""
+    time_s, lengths_m, _ = run_series(planar_run, "stretch_length[1, mean]")
+    begun = len(time_s) // 4
+    table = np.column_stack([time_s[begun:] - time_s[begun], 1e3 * lengths_m[begun:]])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t_s,s1_mm", comments="")
+    log_map = LogMap.model_validate({"time": "t_s", "map": {"s1_mm": "stretch_length[1, mean]"}})
+    agreement = compare_with_log(planar_run, read_measured(tmp_path / "log.csv", log_map))
+    (name, plot), *others = measured_plots(agreement).items()
+    assert (name, others) == ("measured: s1_mm", [])
+    assert [(curve.label, curve.dashed) for curve in plot.curves] == [("simulated", False), ("measured", True)]
+    first, last = time_s[len(time_s) // 2], time_s[-1]
+    times, simulated, measured = plot.window(first, last)
+    assert first <= times[0] < times[-1] <= last
+    assert len(times) <= MOST_SAMPLES
+    assert np.abs(simulated - measured).max() < 1e-3 * np.ptp(lengths_m)
+    assert np.abs(simulated - np.interp(times, time_s, lengths_m)).max() < 1e-3 * np.ptp(lengths_m)
+
+
+def test_a_run_is_read_as_it_was_recorded(planar_run: Run) -> None:
     n = rods_run.data.sizes["coordinate"]
     recorded = reel_of(rods_run, n)
     times = rods_run.data["frame_time"].values

@@ -277,6 +277,12 @@ def view_command(
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: the first from 8080]")
     ] = None,
+    measured: Annotated[
+        Path | None, typer.Option(metavar="TABLE", help="A measured log, drawn beside a recorded run; needs --map.")
+    ] = None,
+    log_map: Annotated[
+        Path | None, typer.Option("--map", metavar="MAP.toml", help="What the columns of the measured log are.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Watch a worm in the browser as it runs, or play a run.
@@ -291,19 +297,33 @@ def view_command(
     annelid view riddle2025-adaptive --arena pipe.taper  another one, elsewhere
     annelid view --set arena.friction=0.3 --speed 0.5    changed, in slow motion
     annelid view runs/riddle2023-rods-001                a run, as it was recorded
+    annelid view runs/riddle2023-rods-001 --measured robot.csv --map robot.toml   with a robot's log beside it
     annelid view runs/riddle2023-rods-001 --export walk.html   as one page to send by mail
     annelid view --native                                in MuJoCo's own window
     """
     worm: RunConfig | Run
+    recorded = None
     if source and not source.endswith(".toml") and Path(source).exists():
         from annelid.simulation.runfile import open_run
 
         if (assignments, segments, fidelity, arena) != (None, None, None, None):
             raise typer.BadParameter("a run is played as it was: give no --set, --segments, --fidelity or --arena")
-        worm = open_run(source)
+        worm = recorded = open_run(source)
     else:
         preset = RIGID_PRESET if source is None else source
         worm = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
+    agreement = None
+    if measured is not None or log_map is not None:
+        if measured is None or log_map is None:
+            raise typer.BadParameter("a log needs both --measured TABLE and --map MAP.toml")
+        if recorded is None or native or export is not None:
+            raise typer.BadParameter("a log is drawn beside a recorded run in the browser: name a run's folder")
+        from annelid.analysis.agreement import compare_with_log
+        from annelid.analysis.measured import read_map, read_measured
+
+        agreement = compare_with_log(recorded, read_measured(measured, read_map(log_map)))
+        for note in agreement.notes:
+            complain(f"note: {note}")
     if export is not None:
         if native:
             raise typer.BadParameter("--export writes a page: it does not go with --native")
@@ -325,7 +345,7 @@ def view_command(
 
     if (warning := warning_of(host)) is not None:
         complain(f"warning: {warning}")
-    with Show(worm, host=host, port=free_port(host, port), speed=speed) as show:
+    with Show(worm, host=host, port=free_port(host, port), speed=speed, agreement=agreement) as show:
         typer.echo(f"{show.address}  (Ctrl-C ends)")
         if open_browser:
             webbrowser.open(show.address)

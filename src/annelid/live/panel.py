@@ -17,11 +17,13 @@ from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
+from annelid.morphology import Array
 from annelid.nervous.drawing import by_segment, role_of
 
 if TYPE_CHECKING:
     import viser
 
+    from annelid.analysis.agreement import Agreement
     from annelid.live.show import Show
 
 PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
@@ -51,6 +53,23 @@ class Plot:
     curves: tuple[Curve, ...]
     n_colors: int
     limits: tuple[float, float] | None = None  # ends of the axis, or None for those of the curves
+    series: tuple[Array, ...] = ()  # times and the curves' values, where these are not signals of the reel
+
+    def window(self, first_s: float, last_s: float) -> tuple[Array, ...]:
+        """Returns times and values of its `series` in a stretch of time, thinned."""
+        start, stop = np.searchsorted(self.series[0], (first_s, last_s))
+        every = max(1, -(-int(stop - start) // MOST_SAMPLES))
+        return tuple(one[start + -start % every : stop : every] for one in self.series)
+
+
+def measured_plots(agreement: Agreement) -> dict[str, Plot]:
+    """Returns a plot for each column of a measured log: the log, dashed, and the run that it was aligned with."""
+    plots: dict[str, Plot] = {}
+    for name, one in agreement.signals.items():
+        curves = Curve("", "simulated", 0), Curve("", "measured", 1, dashed=True)
+        series = agreement.time_s, agreement.simulated[name], agreement.measured[name]
+        plots[f"measured: {name}"] = Plot(f"{one.signal} ({one.unit}), measured dashed", curves, 2, series=series)
+    return plots
 
 
 def neurons_of(names: Sequence[str]) -> Sequence[str]:
@@ -95,7 +114,15 @@ def _half_centres(segments: dict[int, list[str]]) -> Plot:
 class Panel:
     """The panel's elements; what they change is asked of the loop of a view."""
 
-    def __init__(self, server: viser.ViserServer, show: Show, speed: float, weight_N: float, legend: str) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        show: Show,
+        speed: float,
+        weight_N: float,
+        legend: str,
+        agreement: Agreement | None = None,
+    ) -> None:
         """Makes all elements; the worm's weight on Earth is what pokes are measured by."""
         gui = self._gui = server.gui
         self._player = player = show.player
@@ -113,8 +140,8 @@ class Panel:
             with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
                 gui.add_html(network_html(network))
                 self._colors = gui.add_html("")
-        self._plots = plots_of(player.reel.names)
-        self._plot_folder = gui.add_folder("Nervous system, last 5 s")
+        self._plots = ({} if agreement is None else measured_plots(agreement)) | plots_of(player.reel.names)
+        self._plot_folder = gui.add_folder(f"{'Signals' if agreement else 'Nervous system'}, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
             choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))
@@ -167,8 +194,9 @@ class Panel:
 
     def choose_plot(self, name: str) -> None:
         """Puts another plot in place of the present one; it is empty until `update`."""
-        plot = self._plots[name]
-        self._columns = [self._player.reel.names.index(curve.signal) for curve in plot.curves]
+        self._plot = plot = self._plots[name]
+        signals = () if plot.series else (curve.signal for curve in plot.curves)
+        self._columns = [self._player.reel.names.index(signal) for signal in signals]
         if self._chart is not None:
             self._chart.remove()
         colors = [_css(color) for color in segment_colors(max(plot.n_colors, 1))]
@@ -193,7 +221,8 @@ class Panel:
         self._time.value = time_s
         times, values = reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
         if len(times):
-            self._chart.data = (times, *values[:, self._columns].T)
+            drawn = (times, *values[:, self._columns].T)
+            self._chart.data = self._plot.window(time_s - SECONDS, time_s) if self._plot.series else drawn
             if self._colors is not None:
                 self._colors.content = colors_html(values[-1, : self._n_neurons])
 

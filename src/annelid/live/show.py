@@ -23,6 +23,8 @@ from annelid.simulation.runfile import Run
 if TYPE_CHECKING:
     import viser
 
+    from annelid.analysis.agreement import Agreement
+
 FRAMES_A_SECOND = 30.0  # at most; fewer where a step of the body takes longer
 LONGEST_TICK_S = 0.25  # a computer that was asleep does not make the view leap
 PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
@@ -44,7 +46,15 @@ class Show:
         frames_drawn: Number of pictures sent so far.
     """
 
-    def __init__(self, source: RunConfig | Run, *, host: str = LOOPBACK, port: int = 0, speed: float = 1.0) -> None:
+    def __init__(
+        self,
+        source: RunConfig | Run,
+        *,
+        host: str = LOOPBACK,
+        port: int = 0,
+        speed: float = 1.0,
+        agreement: Agreement | None = None,
+    ) -> None:
         """Builds the worm, or reads the run, and begins to serve.
 
         Args:
@@ -52,6 +62,7 @@ class Show:
             host: Address to listen on.
             port: Port, 0 for any that is free.
             speed: Simulated seconds per second.
+            agreement: The run and a measured log, aligned (`annelid.analysis.agreement`): drawn beside the worm.
 
         Raises:
             ConfigError: The body is planar, or cannot be built.
@@ -73,7 +84,7 @@ class Show:
         self.stage = Stage(self._server, self.config, painter, self.player.moment)
         weight_N = round(EARTH_M_PER_S2 * anatomy.total_mass_kg, 1)
         legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
-        self.panel = Panel(self._server, self, speed, weight_N, legend)
+        self.panel = Panel(self._server, self, speed, weight_N, legend, agreement)
         if self.player.worm is not None:
             self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
 

@@ -27,8 +27,9 @@ class ServoRings(ActuatorKind):
     Activation commands the cable's slack length, from the longest at 0 to the shortest at 1, and the servo winds or
     pays out towards it at no more than its speed limit. The cable's tension is ``stiffness (length - slack length) +
     damping rate``, kept between 0 and the force limit; at the limit the servo stalls, and winds on only as its ring
-    gives way. A longest cable beyond the ring at rest is slack that is wound first. Play of a gear is nothing else: a
-    cable that only pulls keeps the gear on one flank (`trial.backlash` is play of the commands).
+    gives way. A longest cable beyond the ring at rest is slack that is wound first. A taut cable keeps a gear on one
+    flank, so its play alone is not felt; ``backlash_m`` is what a servo loses where it reverses, because its position
+    sensor has play or its controller ignores small errors.
 
     A direct-current motor (``no_load_speed_m_per_s``) winds the more slowly the more it pulls, and what it takes from
     its battery is recorded. With ``cable_friction``, force limits are those at the motor, and a ring feels the mean
@@ -51,6 +52,11 @@ class ServoRings(ActuatorKind):
         default=None,
         description="speed of winding without tension, which falls in proportion to tension to 0 at the force limit; "
         "records motor_energy (not set: the speed limit up to the force limit)",
+    )
+    backlash_m: NonNegative = Field(
+        default=0.0,
+        description="length of cable that is lost where winding reverses: a servo stands still within half of it about "
+        "its command",
     )
     cable_friction: NonNegative | None = Field(
         default=None,
@@ -127,12 +133,15 @@ class ServoRings(ActuatorKind):
     def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
         """Returns the rate at which the slack lengths of the cables, the states, change, m/s: negative while they wind.
 
-        Towards the commanded length, but never so short that the tension at rest would exceed the force limit: a
-        stalled servo does not wind on, gives way to what pulls harder, and lets go at once when it is commanded to. The
-        rate is applied for a time, so that a cable does not overshoot the length that it is wound to.
+        Towards the commanded length, up to half the backlash from it, but never so short that the tension at rest would
+        exceed the force limit: a stalled servo does not wind on, gives way to what pulls harder, and lets go at once
+        when it is commanded to. The rate is applied for a time, so that a cable does not overshoot the length that it
+        is wound to.
         """
         (shortest, longest), limits_N = model.actuator_actrange.T, -model.actuator_forcerange[:, 0]
-        commanded = longest + activation * (shortest - longest)
+        commanded, play = longest + activation * (shortest - longest), 0.5 * self.backlash_m
+        if play:
+            commanded = state.clip(commanded - play, commanded + play)
         stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
         rate = (np.maximum(commanded, stalled) - state) / time_s
         speed = winding = self.speed_limit_m_per_s

@@ -271,7 +271,7 @@ def test_a_log_is_drawn_beside_the_run_that_it_was_aligned_with(planar_run: Run,
     assert np.abs(simulated - np.interp(times, time_s, lengths_m)).max() < 1e-3 * np.ptp(lengths_m)
 
 
-def test_a_run_is_read_as_it_was_recorded(planar_run: Run) -> None:
+def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
     n = rods_run.data.sizes["coordinate"]
     recorded = reel_of(rods_run, n)
     times = rods_run.data["frame_time"].values

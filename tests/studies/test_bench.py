@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import LEVELS, load_config
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, RunFileError
 from annelid_studies.bench import benchmark as store_module
 from annelid_studies.bench import peer as peer_module
 from annelid_studies.bench.benchmark import (
@@ -25,11 +25,12 @@ from annelid_studies.bench.benchmark import (
     exponent,
     front,
     judge,
+    slowdowns,
 )
 from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
 from annelid_studies.bench.measure import measure, peak_memory_bytes
 from annelid_studies.bench.report import bench_figure, bench_table
-from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares
+from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares, yardstick_ms
 from annelid_studies.worms import CHAIN, RODS
 
 positive = st.floats(1e-3, 1e3)
@@ -42,6 +43,36 @@ def numbers(ring: float = 0.4, elongation: float = 0.08, period: float = 2.6, tr
         "period_s": period,
         "travel_m": travel,
     }
+
+
+def timings(**steps_ms: tuple[float | None, float | None]) -> dict[str, Any]:
+    return {
+        "cases": [
+            {"name": name, "step_median_ms": step, "yardstick_ms": yardstick}
+            for name, (step, yardstick) in steps_ms.items()
+        ]
+    }
+
+
+class TestSlowdowns:
+    @given(positive, positive, st.floats(0.1, 10.0))
+    def test_a_slower_machine_is_no_slowdown_and_a_slower_step_is(self, step: float, yardstick: float, factor: float):
+        before = timings(a=(step, yardstick))
+        assert slowdowns(timings(a=(factor * step, factor * yardstick)), before)["a"] == pytest.approx(0.0, abs=1e-9)
+        assert slowdowns(timings(a=(factor * step, yardstick)), before)["a"] == pytest.approx(factor - 1.0)
+
+    def test_only_cases_that_both_have_measured_count(self) -> None:
+        now = timings(a=(2.0, 1.0), b=(2.0, None), c=(2.0, 1.0)) | {"peer": None}
+        before = timings(a=(1.0, 1.0), b=(1.0, 1.0), d=(1.0, 1.0))
+        assert slowdowns(now, before) == {"a": 1.0}
+
+    @pytest.mark.parametrize("before", [{}, [], {"cases": [1]}, {"cases": []}, timings(a=(1.0, None))])
+    def test_what_is_no_benchmark_is_refused(self, before: Any) -> None:
+        with pytest.raises(RunFileError, match=r"no bench\.json|measure both again"):
+            slowdowns(timings(a=(1.0, 1.0)), before)
+
+    def test_the_yardstick_is_a_moving_body(self) -> None:
+        assert 0.0 < yardstick_ms(0.01) < 1e3
 
 
 class TestErrors:

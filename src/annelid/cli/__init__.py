@@ -4,13 +4,12 @@ from annelid.cli.entry import Command, app, experiments, main
 from annelid.cli.gallery import gallery_command
 from annelid.cli.result import with_json
 from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
-from annelid.cli.run import run_command
+from annelid.cli.run import limit_cycle_command, run_command
 from annelid.cli.runs import runs_command
 from annelid.cli.studies import (
     bench_command,
     calibrate_command,
     challenge_command,
-    limit_cycle_command,
     paper_command,
     robustness_command,
     sweep_command,

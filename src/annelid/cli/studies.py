@@ -6,7 +6,7 @@ import json
 import shlex
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import Annotated
 
 import typer
 
@@ -19,76 +19,17 @@ from annelid.cli.common import (
     NamedPreset,
     OnlyPaths,
     Output,
-    Preset,
     Quiet,
     ResultsFolder,
-    Segments,
-    config_of,
     going_on,
     kept_runs,
     overrides_of,
-    print_paths,
     print_results,
     refuse_existing,
 )
 from annelid.cli.entry import EXIT_ALL_FAILED, complain, end_study, lock, typed_command
-from annelid.cli.result import give, refuse_json, wants_json
+from annelid.cli.result import refuse_json, wants_json
 from annelid.errors import RunFileError
-
-
-def limit_cycle_command(
-    preset: Preset = None,
-    assignments: Assignments = None,
-    segments: Segments = None,
-    neuron: Annotated[
-        str, typer.Option(help="The cycle begins when this neuron's potential rises through the threshold.")
-    ] = "contraction_1",
-    threshold: Annotated[
-        float | None, typer.Option(help="Threshold, mV above rest.  [default: half the operating range]")
-    ] = None,
-    times: Annotated[
-        list[str] | None,
-        typer.Option("--time", metavar="WAY", help="continuous, located or stepped; may be repeated.  [default: all]"),
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
-    ] = None,
-    force: Force = False,
-) -> None:
-    """Find a planar worm's limit cycle, and how stable it is.
-
-    Follows the worm until its states repeat, then disturbs each state a little at a hundred points of the
-    cycle. Prints the period and the Floquet multipliers: what one cycle leaves of a deviation. All but one
-    below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
-
-    Time is taken in three ways: continuous, for the multipliers; located, in the worm's own steps, but each
-    ended where a stretch sensor switches; and stepped, in its own steps as they are in a run. The picture
-    shows the phase response too: by how much a kick of a neuron, at each phase, advances the rhythm.
-    Takes about ten seconds for 3 segments, twenty for 6; default preset: riddle2022-planar.
-
-    \b
-    annelid limit-cycle riddle2022-planar --segments 6
-    annelid limit-cycle riddle2022-planar --time continuous -o cycle.png
-    annelid limit-cycle --set controller.gate_time_constant_ms=200 --set body.gain=1.9
-    annelid limit-cycle --json | jq .continuous.multipliers[0]
-    """
-    from annelid.analysis.limit_cycle import Time, limit_cycle
-    from annelid.draw.figures.limit_cycle import limit_cycle_figure
-    from annelid.draw.plots import plot_path
-    from annelid.draw.table import TIMES, cycle_numbers, cycle_table
-    from annelid.terminal import Console
-
-    if output is not None:
-        output = plot_path(output)
-        refuse_existing(output, force)
-    config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
-    wanted = cast(list["Time"], times or list(get_args(Time)))
-    cycles = {time: limit_cycle(config, time=time, neuron=neuron, threshold_mV=threshold) for time in wanted}
-    if not give({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)):
-        Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
-    if output is not None:
-        named = {TIMES[time]: cycle for time, cycle in cycles.items()}
-        print_paths([limit_cycle_figure(named, output)])
 
 
 def paper_command(
@@ -146,6 +87,9 @@ def bench_command(
     cases: Annotated[
         list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
     ] = None,
+    against: Annotated[
+        Path | None, typer.Option(metavar="bench.json", help="Fail if a case is over 10 % slower than it was there.")
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure speed and error side by side.
@@ -167,23 +111,36 @@ def bench_command(
     Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
     a full run takes over what --quick measured. Delete that folder to measure again.
 
+    --against compares with an earlier bench.json of the same machine. A machine is not as fast at all times: steps are
+    therefore counted in those of a small model of the engine alone, timed before and after each case.
+
     \b
     annelid bench                                   everything, into the folder bench
     annelid bench --quick                           an overview
     annelid bench --cases levels -o levels          the levels of fidelity only
     annelid bench --cases segments --cases chain    how the cost grows with the worm
+    annelid bench --quick -o now --against before/bench.json    has it become slower?
     """
     from annelid.experiment.progress import study_progress
-    from annelid_studies.bench.benchmark import bench
-    from annelid_studies.bench.report import bench_figure, bench_table
+    from annelid.textfiles import read_json
+    from annelid_studies.bench.benchmark import SLOWDOWN, bench, slowdowns
+    from annelid_studies.bench.report import bench_figure, bench_table, slowdown_table
+
+    before = None if against is None else read_json(against)
 
     lock(output)
     with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
         path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
     report = json.loads(path.read_text(encoding="utf-8"))
     tables = [] if quiet else [bench_table(report)]
+    slower = {} if before is None else slowdowns(report, before)
+    if slower and not quiet:
+        tables.append(slowdown_table(slower, SLOWDOWN))
     print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
     end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)
+    if worst := [name for name, share in slower.items() if share > SLOWDOWN]:
+        complain(f"slower than in {against} by over {100 * SLOWDOWN:.0f} %: {', '.join(worst)}")
+        raise typer.Exit(1)
 
 
 def robustness_command(

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from annelid.errors import AnnelidError
+from annelid.errors import AnnelidError, RunFileError
 from annelid.experiment import StudyProgress, case_key, code_fingerprint
 from annelid.output import write_json, write_text
 from annelid.simulation import locks
@@ -31,8 +31,12 @@ CASES_FOLDER = "cases"
 SCALED_SEGMENTS = (12, 30)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
 
+SLOWDOWN = 0.1
+"""By which a case may be slower than before, against the yardstick."""
+
 SCHEMA = {
     "cases[].step_median_ms, step_mean_ms": "wall-clock time of the closed loop a physics step, recording included, ms",
+    "cases[].yardstick_ms": "a step of a small model of the engine alone, in the same process before and after, ms",
     "cases[].real_time_factor": "simulated over wall-clock time, recording included",
     "cases[].peak_memory_MB": "largest resident memory of the process that ran the case and nothing else, 1e6 bytes",
     "cases[].build_s, compile_s": "making the engine's specification, and the engine's compilation of it, s",
@@ -215,6 +219,38 @@ def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[st
         "travel_m": None if None in travels else abs(travels[0] - travels[1]),
     }
     return found | {"largest": _largest([found["elongation_max"], found["period"]])}
+
+
+def slowdowns(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, float]:
+    """Compares the median steps of two benchmarks, each over what its yardstick took at that time.
+
+    Args:
+        now: The content of a ``bench.json``.
+        before: The same of an earlier one.
+
+    Returns:
+        By how much each case that both have measured takes longer now, as a share; negative if it is faster.
+
+    Raises:
+        RunFileError: The earlier one is none, or they have no case in common whose yardstick was taken.
+    """
+    cases = before.get("cases") if isinstance(before, dict) else None
+    if not isinstance(cases, list) or not all(isinstance(case, dict) and "name" in case for case in cases):
+        raise RunFileError("the earlier benchmark is no bench.json: it has no list of cases with names")
+    then, found = {str(case["name"]): _in_yardsticks(case) for case in cases}, {}
+    for case in now["cases"]:
+        old, new = then.get(case["name"]), _in_yardsticks(case)
+        if old and new:
+            found[case["name"]] = new / old - 1.0
+    if not found:
+        raise RunFileError("the two benchmarks have no case in common whose yardstick was taken: measure both again")
+    return found
+
+
+def _in_yardsticks(case: Mapping[str, Any]) -> float | None:
+    step, yardstick = (case.get(key) for key in ("step_median_ms", "yardstick_ms"))
+    usable = all(isinstance(one, int | float) and one > 0 for one in (step, yardstick))
+    return step / yardstick if usable and step and yardstick else None
 
 
 def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:

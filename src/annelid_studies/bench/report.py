@@ -41,6 +41,16 @@ def bench_table(report: Mapping[str, Any]) -> TerminalTable:
     return terminal_table(Table(header, rows), f"{report['machine']}, recording on", caption=caption)
 
 
+def slowdown_table(slowdowns: Mapping[str, float], tolerated: float) -> TerminalTable:
+    """Lays out what `annelid_studies.bench.benchmark.slowdowns` found, the slowest first."""
+    rows = [
+        [name, f"{100 * share:+.0f} %", "slower" if share > tolerated else ""]
+        for name, share in sorted(slowdowns.items(), key=lambda item: -item[1])
+    ]
+    caption = f"against the yardstick; {100 * tolerated:.0f} % are tolerated"
+    return terminal_table(Table(["case", "time of a step", ""], rows), "Against the earlier benchmark", caption=caption)
+
+
 def _row(entry: Mapping[str, Any], references: Sequence[str]) -> list[str]:
     name = f"{entry['name']} ({entry['level']})" if entry["level"] else entry["name"]
     if "failed" in entry:

@@ -48,7 +48,7 @@ def numbers(ring: float = 0.4, elongation: float = 0.08, period: float = 2.6, tr
 def timings(**steps_ms: tuple[float | None, float | None]) -> dict[str, Any]:
     return {
         "cases": [
-            {"name": name, "step_median_ms": step, "yardstick_ms": yardstick}
+            {"name": name, "step_quiet_ms": step, "yardstick_ms": yardstick}
             for name, (step, yardstick) in steps_ms.items()
         ]
     }

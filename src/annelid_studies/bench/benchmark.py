@@ -36,7 +36,8 @@ SLOWDOWN = 0.1
 
 SCHEMA = {
     "cases[].step_median_ms, step_mean_ms": "wall-clock time of the closed loop a physics step, recording included, ms",
-    "cases[].yardstick_ms": "a step of a small model of the engine alone, in the same process before and after, ms",
+    "cases[].step_quiet_ms, yardstick_ms": "10th percentile of a step, and of one of a small model of the engine alone "
+    "timed in the same process before and after, ms",
     "cases[].real_time_factor": "simulated over wall-clock time, recording included",
     "cases[].peak_memory_MB": "largest resident memory of the process that ran the case and nothing else, 1e6 bytes",
     "cases[].build_s, compile_s": "making the engine's specification, and the engine's compilation of it, s",
@@ -222,7 +223,7 @@ def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[st
 
 
 def slowdowns(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, float]:
-    """Compares the median steps of two benchmarks, each over what its yardstick took at that time.
+    """Compares the quiet steps of two benchmarks, each over what its yardstick took at that time.
 
     Args:
         now: The content of a ``bench.json``.
@@ -248,7 +249,7 @@ def slowdowns(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, fl
 
 
 def _in_yardsticks(case: Mapping[str, Any]) -> float | None:
-    step, yardstick = (case.get(key) for key in ("step_median_ms", "yardstick_ms"))
+    step, yardstick = (case.get(key) for key in ("step_quiet_ms", "yardstick_ms"))
     usable = all(isinstance(one, int | float) and one > 0 for one in (step, yardstick))
     return step / yardstick if usable and step and yardstick else None
 

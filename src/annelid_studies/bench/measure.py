@@ -63,7 +63,7 @@ def measure(config: RunConfig) -> dict[str, Any]:
     from annelid.analysis import rhythm_score, summary
     from annelid.body import build_spec, compile_spec
     from annelid.simulation import WormPlant, build_controller, open_run, simulate, start
-    from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares, yardstick_ms
+    from annelid_studies.bench.timing import QUIET, Stopwatch, engine_times, laps_s, shares, yardstick_ms
 
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     plant = WormPlant(config)
@@ -108,6 +108,7 @@ def measure(config: RunConfig) -> dict[str, Any]:
         "simulated_s": simulated_s,
         "step_median_ms": float(np.median(laps_ms)) if laps_ms.size else None,
         "step_mean_ms": float(np.mean(laps_ms)) if laps_ms.size else None,
+        "step_quiet_ms": float(np.percentile(laps_ms, QUIET)) if laps_ms.size else None,
         "yardstick_ms": 0.5 * (before_ms + after_ms),
         "shares": shares(total_s, plant_s, control_s, engine),
         "peak_memory_MB": None if peak is None else peak / _MB,

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 from synthetic import wave_data
 
-from annelid.analysis.agreement import Agreement, compare_with_log, period
-from annelid.analysis.measured import LogMap, read_map, read_measured, run_series
+from annelid.analysis.agreement import Agreement, compare_with_log, period, run_series
+from annelid.analysis.measured import LogMap, read_map, read_measured
 from annelid.config import load_config
 from annelid.draw.table import agreement_table
 from annelid.errors import AnnelidError, ConfigError, UnreadableText

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from doc_commands import Command, Script, Written, commands_of, steps_of
 
-from annelid.analysis.measured import run_series
+from annelid.analysis.agreement import run_series
 from annelid.simulation.runfile import open_run
 
 

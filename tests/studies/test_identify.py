@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from annelid.analysis.measured import run_series
+from annelid.analysis.agreement import run_series
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.analysis.agreement import compare_with_log
-from annelid.analysis.measured import LogMap, read_measured, run_series
+from annelid.analysis.agreement import compare_with_log, run_series
+from annelid.analysis.measured import LogMap, read_measured
 from annelid.config import load_config, preset_names
 from annelid.draw.scene import Skeleton, upright
 from annelid.errors import ConfigError, RunFileError

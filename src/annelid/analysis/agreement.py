@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -10,8 +11,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlate, find_peaks
 
-from annelid.analysis.measured import OFF_SCALE, Measured, run_series
-from annelid.errors import ConfigError, shown
+from annelid.analysis.measured import OFF_SCALE, Measured
+from annelid.analysis.track import forward_position, track_of
+from annelid.body import mesh_of
+from annelid.body.actuation import stretch_sensors
+from annelid.body.worm import WormBody
+from annelid.errors import ConfigError, listed, shown, suggest
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
@@ -27,6 +32,7 @@ MOST_SAMPLES = 2_000_000
 """Of either record, as compared."""
 MOST_DRIFT = 0.05
 """Largest drift of the log's clock that is looked for."""
+_REFERENCE = re.compile(r"^\s*(\w+)\s*(?:\[([^\[\]]*)\])?\s*$")
 
 
 @dataclass(frozen=True)
@@ -199,6 +205,72 @@ def period(signals: Array) -> float:
         return np.nan
     best = peaks[np.flatnonzero(mean[peaks] >= 0.8 * mean[peaks].max())[0]]
     return float(best + _vertex(*mean[best - 1 : best + 2]))
+
+
+def run_series(run: Run, reference: str) -> tuple[Array, Array, str]:
+    """Returns times, s, values and unit of a signal of a run.
+
+    Args:
+        run: The run.
+        reference: A variable with a label for each dimension beside the time, as ``stretch_length[1, left]`` or
+            ``muscle_force[ring_0]``: segments from 1, unlabelled dimensions from 0, ``mean`` for the mean over one.
+            Besides: ``travel``, and ``ring_distance[1]``, from the centre of ring 1 to that of ring 2 (once a frame).
+
+    Raises:
+        ConfigError: The run has no such signal, or a label is none of its dimension's.
+    """
+    found = _REFERENCE.match(reference)
+    name, labels = (found[1], found[2]) if found else (reference, None)
+    given = [label.strip() for label in labels.split(",")] if labels else []
+    if name == "travel" and "center_of_mass" in run.data and not given:
+        ahead = forward_position(run)
+        return run.data["time"].values, ahead - ahead[0], "m"
+    if name == "ring_distance" and isinstance(run.config.body, WormBody):
+        between = [str(segment) for segment in range(1, run.config.body.n_segments)]
+        first = int(_label(given[0] if given else "", between, reference, "pair of rings"))
+        track = track_of(run)
+        ends = [track.ring_centre(first + i) for i in (-1, 0)]
+        return track.time_s, np.linalg.norm(ends[1] - ends[0], axis=1), "m"
+    offered = [str(v) for v, own in run.data.data_vars.items() if own.dims[:1] == ("time",)]
+    if name not in offered:
+        raise ConfigError(
+            f"the run has no signal {shown(name)}: {suggest(name, [*offered, 'travel', 'ring_distance'])}"
+        )
+    signal = run.data[name]
+    dimensions = [str(dimension) for dimension in signal.dims[1:]]
+    if len(given) != len(dimensions):
+        raise ConfigError(f"{shown(reference)} needs a label for each of {listed(dimensions) or 'no dimension'}")
+    for dimension, label in zip(dimensions, given, strict=True):
+        known = [str(one) for one in signal[dimension].values]
+        sides = _sides(run) if dimension == "sensor" else {}
+        if _label(label, [*known, *sides, "mean"], reference, dimension) == "mean":
+            signal = signal.mean(dimension)
+        elif label in sides:
+            segment = given[dimensions.index("segment")]
+            if segment == "mean":
+                raise ConfigError(f"{shown(reference)}: {label} is another sensor in every segment; name a segment")
+            signal = signal.isel({dimension: sides[label][int(segment) - 1]})
+        else:
+            signal = signal.isel({dimension: known.index(label)})
+    return run.data["time"].values, signal.values.astype(float), str(run.data[name].attrs["units"])
+
+
+def _label(given: str, known: list[str], reference: str, what: str) -> str:
+    if given not in known:
+        raise ConfigError(f"{shown(reference)}: unknown {what} {shown(given)}, it is one of {listed(known)}")
+    return given
+
+
+def _sides(run: Run) -> dict[str, list[int]]:
+    """Which sensor of each segment lies to the left, and which to the right."""
+    body = run.config.body
+    if not isinstance(body, WormBody):
+        return {}
+    geometry = mesh_of(body.mesh)
+    carried = stretch_sensors(geometry, body.springs)
+    sides = stretch_sensors(geometry, body.springs.model_copy(update={"sensors": "sides"}))
+    places = (carried[:, :, None] == sides[:, None, :]).argmax(axis=1)
+    return {"left": places[:, 0].tolist(), "right": places[:, 1].tolist()}
 
 
 def _refuse_unlike(name: str, log: Measured, values: Array, unit: str) -> None:

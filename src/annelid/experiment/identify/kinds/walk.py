@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from annelid.analysis.measured import Measured, read_map, read_measured, run_series
+from annelid.analysis.measured import Measured, read_map, read_measured
 from annelid.config import RunConfig
 from annelid.config.sections import Line, NonNegative
 from annelid.errors import ConfigError
@@ -26,6 +26,7 @@ class WalkTest:
 
     def run(self, config: RunConfig) -> Found:
         """Gives times, values and unit of every signal."""
+        from annelid.analysis.agreement import run_series
         from annelid.simulation.loop import simulate
 
         found: dict[str, Array] = {}

@@ -101,14 +101,15 @@ class PacedPlant(ABC):
     def recordable(self) -> Recordable:
         """Names what is sensed, the command and the times."""
         command = Signal("command", ("muscle",), (self.n_muscles,), "1", "activation as it was sent, within limits")
+        known = self._senses.read(False)
+        sensed = (each for each in self._senses.recordable().signals if np.isfinite(known[each.name]).all())
         own = (command, *timing_signals(self.partner, self._pace))
-        return Recordable((*self._senses.recordable().signals, *own), attrs={"hardware": "robot"})
+        return Recordable((*sensed, *own), attrs={"hardware": "robot"})
 
     def read(self, frame: bool) -> Values:
         """Reads them; there are none at frame rate."""
-        return self._senses.read(frame) if frame else {
-            **self._senses.read(frame), "command": self.command, **timing_values(self.partner, self._pace)
-        }
+        own = {"command": self.command, **timing_values(self.partner, self._pace)}
+        return {} if frame else {**self._senses.read(frame), **own}
 
     def doubts(self) -> tuple[str, ...]:
         """Returns what went wrong without ending the run."""

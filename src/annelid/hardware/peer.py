@@ -71,7 +71,7 @@ class Peer:
             return None
         if frame.kind == Kind.STOP:
             self._close()
-            return frame
+            return Frame(Kind.STOP, frame.session, frame.sequence)
         ahead = (frame.sequence - self._last) & 0xFFFF
         if not self.is_open or frame.kind != self._comes or not 0 < ahead < 0x8000:
             return None

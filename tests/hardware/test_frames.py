@@ -105,7 +105,7 @@ def test_a_long_flood_is_one_wrong_frame() -> None:
 
 
 def test_another_version_is_said() -> None:
-    whole = bytearray(unstuffed(Frame(Kind.STOP, 1, 2).encoded()[:-1]))[:-4]
+    whole = bytearray(unstuffed(Frame(Kind.STOP, 1, 2).encoded()[1:-1]))[:-4]
     whole[0] = 2
     with pytest.raises(FrameError, match="version 2 of the protocol, not 1"):
         decoded(stuffed(bytes(whole) + binascii.crc32(bytes(whole)).to_bytes(4, "little")))
@@ -209,7 +209,7 @@ def test_the_c_client_answers_as_the_python_one(real: Any, tmp_path: Path) -> No
     python = Peer(Role.BODY, INTERFACE, moved)
     rng = np.random.default_rng(0)
     session, sequence, answers = 1, 0, 0
-    for n in range(6000):
+    for n in range(2500):
         choice = rng.integers(12)
         sequence = (sequence + int(rng.integers(-1, 4))) & 0xFFFF
         payload = packed(rng.uniform(0.0, 0.995, 3))
@@ -239,7 +239,7 @@ def test_the_c_client_answers_as_the_python_one(real: Any, tmp_path: Path) -> No
         waited = float(rng.choice([0.0, 0.001, 0.01, 0.2]))
         code.elapsed(waited)
         python.elapsed(waited)
-    assert answers > 500
+    assert answers > 200
 
 
 @COMPILER

@@ -72,7 +72,7 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
 
 
 def _wire(name: str, interface: Interface) -> tuple[str, ...]:
-    # Header, the larger of a hello and a frame of numbers, checksum; stuffing adds a byte for each 254, a zero ends it.
+    # Header, the larger of a hello and a frame of numbers, checksum; stuffing adds a byte for each 254, zeros are around it.
     room = 8 + max(15, 4 * interface.n_sensed, 4 * interface.n_muscles) + 4
     words = {
         "name": name,
@@ -84,7 +84,7 @@ def _wire(name: str, interface: Interface) -> tuple[str, ...]:
         "digest": interface.digest,
         "most_steps": MOST_STEPS,
         "room": room,
-        "most_answer": room + room // 254 + 2,
+        "most_answer": room + room // 254 + 3,
     }
     return filled("wire.h.txt", words), filled("wire.c.txt", words)
 

@@ -68,10 +68,11 @@ class Frame:
     payload: bytes = b""
 
     def encoded(self) -> bytes:
-        """Returns the bytes for the line: without any zero, then one zero."""
+        """Returns the bytes for the line: a zero, bytes that are none, a zero."""
         head = _HEADER.pack(VERSION, self.kind, self.session, self.sequence, len(self.payload))
         whole = head + self.payload
-        return stuffed(whole + _CHECKSUM.pack(zlib.crc32(whole))) + b"\0"
+        # The zero before it ends what is left of a frame that was cut.
+        return b"\0" + stuffed(whole + _CHECKSUM.pack(zlib.crc32(whole))) + b"\0"
 
     def numbers(self, n: int) -> Array:
         """Returns a payload of ``n`` numbers; `FrameError` where these are not finite, or not so many."""

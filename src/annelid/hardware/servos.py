@@ -229,9 +229,10 @@ class ServoPlant(PacedPlant):
         error: object = ""
         for _ in range(5):
             try:
+                # Without its watchdog, which would hold a servo on its way to where it is relaxed.
+                self._write(Register.WATCHDOG, 1, [0] * self.n_muscles)
                 self._write(Register.GOAL, 4, self._wiring.goals(self.command))
                 if len(self._read(Register.GOAL, 0.05, 4)) == self.n_muscles:
-                    self._write(Register.WATCHDOG, 1, [0] * self.n_muscles)
                     return None
             except (OSError, SimulationStopped) as reason:
                 error = f": {reason}"

@@ -253,7 +253,9 @@ def test_random_loss_damage_and_delay(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
 
     def fault(way: str, n: int, data: bytes) -> Arrivals:
-        names = [name for name in FAULTS if "stop" not in name and "error" not in name and name != "a line that is gone"]
+        names = [
+            name for name in FAULTS if "stop" not in name and "error" not in name and name != "a line that is gone"
+        ]
         return FAULTS[str(rng.choice(names[:35]))](data) if n > 6 and rng.random() < 0.1 else [(0.0, data)]
 
     body = Body()

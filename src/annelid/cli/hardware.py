@@ -37,7 +37,9 @@ def loop_command(
     ] = None,
     servos: Annotated[
         str | None,
-        typer.Option(metavar="LINE", help="A robot of servos in the manner of Dynamixel 2.0: a serial port as PORT@BAUD."),
+        typer.Option(
+            metavar="LINE", help="A robot of servos in the manner of Dynamixel 2.0: a serial port as PORT@BAUD."
+        ),
     ] = None,
     firmware: Annotated[
         str | None, typer.Option(metavar="LINE", help=f"A controller that speaks annelid's protocol: {_LINE}.")
@@ -75,7 +77,7 @@ def loop_command(
 
     With a robot, the preset's controller drives it. With firmware, as `annelid export-network --wire` writes it, the
     firmware drives the preset's simulated body. With both, the firmware drives the robot. Writes run.nc, for `annelid
-    show` and `annelid compare`, and prints latency and jitter with every missed deadline.
+    show` and `annelid compare`, and loop.csv: latency and jitter, missed deadlines and lost answers.
 
     The robot is sent zero activation and a stop at the end, on Ctrl-C, when the watchdog's time is over, and when
     anything else goes wrong; docs/wire.md describes the protocol, and what stops it.
@@ -87,6 +89,7 @@ def loop_command(
     annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
     """
     from annelid.hardware import Limits, Wiring, drive, open_link
+    from annelid.output import write_text
 
     config = config_of(preset, overrides_of(assignments, duration_s=duration), segments)
     limits = Limits(least, most, math.inf if most_rate is None else most_rate)
@@ -120,6 +123,7 @@ def loop_command(
             link.close()
     run = driven.run
     print_run(run, quiet=quiet)
+    written = write_text(run.path.with_name("loop.csv"), _csv(driven.report))
     if not give_files((), {"loop": driven.report}) and not quiet:
         from annelid.terminal import Console
 
@@ -129,6 +133,21 @@ def loop_command(
         raise typer.Exit(EXIT_INTERRUPTED if run.status == "interrupted" else EXIT_STOPPED)
     if not wants_json():
         print_paths([run.path])
+    print_paths([written])
+
+
+def _times(report: dict[str, Any]) -> dict[str, dict[str, float | None]]:
+    of_answers = {f"answer of the {who}": report[who]["latency_s"] for who in ("robot", "firmware") if who in report}
+    return {"command late": report["lateness_s"], **of_answers}
+
+
+def _csv(report: dict[str, Any]) -> str:
+    lost = [report["missed_deadlines"], *(report[who]["lost"] for who in ("robot", "firmware") if who in report)]
+    rows = zip(_times(report).items(), lost, strict=True)
+    cells = [(name, report["periods"], n, *times.values()) for (name, times), n in rows]
+    head = "what,periods,missed,median_s,p99_s,p99_9_s,max_s"
+    lines = (",".join("" if cell is None else str(cell) for cell in row) for row in cells)
+    return "\n".join([head, *lines]) + "\n"
 
 
 def _table(report: dict[str, Any]) -> Table:
@@ -137,9 +156,7 @@ def _table(report: dict[str, Any]) -> Table:
     missed, periods = report["missed_deadlines"], report["periods"]
     title = f"{periods} periods of {1e3 / report['rate_hz']:g} ms, {missed} deadlines missed"
     table = Table("ms", "median", "99 %", "99.9 %", "largest", title=title, title_justify="left")
-    rows = {"command late": report["lateness_s"]}
-    rows |= {f"answer of the {who}": report[who]["latency_s"] for who in ("robot", "firmware") if who in report}
-    for name, times in rows.items():
+    for name, times in _times(report).items():
         table.add_row(name, *("-" if time_s is None else f"{1e3 * time_s:.3f}" for time_s in times.values()))
     return table
 

@@ -148,9 +148,7 @@ class RemotePlant(PacedPlant):
 
     partner: WirePartner
 
-    def __init__(
-        self, partner: WirePartner, pace: Pace, limits: Limits, rest_m: Array, interface: Interface
-    ) -> None:
+    def __init__(self, partner: WirePartner, pace: Pace, limits: Limits, rest_m: Array, interface: Interface) -> None:
         """Makes a robot at rest, as `PacedPlant`."""
         super().__init__(partner, pace, limits, rest_m, interface.n_muscles, interface.timestep_us / 1e6)
         self._interface = interface
@@ -176,7 +174,9 @@ class RemoteController:
 
     name = "firmware over the wire"
 
-    def __init__(self, partner: WirePartner, pace: Pace, interface: Interface, n_steps: int, *, keeps_pace: bool) -> None:
+    def __init__(
+        self, partner: WirePartner, pace: Pace, interface: Interface, n_steps: int, *, keeps_pace: bool
+    ) -> None:
         """Takes what is at the end of the line; ``keeps_pace`` where the body does not wait for the clock itself."""
         self.partner, self._pace, self._interface = partner, pace, interface
         self._n_steps, self._keeps_pace = n_steps, keeps_pace

@@ -197,9 +197,7 @@ class Partner:
 class WirePartner(Partner):
     """A partner that speaks the protocol of docs/wire.md; annelid begins every exchange."""
 
-    def __init__(
-        self, role: Role, link: Link, pace: Pace, interface: Interface, n_steps: int, watchdog: int
-    ) -> None:
+    def __init__(self, role: Role, link: Link, pace: Pace, interface: Interface, n_steps: int, watchdog: int) -> None:
         """Takes a line, who is at its end, and what passes between both in so many control steps."""
         super().__init__("robot" if role == Role.BODY else "firmware", link, pace, watchdog)
         self._role, self._interface = role, interface

@@ -19,6 +19,7 @@ import annelid
 from annelid.control.base import SENSED
 from annelid.errors import ConfigError
 from annelid.export import Firmware, controller_firmware
+from annelid.export.host import OPTIONS
 from annelid.hardware.frames import (
     MOST_BYTES,
     Decoder,
@@ -145,9 +146,9 @@ class CPeer:
     def __init__(self, firmware: Firmware, folder: Path) -> None:
         firmware.write(folder, wire=True)
         name, library = firmware.name, folder / "wire.so"
-        options = "-std=c99 -Wall -Wextra -Werror -pedantic -O2 -ffp-contract=off -shared -fPIC".split()
+        options = [*OPTIONS.split(), "-o", str(library)]
         sources = [str(folder / f"{name}{ending}") for ending in (".c", "_wire.c")]
-        subprocess.run(["cc", *options, "-o", str(library), *sources, "-lm"], check=True)
+        subprocess.run(["cc", *options, *sources, "-lm"], check=True)
         self._code: Any = ctypes.CDLL(str(library))
         self._receive = getattr(self._code, f"{name}_wire_receive")
         self._receive.restype, self._receive.argtypes = ctypes.c_size_t, [ctypes.c_ubyte, ctypes.c_char_p]
@@ -294,4 +295,4 @@ def test_a_peer_survives_anything(parts: list[bytes]) -> None:
     peer = robot(body)
     for part in parts:
         peer.receive(part)
-    assert all(((0 <= each) & (each <= 1)).all() for each in body.commands)
+    assert all(((each >= 0) & (each <= 1)).all() for each in body.commands)

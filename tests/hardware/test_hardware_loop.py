@@ -140,9 +140,13 @@ def test_a_bus_that_fails_stops_the_loop(fault: Callable[[bytes], bytes], senten
     plant.reset(0)
     plant.stride(np.ones(3), 10)
     bus.fault = fault
-    with pytest.raises(SimulationStopped, match=sentence):
+
+    def go_on() -> None:
         for _ in range(10):
             plant.stride(np.ones(3), 10)
+
+    with pytest.raises(SimulationStopped, match=sentence):
+        go_on()
     plant.stop()
     assert plant.doubts()[0].startswith("the robot at bus did not confirm that it stopped")
     # The command to relax went out all the same.

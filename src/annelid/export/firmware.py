@@ -72,7 +72,7 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
 
 
 def _wire(name: str, interface: Interface) -> tuple[str, ...]:
-    # Header, the larger of a hello and a frame of numbers, checksum; stuffing adds a byte for each 254, zeros are around it.
+    # Header, the larger of a hello and a frame of numbers, checksum. Stuffing adds a byte for each 254, and two zeros.
     room = 8 + max(15, 4 * interface.n_sensed, 4 * interface.n_muscles) + 4
     words = {
         "name": name,

@@ -1,4 +1,4 @@
-"""A robot that is not there: servos and potentiometers behind a pseudo-terminal, each segment a cheap model with a lag."""
+"""A robot that is not there: servos and potentiometers behind a pseudo-terminal, each segment a model with a lag."""
 
 from __future__ import annotations
 

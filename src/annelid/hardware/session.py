@@ -1,4 +1,4 @@
-"""What every line to hardware shares: the pace of the wall clock, the watchdog, the limits, and the exchange of frames."""
+"""What every line to hardware shares: the pace of the wall clock, watchdog, limits, and the exchange of frames."""
 
 from __future__ import annotations
 

@@ -23,6 +23,7 @@ from annelid.hardware.links import MOST_READ
 from annelid.hardware.peer import serve
 from annelid.hardware.servos import ServoPlant
 from annelid.hardware.session import Pace, Times
+from annelid.nervous import peristalsis_network
 from annelid.simulation.runfile import open_run
 
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
@@ -299,6 +300,18 @@ def test_the_command_refuses_in_a_sentence(words: list[str], sentence: str, tmp_
     assert done.exit_code == 2
     assert sentence in " ".join(done.output.replace("│", " ").split())
     assert not (tmp_path / "run" / "run.nc").exists()
+
+
+def test_the_command_writes_the_c_client(tmp_path: Path) -> None:
+    words = ["export-network", "riddle2023-rods", "-o", str(tmp_path), "--wire"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert {each.name for each in tmp_path.iterdir()} >= {"riddle2023_rods_wire.h", "riddle2023_rods_wire.c"}
+    assert len((tmp_path / "riddle2023_rods_wire.c").read_text().splitlines()) < 200
+    assert "exists" in CliRunner().invoke(app, words).output
+    (tmp_path / "alone.toml").write_text(peristalsis_network(3).to_toml())
+    done = CliRunner().invoke(app, ["export-network", str(tmp_path / "alone.toml"), "-o", str(tmp_path), "--wire"])
+    assert done.exit_code == 2
+    assert "only a whole controller answers over the wire" in " ".join(done.output.split())
 
 
 def test_a_run_that_was_interrupted_is_whole(tmp_path: Path) -> None:

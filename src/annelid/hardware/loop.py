@@ -24,7 +24,7 @@ from annelid.protocols import Controller, Plant, Sensation
 from annelid.simulation.lock import locks
 from annelid.simulation.loop import simulate
 from annelid.simulation.progress import ProgressCallback
-from annelid.simulation.runfile import FILE_NAME, Run, open_run
+from annelid.simulation.runfile import Run, open_run
 from annelid.simulation.stepping import build_controller, build_plant
 
 
@@ -87,7 +87,6 @@ def drive(
     Raises:
         ConfigError: Nothing is real, nobody answers, or what answers does not fit.
         RunFileError: The file cannot be written.
-        SimulationStopped: It stopped before the first sample.
     """
     if robot is None and servos is None and firmware is None:
         raise ConfigError("nothing here is real: name a robot, servos or firmware, or use annelid.simulate")
@@ -124,9 +123,6 @@ def drive(
     try:
         run = simulate(config, out, plant=plant, controller=controller, progress=progress, overwrite=overwrite)
     except SimulationStopped:
-        # Before the first sample there is no file, or that of a run before.
-        if pace.late.n == 0 or not (Path(out) / FILE_NAME).exists():
-            raise
         run = open_run(out)
     finally:
         for part in parts:

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from annelid.control.base import SENSED
+from annelid.errors import ConfigError, SimulationStopped
 from annelid.hardware.frames import Interface
 from annelid.hardware.session import Limits, Pace, Partner, WirePartner
 from annelid.protocols import Array, Recordable, Sensation, Signal, Values
@@ -69,12 +70,19 @@ class PacedPlant(ABC):
         self._unconfirmed += filter(None, [self._relax()])
 
     def reset(self, seed: int) -> Sensation:
-        """Connects; returns the first sensation, of the relaxed robot."""
+        """Connects; returns the first sensation, of the relaxed robot.
+
+        Raises:
+            ConfigError: There is no robot, it does not fit, or its sensors cannot be read.
+        """
         self._begin()
         self._taken, self.command = 0, np.zeros(self.n_muscles)
         self._sensed = {}
-        while not self._sensed:
-            self._move(self.command)
+        try:
+            while not self._sensed:
+                self._move(self.command)
+        except SimulationStopped as stop:
+            raise ConfigError(f"the robot does not begin: {stop}") from None
         self._is_fresh = True
         return self._sensation()
 

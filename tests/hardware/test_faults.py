@@ -230,7 +230,7 @@ def test_a_fault_ends_safely_or_is_survived(case: tuple[str, str, str], tmp_path
     check(line, body, tmp_path / "run", ended)
     if stage == "in the middle once" and name in ("drop", "delay of three periods", "half of it", "noise instead"):
         assert not ended, "one frame is not missed"
-        assert any("1 answers of the robot were lost" in doubt for doubt in open_run(tmp_path / "run").warnings)
+        assert any(doubt == "lost answers of the robot: 1" for doubt in open_run(tmp_path / "run").warnings)
     if stage == "in the middle on" and name in ("drop", "noise instead", "another session", "an unknown kind"):
         assert "no answer of the robot at memory for 5 periods of 0.01 s" in ended
 

@@ -25,7 +25,7 @@ Ticks = Annotated[
 ]
 Potentiometer = Annotated[
     tuple[float, float],
-    typer.Option(metavar="COUNTS M_PER_COUNT", help="Reading of a potentiometer at rest, and metres per count."),
+    typer.Option(metavar="COUNTS M_PER_COUNT", help="Reading of a potentiometer at rest, and m per count."),
 ]
 _TICKS, _POTENTIOMETER = (1024, 3072), (512.0, 0.3 / 4095)
 
@@ -44,14 +44,14 @@ def loop_command(
     firmware: Annotated[
         str | None, typer.Option(metavar="LINE", help=f"A controller that speaks annelid's protocol: {_LINE}.")
     ] = None,
-    rate: Annotated[float, typer.Option(help="Exchanges per second.", min=1.0, max=10_000.0)] = 100.0,
+    rate: Annotated[float, typer.Option(help="Exchanges in a second.", min=1.0, max=10_000.0)] = 100.0,
     watchdog: Annotated[
         int, typer.Option(min=1, max=10_000, help="Stop after so many periods without a valid answer.")
     ] = 10,
-    least: Annotated[float, typer.Option(help="Least activation that is sent to a robot.")] = 0.0,
-    most: Annotated[float, typer.Option(help="Largest activation that is sent to a robot.")] = 1.0,
+    least: Annotated[float, typer.Option(help="Least activation that is sent to a robot, a share of all.")] = 0.0,
+    most: Annotated[float, typer.Option(help="Largest activation that is sent to a robot, a share of all.")] = 1.0,
     most_rate: Annotated[
-        float | None, typer.Option(help="Largest change of activation per second that is sent  [default: no limit]")
+        float | None, typer.Option(help="Largest change of activation that is sent in a second  [default: no limit]")
     ] = None,
     ticks: Ticks = _TICKS,
     potentiometer: Potentiometer = _POTENTIOMETER,

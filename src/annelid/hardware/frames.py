@@ -218,7 +218,7 @@ class Interface:
     def digest(self) -> int:
         """CRC-32 of the interface in words, so that neither side takes one number for another."""
         sensed = " ".join(f"{name}{list(shape)}" for name, shape in self.shapes.items())
-        text = f"annelid {VERSION}: {sensed} -> activation[{self.n_muscles}] every {self.timestep_us} us"
+        text = f"wire {VERSION}: {sensed} -> activation[{self.n_muscles}] every {self.timestep_us} us"
         return zlib.crc32(text.encode())
 
     def split(self, values: Array) -> dict[str, Array]:

@@ -193,6 +193,9 @@ def pseudo_robot(robot: PseudoRobot) -> Iterator[str]:
 
     Yields:
         The path of the terminal.
+
+    Raises:
+        ConfigError: This system has no pseudo-terminals.
     """
     path: list[str] = []
     is_there, is_over = threading.Event(), threading.Event()

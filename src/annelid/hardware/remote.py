@@ -256,4 +256,4 @@ def timing_values(partner: Partner, pace: Pace | None) -> Values:
 def _missed(pace: Pace) -> tuple[str, ...]:
     if not pace.missed:
         return ()
-    return (f"{pace.missed} deadlines were missed, and the loop fell {pace.slipped_s:.3g} s behind the wall clock",)
+    return (f"missed deadlines: {pace.missed}; the loop fell {pace.slipped_s:.3g} s behind the wall clock",)

@@ -186,8 +186,8 @@ class Partner:
         return SimulationStopped(f"the line to the {self.who} at {self.link.name} is gone: {reason}")
 
     def doubts(self) -> tuple[str, ...]:
-        """Returns a sentence about answers that were lost, if any."""
-        return (f"{self.lost} answers of the {self.who} were lost",) if self.lost else ()
+        """Returns how many answers were lost, if any."""
+        return (f"lost answers of the {self.who}: {self.lost}",) if self.lost else ()
 
     def to_dict(self) -> dict[str, object]:
         """Returns what is reported."""

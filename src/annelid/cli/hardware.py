@@ -10,9 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from annelid.cli.common import Assignments, NamedPreset, Segments, config_of, overrides_of, print_paths, print_run
+from annelid.cli.common import (
+    Assignments,
+    NamedPreset,
+    Segments,
+    config_of,
+    overrides_of,
+    print_paths,
+    print_results,
+    print_run,
+)
 from annelid.cli.entry import EXIT_INTERRUPTED, EXIT_STOPPED, complain
-from annelid.cli.result import give_files, wants_json
+from annelid.cli.result import wants_json
 from annelid.cli.run import locked_folder
 
 if TYPE_CHECKING:
@@ -89,7 +98,7 @@ def loop_command(
     annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
     """
     from annelid.hardware import Limits, Wiring, drive, open_link
-    from annelid.output import write_text
+    from annelid.output import write_csv
 
     config = config_of(preset, overrides_of(assignments, duration_s=duration), segments)
     limits = Limits(least, most, math.inf if most_rate is None else most_rate)
@@ -123,41 +132,39 @@ def loop_command(
             link.close()
     run = driven.run
     print_run(run, quiet=quiet)
-    written = write_text(run.path.with_name("loop.csv"), _csv(driven.report))
-    if not give_files((), {"loop": driven.report}) and not quiet:
-        from annelid.terminal import Console
-
-        Console().print(_table(driven.report))
+    if not wants_json():
+        print_paths([run.path])
+    rows = _rows(driven.report)
+    times = write_csv(run.path.with_name("loop.csv"), list(rows[0]), [list(row.values()) for row in rows])
+    print_results([times], _table(driven.report, rows), quiet=quiet)
     if run.status != "complete":
         complain(f"{run.message}; what was recorded is in {run.path}")
         raise typer.Exit(EXIT_INTERRUPTED if run.status == "interrupted" else EXIT_STOPPED)
-    if not wants_json():
-        print_paths([run.path])
-    print_paths([written])
 
 
-def _times(report: dict[str, Any]) -> dict[str, dict[str, float | None]]:
-    of_answers = {f"answer of the {who}": report[who]["latency_s"] for who in ("robot", "firmware") if who in report}
-    return {"command late": report["lateness_s"], **of_answers}
+def _rows(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """Times of commands and answers, in s, as records."""
+    there = [(who, report[who]) for who in ("robot", "firmware") if who in report]
+    found = [
+        ("command late", report["missed_deadlines"], report["lateness_s"]),
+        *((f"answer of the {who}", its["lost"], its["latency_s"]) for who, its in there),
+    ]
+    return [
+        {"what": what, "periods": report["periods"], "missed": n, **{f"{name}_s": each for name, each in times.items()}}
+        for what, n, times in found
+    ]
 
 
-def _csv(report: dict[str, Any]) -> str:
-    lost = [report["missed_deadlines"], *(report[who]["lost"] for who in ("robot", "firmware") if who in report)]
-    rows = zip(_times(report).items(), lost, strict=True)
-    cells = [(name, report["periods"], n, *times.values()) for (name, times), n in rows]
-    head = "what,periods,missed,median_s,p99_s,p99_9_s,max_s"
-    lines = (",".join("" if cell is None else str(cell) for cell in row) for row in cells)
-    return "\n".join([head, *lines]) + "\n"
-
-
-def _table(report: dict[str, Any]) -> Table:
+def _table(report: dict[str, Any], rows: list[dict[str, Any]]) -> Table:
     from rich.table import Table
 
-    missed, periods = report["missed_deadlines"], report["periods"]
-    title = f"{periods} periods of {1e3 / report['rate_hz']:g} ms, {missed} deadlines missed"
-    table = Table("ms", "median", "99 %", "99.9 %", "largest", title=title, title_justify="left")
-    for name, times in _times(report).items():
-        table.add_row(name, *("-" if time_s is None else f"{1e3 * time_s:.3f}" for time_s in times.values()))
+    title = f"{report['periods']} periods of {1e3 / report['rate_hz']:g} ms, times in ms"
+    table = Table("", "missed, lost", "median", "99 %", "99.9 %", "largest", title=title, title_justify="left")
+    for row in rows:
+        times = [row[name] for name in ("median_s", "p99_s", "p99_9_s", "max_s")]
+        table.add_row(
+            row["what"], str(row["missed"]), *("-" if each is None else f"{1e3 * each:.3f}" for each in times)
+        )
     return table
 
 

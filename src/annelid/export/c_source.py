@@ -79,11 +79,13 @@ class Firmware:
             Their paths.
 
         Raises:
-            ConfigError: The wire of a network without a controller is asked for.
+            ConfigError: The wire of what has none is asked for.
             RunFileError: A file exists, unless it may be overwritten, or cannot be written.
         """
         if wire and not self.wire:
-            raise ConfigError("only a whole controller answers over the wire, not a network alone")
+            raise ConfigError(
+                "only a whole controller answers over the wire, not a network alone, and none of more than 256 numbers"
+            )
         folder = Path(folder)
         paths = self.paths(folder, wire=wire)
         for path in paths:

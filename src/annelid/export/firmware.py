@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -67,8 +68,11 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
     vectors = _controller_vectors(controller, code)
     controller.reset(0)
     firmware = Writer(code, start, real, name, vectors).firmware("activation", code.n_muscles)
-    interface = Interface(code.senses, code.n_segments, code.n_muscles, round(1e3 * code.stepper.timestep_ms))
-    return replace(firmware, wire=_wire(firmware.name, interface))
+    # A very long worm has more numbers than a frame holds, and goes without.
+    with suppress(ConfigError):
+        interface = Interface(code.senses, code.n_segments, code.n_muscles, round(1e3 * code.stepper.timestep_ms))
+        firmware = replace(firmware, wire=_wire(firmware.name, interface))
+    return firmware
 
 
 def _wire(name: str, interface: Interface) -> tuple[str, ...]:

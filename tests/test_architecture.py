@@ -48,6 +48,7 @@ MAY_IMPORT = {
     "live": {"config", "morphology", "nervous", "arena", "body", "simulation", "analysis", "draw"} | BASE,
     "environments": {"config", "morphology", "arena", "body", "simulation", "analysis", "draw"} | BASE,
     "experiment": {"config", "morphology", "plausibility", "arena", "body", "simulation", "analysis", "draw"} | BASE,
+    "hardware": {"config", "control", "simulation"} | BASE,
     "export": {
         "config",
         "references",
@@ -59,6 +60,7 @@ MAY_IMPORT = {
         "draw",
         "live",
         "experiment",
+        "hardware",
     }
     | BASE,
     "cli": {
@@ -73,6 +75,7 @@ MAY_IMPORT = {
         "live",
         "experiment",
         "export",
+        "hardware",
     }
     | BASE,
 }

@@ -28,6 +28,7 @@ __all__ = [
     "Signal",
     "State",
     "Stateful",
+    "Stoppable",
     "StridingController",
     "Values",
     "Watched",
@@ -205,6 +206,15 @@ class Doubtful(Protocol):
 
     def doubts(self) -> tuple[str, ...]:
         """Returns a sentence for everything doubtful since time zero."""
+        ...
+
+
+@runtime_checkable
+class Stoppable(Protocol):
+    """The capability of hardware of being brought to a safe state, which comes before all else when a run ends."""
+
+    def stop(self) -> None:
+        """Stops, once; never raises."""
         ...
 
 

@@ -16,6 +16,7 @@ from outcome import STUDY, Command, Outcome
 from typer.main import get_command
 
 from annelid.cli import app, entry
+from annelid.hardware import PseudoRobot, pseudo_robot
 from annelid.output import write_csv, write_json
 from annelid_studies.riddle2023.contents import Claim, Report, Table
 
@@ -24,6 +25,7 @@ pytestmark = pytest.mark.usefixtures("runs_in_this_process", "undrawn")
 PAGE = Path(__file__).parents[2] / "docs" / "data_out.md"
 NO_RESULT = {
     "view": "a view goes on until it is closed",
+    "pseudo-robot": "a robot goes on until it is ended",
     "cite": "BibTeX is a format for programs already",
 }
 ROWS = [{"run": "007", "speed_m_per_s": 0.5, "slip": None, "ordered": True, "problem": "silent"}]
@@ -140,7 +142,16 @@ def faked(name: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
     return run
 
 
+def loop(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    pytest.importorskip("serial")
+    with pseudo_robot(PseudoRobot(3, 3)) as path:
+        # Busy tests beside it must not end it.
+        quick = ("--duration", "0.2", "--rate", "20", "--watchdog", "40")
+        return annelid("loop", "riddle2023-rods", "--servos", path, *quick, "--json")
+
+
 DONE = {
+    "loop": loop,
     "run": typed("run", "riddle2022-planar", "--duration", "0.1", "--no-video"),
     "check": typed("check", "riddle2022-planar"),
     "build": typed("build", "riddle2023-rods"),

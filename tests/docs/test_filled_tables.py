@@ -47,12 +47,14 @@ EXCEPTIONS = {
     ("docs/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
     ("docs/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
     ("docs/validation.md", "step (ms)"): "the same",
+    ("docs/wire.md", "bytes"): "the protocol, not results",
     ("docs/weak_middle.md", "cause"): "printed by `annelid experiment weak-middle`, which writes it into no file",
 }
 """Tables of numbers without a result file, by page and first head, and why."""
 
 NO_WORM = {
     "bench.json": "every case names the digest of its own configuration",
+    "loop.csv": "times of a loop with a pseudo-robot",
     "robust_network.csv": "networks without a body",
     "firmware_random.csv": "the same",
     "lateral_damping.csv": "rods with and without the damping that it is about",

@@ -2,6 +2,7 @@
 
 from annelid.cli.entry import Command, app, experiments, main
 from annelid.cli.gallery import gallery_command
+from annelid.cli.hardware import loop_command, pseudo_robot_command
 from annelid.cli.result import with_json
 from annelid.cli.results import cite, compare_command, export_command, plot, render, show, view_command
 from annelid.cli.run import limit_cycle_command, run_command
@@ -20,8 +21,8 @@ from annelid.registry import load_extensions, load_home
 
 __all__ = ["app", "main"]
 
-_NO_JSON = {"view", "cite"}
-"""A view goes on until it is closed; BibTeX is a format for programs already."""
+_NO_JSON = {"view", "cite", "pseudo-robot"}
+"""A view and a pseudo-robot go on until they are ended; BibTeX is a format for programs already."""
 
 # In the order in which the help lists them.
 for _name, _command in (
@@ -30,6 +31,8 @@ for _name, _command in (
     ("check", check),
     ("build", build),
     ("export-network", export_network),
+    ("loop", loop_command),
+    ("pseudo-robot", pseudo_robot_command),
     ("runs", runs_command),
     ("show", show),
     ("compare", compare_command),

@@ -122,7 +122,7 @@ def run_command(
         raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments, --fidelity or --arena")
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
-    folder = _locked_folder(out, config.name)
+    folder = locked_folder(out, config.name)
     result = None
     try:
         if uncertainty is None:
@@ -239,7 +239,7 @@ def _errors(vary: list[str] | None) -> dict[str, float]:
     return errors
 
 
-def _locked_folder(out: Path | None, name: str) -> Path:
+def locked_folder(out: Path | None, name: str) -> Path:
     """Returns the folder to run into, or a new one with the next number, which this command alone writes."""
     if out is not None:
         lock(out)

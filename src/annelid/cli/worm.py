@@ -214,6 +214,9 @@ def export_network(
     scheme: Annotated[
         str | None, typer.Option(help="Scheme of a network: euler, toolbox or heun  [default: euler]")
     ] = None,
+    wire: Annotated[
+        bool, typer.Option("--wire", help="Also write what answers `annelid loop` over a serial line or UDP.")
+    ] = False,
     force: Force = False,
 ) -> None:
     """Write a network, or a worm's whole controller, as C99 for a microcontroller.
@@ -225,6 +228,7 @@ def export_network(
     \b
     annelid export-network riddle2022-planar -o firmware
     annelid export-network riddle2023-rods -o firmware --float
+    annelid export-network riddle2023-rods -o firmware --float --wire
     annelid export-network network.toml -o firmware --timestep-ms 0.5
     """
     from typing import cast
@@ -250,7 +254,7 @@ def export_network(
     else:
         config = config_of(source, overrides_of(assignments), segments).model_copy(update={"trial": None})
         firmware = controller_firmware(build_controller(config, build_plant(config)), config.name, real=real)
-    for written in firmware.paths(output):
+    for written in firmware.paths(output, wire=wire):
         if written.exists():
             refuse_existing(written, force)
-    print_paths(firmware.write(output, overwrite=force))
+    print_paths(firmware.write(output, overwrite=force, wire=wire))

@@ -54,6 +54,7 @@ class Firmware:
         sensors: Names and shapes of what a step is given, in the order in the struct, which has nothing else.
         returned: Name and length of what it returns.
         neurons: Names of the neurons, in the order in ``potential_mV``, with which the struct of the state begins.
+        wire: Of a controller: texts of ``name_wire.h`` and ``name_wire.c``, which answer annelid over a line.
     """
 
     name: str
@@ -64,19 +65,29 @@ class Firmware:
     sensors: Mapping[str, tuple[int, ...]]
     returned: tuple[str, int]
     neurons: tuple[str, ...]
+    wire: tuple[str, ...] = ()
 
-    def paths(self, folder: Path) -> list[Path]:
+    def paths(self, folder: Path, *, wire: bool = False) -> list[Path]:
         """Returns where `write` writes."""
-        return [folder / f"{self.name}{ending}" for ending in (".h", ".c", "_selftest.c")]
+        endings = (".h", ".c", "_selftest.c", *(("_wire.h", "_wire.c") if wire else ()))
+        return [folder / f"{self.name}{ending}" for ending in endings]
 
-    def write(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
-        """Writes the three files into a folder, which is made if it is not there, and returns their paths.
+    def write(self, folder: str | Path, *, overwrite: bool = False, wire: bool = False) -> list[Path]:
+        """Writes the three files, and those of the wire if asked for, into a folder, which is made if it is not there.
+
+        Returns:
+            Their paths.
 
         Raises:
+            ConfigError: The wire of what has none is asked for.
             RunFileError: A file exists, unless it may be overwritten, or cannot be written.
         """
+        if wire and not self.wire:
+            raise ConfigError(
+                "only a whole controller answers over the wire, not a network alone, and none of more than 256 numbers"
+            )
         folder = Path(folder)
-        paths = self.paths(folder)
+        paths = self.paths(folder, wire=wire)
         for path in paths:
             if path.exists() and not overwrite:
                 raise RunFileError(f"{path} exists: name another folder, or allow to overwrite it")
@@ -84,7 +95,7 @@ class Firmware:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RunFileError(f"cannot make the folder {folder}: {error.strerror}") from None
-        texts = (self.header, self.source, self.self_test)
+        texts = (self.header, self.source, self.self_test, *(self.wire if wire else ()))
         return [write_text(path, text) for path, text in zip(paths, texts, strict=True)]
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from annelid.control.base import SENSED, Coded, ControllerCode
 from annelid.errors import ConfigError
-from annelid.export.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer
+from annelid.export.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer, filled
+from annelid.hardware.frames import MOST_STEPS, VERSION, Interface
 from annelid.nervous import Network, Scheme
 from annelid.protocols import Controller, Sensation
 
@@ -65,7 +67,30 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
     start = code.network_state.copy()
     vectors = _controller_vectors(controller, code)
     controller.reset(0)
-    return Writer(code, start, real, name, vectors).firmware("activation", code.n_muscles)
+    firmware = Writer(code, start, real, name, vectors).firmware("activation", code.n_muscles)
+    # A very long worm has more numbers than a frame holds, and goes without.
+    with suppress(ConfigError):
+        interface = Interface(code.senses, code.n_segments, code.n_muscles, round(1e3 * code.stepper.timestep_ms))
+        firmware = replace(firmware, wire=_wire(firmware.name, interface))
+    return firmware
+
+
+def _wire(name: str, interface: Interface) -> tuple[str, ...]:
+    # Header, the larger of a hello and a frame of numbers, checksum. Stuffing adds a byte for each 254, and two zeros.
+    room = 8 + max(15, 4 * interface.n_sensed, 4 * interface.n_muscles) + 4
+    words = {
+        "name": name,
+        "NAME": name.upper(),
+        "version": VERSION,
+        "n_segments": interface.n_segments,
+        "n_muscles": interface.n_muscles,
+        "n_sensed": interface.n_sensed,
+        "digest": interface.digest,
+        "most_steps": MOST_STEPS,
+        "room": room,
+        "most_answer": room + room // 254 + 3,
+    }
+    return filled("wire.h.txt", words), filled("wire.c.txt", words)
 
 
 def _controller_vectors(controller: Coded, code: ControllerCode) -> Vectors:

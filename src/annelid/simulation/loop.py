@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from annelid.config import RunConfig, as_config
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
-from annelid.protocols import Controller, Plant, Records, Sensation, Values
+from annelid.protocols import Controller, Plant, Records, Sensation, Stoppable, Values
 from annelid.simulation.lock import locks
 from annelid.simulation.progress import Interruption, ProgressCallback, reporting
 from annelid.simulation.recorder import Recorder, Senses, global_attributes, loop_signals
@@ -129,6 +129,7 @@ class RecordedRun:
 
     def finish(self, interrupted_by: str | None) -> None:
         """Writes all that is left and closes the file: the run is complete, or a signal of that name ended it."""
+        self._stop()
         self.checkpoint()
         if interrupted_by is None:
             self._end("complete")
@@ -138,6 +139,7 @@ class RecordedRun:
     def end_with(self, error: BaseException) -> None:
         """Ends the run because of an error; a file that is closed stays as it is."""
         self.error = self.error or error
+        self._stop()
         if self.recorder.closed:
             return
         with suppress(RunFileError):
@@ -151,6 +153,11 @@ class RecordedRun:
                 self._end("interrupted", self.simulation.at("interrupted"), whole=False)
             else:
                 self._end("failed", self.simulation.at(f"{type(error).__name__}: {error}"))
+
+    def _stop(self) -> None:
+        for part in (self.simulation.plant, self.simulation.controller):
+            if isinstance(part, Stoppable):
+                part.stop()
 
     def _end(self, status: str, message: str = "", whole: bool = True) -> None:
         self.status, self.message = status, message

@@ -55,17 +55,31 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
     Raises:
         ConfigError: The controller cannot be written as C, or a number is too large for the type.
     """
-    if not isinstance(controller, Coded):
-        raise ConfigError(
-            f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
-            "a network can (sns, adaptive, sns-pressure, sns-robust, NetworkController)"
-        )
+    controller = _coded(controller)
     controller.reset(0)
     code = controller.code()
     start = code.network_state.copy()
     vectors = _controller_vectors(controller, code)
     controller.reset(0)
     return Writer(code, start, real, name, vectors).firmware("activation", code.n_muscles)
+
+
+def controller_network(controller: Controller) -> Network:
+    """Returns the network of a controller.
+
+    Raises:
+        ConfigError: The controller steps none.
+    """
+    return _coded(controller).code().network
+
+
+def _coded(controller: Controller) -> Coded:
+    if not isinstance(controller, Coded):
+        raise ConfigError(
+            f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
+            "a network can (sns, adaptive, sns-pressure, sns-robust, NetworkController)"
+        )
+    return controller
 
 
 def _controller_vectors(controller: Coded, code: ControllerCode) -> Vectors:

@@ -1,10 +1,10 @@
-"""What goes elsewhere: a run as tables, NWB, pictures, a page or a model; a controller as C99; a network as C99 or LEMS."""
+"""What goes elsewhere: runs as tables, NWB, pictures, pages, models; controllers as C99; networks as C99 or LEMS."""
 
 from annelid.export.c_source import Firmware
 from annelid.export.firmware import controller_firmware, controller_network, network_firmware
 from annelid.export.formats import FORMATS, Format, find_format
 from annelid.export.host import HostFirmware
-from annelid.export.lems import lems_text, read_lems, write_lems
+from annelid.export.lems import lems_text, read_lems
 from annelid.export.tables import Selection, selected
 
 __all__ = [
@@ -20,5 +20,4 @@ __all__ = [
     "network_firmware",
     "read_lems",
     "selected",
-    "write_lems",
 ]

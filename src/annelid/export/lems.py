@@ -1,8 +1,8 @@
 """A network as LEMS, the language that NeuroML 2 is defined in, and back.
 
 The file has one component type, whose equations are those of `annelid.nervous`, and one component with the numbers:
-its attributes are the fields of the network's TOML text, ``neuron_1_capacitance_nF="5.0nF"``. It includes no other file,
-and runs as it is in pyLEMS and jNeuroML. Cannon et al. 2014, doi:10.3389/fninf.2014.00079.
+its attributes are the fields of the network's TOML text, ``neuron_1_capacitance_nF="5.0nF"``. It includes no other
+file, and runs as it is in pyLEMS and jNeuroML. Cannon et al. 2014, doi:10.3389/fninf.2014.00079.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, get_args
 
-from annelid.errors import ConfigError, require_positive, shortened, shown
+from annelid.errors import ConfigError, require_finite, require_positive, shortened, shown
 from annelid.nervous import Network
 from annelid.nervous.neurons import Modulated
 from annelid.nervous.toml import network_of_tables, network_tables
-from annelid.output import write_text
 from annelid.text import printable
 from annelid.textfiles import parse_xml, read_bytes
 
@@ -44,24 +43,8 @@ _IN_XML = re.compile("[\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
 """Characters that XML 1.0 can hold."""
 
 
-def write_lems(network: Network, path: str | Path, *, timestep_ms: float = 0.1, duration_ms: float = 1000.0) -> Path:
-    """Writes a network as a LEMS file, which `read_lems` reads back to the last bit, and returns its path.
-
-    Args:
-        network: The network; spikes and releases are events, and all else is continuous.
-        path: The file.
-        timestep_ms: Step of the simulation that the file asks for, ms.
-        duration_ms: Its duration, ms.
-
-    Raises:
-        ConfigError: As of `lems_text`.
-        RunFileError: The file cannot be written.
-    """
-    return write_text(Path(path), lems_text(network, timestep_ms=timestep_ms, duration_ms=duration_ms))
-
-
 def read_lems(path: str | Path) -> Network:
-    """Reads a network from a LEMS file as `write_lems` writes it; numbers and names may be others, not equations.
+    """Reads a network from a file of the text that `lems_text` makes; numbers and names may be others, not equations.
 
     Currents of inputs and the simulation are no part of a network, and are left.
 
@@ -82,7 +65,9 @@ def lems_text(
     duration_ms: float = 1000.0,
     output: str = "potentials.dat",
 ) -> str:
-    """Returns a network as LEMS text, with a simulation that writes all potentials (V) over time (s).
+    """Returns a network as LEMS text, of which `read_lems` makes the same network to the last bit.
+
+    It has a simulation that writes all potentials (V) over time (s) into a file.
 
     Args:
         network: The network.
@@ -94,7 +79,8 @@ def lems_text(
     Raises:
         ConfigError: The network has no neurons, a time is not positive, or a name has a character that XML cannot hold.
     """
-    require_positive(timestep_ms=timestep_ms, duration_ms=duration_ms)
+    for check in (require_finite, require_positive):
+        check(timestep_ms=timestep_ms, duration_ms=duration_ms)
     if not network.neurons:
         raise ConfigError(f"network {shown(network.name)} has no neurons to export")
     root = ET.Element("Lems")
@@ -134,7 +120,7 @@ def _read(root: ET.Element) -> Network:
         types = {each.get("type", each.tag) for component in components for each in component.iter()}
         raise ConfigError(
             f"must have one component beside its simulation, of the type {TYPE} as annelid writes it, but has "
-            f"{shortened(printable(', '.join(sorted(types)))) or 'none'}: others have other equations, which would be lost"
+            f"{shortened(printable(', '.join(sorted(types)))) or 'none'}: equations of other types would be lost"
         )
     network = network_of_tables(_tables(components[0]), Network)
     expected = parse_xml(lems_text(network), WHAT, MOST_ELEMENTS, MOST_LEVELS)

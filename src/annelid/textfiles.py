@@ -1,4 +1,4 @@
-"""The one reader and the one writer of TOML and JSON; what is read is bounded in size and depth."""
+"""The one reader and the one writer of TOML and JSON, and a reader of XML; all are bounded in size and depth."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import json
 import re
 import stat
 import tomllib
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from annelid.errors import UnreadableText, shortened
+from annelid.errors import ConfigError, UnreadableText, shortened
 from annelid.text import printable
 
 __all__ = ["read_json", "read_text", "read_toml", "toml_text", "toml_value"]
@@ -101,6 +102,44 @@ def _parsed(load: Callable[[str], Any], language: str, text: str, name: str) -> 
         raise _too_deep(name) from None
     check_depth(tree, name)
     return tree
+
+
+class _XmlBuilder(ET.TreeBuilder):
+    """Builds the tree of a text that is bounded in elements and depth and has no document type, hence no entities."""
+
+    def __init__(self, what: str, most_elements: int, most_levels: int) -> None:
+        super().__init__()
+        self._what, self._most_elements, self._most_levels = what, most_elements, most_levels
+        self._elements = self._level = 0
+
+    def doctype(self, *_: object) -> None:
+        raise ConfigError(f"has a document type (<!DOCTYPE ..>), which {self._what} cannot have: remove it")
+
+    def start(self, tag: str, attrs: dict[str, str]) -> ET.Element:  # pyright: ignore[reportIncompatibleMethodOverride]
+        self._elements, self._level = self._elements + 1, self._level + 1
+        if self._elements > self._most_elements:
+            raise ConfigError(f"has more than {self._most_elements:,} elements, the most of {self._what}")
+        if self._level > self._most_levels:
+            raise ConfigError(f"is nested deeper than {self._most_levels} levels, the most of {self._what}")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str) -> ET.Element:
+        self._level -= 1
+        return super().end(tag)
+
+
+def parse_xml(text: str | bytes, what: str, most_elements: int, most_levels: int) -> ET.Element:
+    """Reads XML without a document type, hence without entities; ``what`` it is stands in the sentences.
+
+    Raises:
+        ConfigError: It is no XML, has a document type, or more elements or levels than so many.
+    """
+    parser = ET.XMLParser(target=_XmlBuilder(what, most_elements, most_levels))
+    try:
+        parser.feed(text)
+        return parser.close()
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise ConfigError(f"is not valid XML: {shortened(str(error))}") from None
 
 
 def check_depth(tree: Any, name: str) -> None:

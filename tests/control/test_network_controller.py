@@ -82,7 +82,7 @@ def test_currents_and_gates_are_recorded_by_name_and_add_up() -> None:
     driven = NetworkController(network, {}, ["b"])
     names = driven.recordable().coords
     assert names["connection"] == ["a -> b", "b -> a", "b -> a_2", "a -> b_2"]
-    assert names["gate"] == ["c"]
+    assert names["channel"] == ["c"]
     after = driven.read(False)
     for step in range(200):
         before = driven.read(False)

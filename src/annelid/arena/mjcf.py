@@ -40,35 +40,10 @@ from annelid.arena.grammar import (
 from annelid.errors import ConfigError, listed, shortened, shown
 from annelid.protocols import Array
 from annelid.text import is_line
-from annelid.textfiles import read_bytes
+from annelid.textfiles import parse_xml, read_bytes
 
 _FILES = {"mesh": ("file", (".obj", ".stl")), "hfield": ("file", (".png",))}
 _FOLDERS = ("meshdir", "assetdir")
-
-
-class _Builder(ET.TreeBuilder):
-    """Builds the tree of a text that is bounded in elements and depth and has no document type, hence no entities."""
-
-    def __init__(self, grammar: Grammar) -> None:
-        super().__init__()
-        self._grammar = grammar
-        self._elements = self._level = 0
-
-    def doctype(self, *_: object) -> None:
-        raise ConfigError(f"has a document type (<!DOCTYPE ..>), which {self._grammar.what} cannot have: remove it")
-
-    def start(self, tag: str, attrs: dict[str, str]) -> ET.Element:  # pyright: ignore[reportIncompatibleMethodOverride]
-        self._elements, self._level = self._elements + 1, self._level + 1
-        what, most, deepest = self._grammar.what, self._grammar.most_elements, self._grammar.most_levels
-        if self._elements > most:
-            raise ConfigError(f"has more than {most:,} elements, the most of {what}")
-        if self._level > deepest:
-            raise ConfigError(f"is nested deeper than {deepest} levels, the most of {what}")
-        return super().start(tag, attrs)
-
-    def end(self, tag: str) -> ET.Element:
-        self._level -= 1
-        return super().end(tag)
 
 
 def read_mjcf(path: Path, grammar: Grammar = SCENE) -> str:
@@ -165,12 +140,7 @@ def with_contact(text: str, contact: dict[str, str]) -> str:
 
 
 def _parsed(text: str | bytes, grammar: Grammar = SCENE) -> ET.Element:
-    parser = ET.XMLParser(target=_Builder(grammar))
-    try:
-        parser.feed(text)
-        return parser.close()
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise ConfigError(f"is not valid XML: {shortened(str(error))}") from None
+    return parse_xml(text, grammar.what, grammar.most_elements, grammar.most_levels)
 
 
 def _leave_out(root: ET.Element, grammar: Grammar) -> None:

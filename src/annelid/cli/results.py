@@ -357,19 +357,22 @@ def view_command(
 
 def export_command(
     run: RunPath,
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, mp4, gif, html or mjcf.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, mp4, gif, html or mjcf.")],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write, or folder of csv and parquet  [default: in the run]"),
     ] = None,
     signals: Annotated[
         str | None,
-        typer.Option(metavar="NAME,NAME,..", help="Only these signals (csv, mat, parquet)  [default: all]"),
+        typer.Option(metavar="NAME,NAME,..", help="Only these signals (csv, mat, parquet, nwb)  [default: all]"),
     ] = None,
     every: Annotated[
         int | None,
         typer.Option(
-            min=1, max=10_000_000, metavar="N", help="Only every Nth sample, and every Nth frame (csv, mat, parquet)."
+            min=1,
+            max=10_000_000,
+            metavar="N",
+            help="Only every Nth sample, and every Nth frame (csv, mat, parquet, nwb).",
         ),
     ] = None,
     from_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="From this time on, s (not mjcf).")] = None,
@@ -377,12 +380,14 @@ def export_command(
     force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:
-    """Write a run as tables, MATLAB, video, HTML or MJCF.
+    """Write a run as tables, MATLAB, NWB, video, HTML or MJCF.
 
     \b
     csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
     mat      one MATLAB file: a variable for each signal; structs with units, labels and the configuration
     parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
+    nwb      Neurodata Without Borders: potentials as intracellular series, behaviour and positions beside
+             (pip install 'annelid[export]')
     mp4 gif  a video; annelid render has camera, speed and frame rate
     html     one page that needs nothing else: numbers, figures, configuration, what to cite
     mjcf     the model for plain MuJoCo, the last state as a keyframe

@@ -90,7 +90,7 @@ class NetworkController(NeuralController):
     name = "network"
     recorded = (
         ("potential", ("neuron",), "mV", "membrane potential"),
-        ("gate", ("gate",), "1", "slow gate of a channel"),
+        ("gate", ("channel",), "1", "slow gate of a channel"),
         ("synaptic_current", ("connection",), "nA", "current through a synapse or gap junction into its target"),
     )
 
@@ -258,7 +258,7 @@ class NetworkController(NeuralController):
     def _coords(self) -> dict[str, list[int] | list[str]]:
         arrays = self._stepper.arrays
         bearers = [arrays.neurons[arrays.channel_neuron[channel]] for _, channel in self._gates]
-        labels = {"gate": numbered(bearers), "connection": self._currents.labels}
+        labels = {"channel": numbered(bearers), "connection": self._currents.labels}
         return {**super()._coords(), **{name: each for name, each in labels.items() if each}}
 
     def _attrs(self) -> dict[str, float | int | str]:

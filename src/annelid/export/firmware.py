@@ -57,11 +57,7 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
     Raises:
         ConfigError: The controller cannot be written as C, or a number is too large for the type.
     """
-    if not isinstance(controller, Coded):
-        raise ConfigError(
-            f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
-            "a network can (sns, adaptive, sns-pressure, sns-robust, NetworkController)"
-        )
+    controller = _coded(controller)
     controller.reset(0)
     code = controller.code()
     start = code.network_state.copy()
@@ -91,6 +87,24 @@ def _wire(name: str, interface: Interface) -> tuple[str, ...]:
         "most_answer": room + room // 254 + 3,
     }
     return filled("wire.h.txt", words), filled("wire.c.txt", words)
+
+
+def controller_network(controller: Controller) -> Network:
+    """Returns the network of a controller.
+
+    Raises:
+        ConfigError: The controller steps none.
+    """
+    return _coded(controller).code().network
+
+
+def _coded(controller: Controller) -> Coded:
+    if not isinstance(controller, Coded):
+        raise ConfigError(
+            f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
+            "a network can (sns, adaptive, sns-pressure, sns-robust, NetworkController)"
+        )
+    return controller
 
 
 def _controller_vectors(controller: Coded, code: ControllerCode) -> Vectors:

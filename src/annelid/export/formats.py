@@ -14,6 +14,7 @@ import numpy as np
 from annelid.body.assemble import mjcf_text
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError
+from annelid.export.nwb import write_nwb
 from annelid.export.page import write_page
 from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_tables
 from annelid.output import with_suffix, write_text
@@ -128,6 +129,7 @@ for _format in (
     Format("csv", "csv", ".csv", SELECTION, write_csv_tables),
     Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)]),
     Format("parquet", "parquet", ".parquet", SELECTION, write_parquet_tables, "pyarrow"),
+    Format("nwb", "run.nwb", ".nwb", SELECTION, write_nwb, "pynwb"),
     Format("mp4", "video.mp4", ".mp4", WINDOW, _video),
     Format("gif", "video.gif", ".gif", WINDOW, partial(_video, fps=GIF_FPS)),
     Format("html", "report.html", ".html", WINDOW, lambda run, path, progress: [write_page(run, path, progress)]),

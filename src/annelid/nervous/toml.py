@@ -29,27 +29,38 @@ KINDS: dict[str, type[neurons.ConnectionKind]] = {
 
 def write_network(network: Network) -> str:
     """Returns a network as TOML text; every field is written, defaults too."""
+    return toml_text(network_tables(network))
+
+
+def network_tables(network: Network) -> dict[str, Any]:
+    """Returns a network as the tables of its text, plain values with every field."""
     names = {kind: name for name, kind in KINDS.items()}
-    return toml_text(
-        {
-            "name": network.name,
-            "neuron": [
-                {"name": name, "initial_mV": network.initial_mV[name], **asdict(neuron)}
-                for name, neuron in network.neurons.items()
-            ],
-            "connection": [
-                {"source": each.source, "target": each.target, "kind": names[type(each.kind)], **asdict(each.kind)}
-                for each in network.connections
-            ],
-            "input": [{"name": name, "targets": targets} for name, targets in network.inputs.items()],
-            "output": [{"name": name, "source": source} for name, source in network.outputs.items()],
-        }
-    )
+    return {
+        "name": network.name,
+        "neuron": [
+            {"name": name, "initial_mV": network.initial_mV[name], **asdict(neuron)}
+            for name, neuron in network.neurons.items()
+        ],
+        "connection": [
+            {"source": each.source, "target": each.target, "kind": names[type(each.kind)], **asdict(each.kind)}
+            for each in network.connections
+        ],
+        "input": [{"name": name, "targets": targets} for name, targets in network.inputs.items()],
+        "output": [{"name": name, "source": source} for name, source in network.outputs.items()],
+    }
 
 
 def read_network(text: str, make: type[Network]) -> Network:
     """Builds a network of the class ``make`` from TOML text."""
-    document = parse_toml(text, "the network")
+    return network_of_tables(parse_toml(text, "the network"), make)
+
+
+def network_of_tables(document: Mapping[str, Any], make: type[Network]) -> Network:
+    """Builds a network of the class ``make`` from the tables of a text, as `network_tables` makes them.
+
+    Raises:
+        ConfigError: As of `Network.from_toml`.
+    """
     _refuse_unknown(document, {"name", "neuron", "connection", "input", "output"}, "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))
     for place, entry in _tables(document, "neuron"):

@@ -18,7 +18,7 @@ import pytest
 from typer.testing import CliRunner
 
 from annelid.cli import app, entry
-from annelid.cli.run import _locked_folder
+from annelid.cli.run import locked_folder
 from annelid.config import load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid.simulation import open_run, simulate
@@ -179,7 +179,7 @@ def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.Mon
             entry._locks.set(stack)
             together.wait(60)
             try:
-                return _locked_folder(None, "worm")
+                return locked_folder(None, "worm")
             finally:
                 everyone_has_one.wait(60)
 

@@ -86,7 +86,6 @@ def groups() -> Iterator[tuple[str, list[Network], float, float]]:
     firing = [network for network, spikes in zip(networks, spiking, strict=True) if spikes]
     yield "random, without spikes", silent, 0.05, 200.0
     yield "random, spiking", firing, 0.05, 200.0
-    yield "random, spiking, finer", firing, 0.0125, 200.0
 
 
 def main() -> None:

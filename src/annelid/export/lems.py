@@ -23,7 +23,7 @@ from annelid.textfiles import parse_xml, read_bytes
 
 WHAT = "a LEMS file of a network"
 MOST_ELEMENTS, MOST_LEVELS = 200_000, 8
-"""A network of 200 segments has 42,000 elements, in six levels."""
+"""A network of 200 segments has 32,000 elements in five levels, 4 MB."""
 DIMENSIONS = {
     "per_mV": ("per_voltage", {"m": "-1", "l": "-2", "t": "3", "i": "1"}, "3"),
     "mV": ("voltage", {"m": "1", "l": "2", "t": "-3", "i": "-1"}, "-3"),
@@ -35,6 +35,24 @@ DIMENSIONS = {
 """Dimension of every unit with which a field may end, its exponents, and the unit's power of ten."""
 LONGEST_NUMBER = 100
 TYPE, INPUT_CURRENT = "annelid_network", "current_nA"
+_SIMULATION = f"""<Lems>
+<ComponentType name="OutputColumn">
+  <Path name="quantity"/>
+  <Simulation><Record quantity="quantity"/></Simulation>
+</ComponentType>
+<ComponentType name="OutputFile">
+  <Text name="path"/><Text name="fileName"/>
+  <Children name="columns" type="OutputColumn"/>
+  <Simulation><DataWriter path="path" fileName="fileName"/></Simulation>
+</ComponentType>
+<ComponentType name="Simulation">
+  <Parameter name="length" dimension="time"/><Parameter name="step" dimension="time"/>
+  <ComponentReference name="target" type="{TYPE}"/>
+  <Children name="outputs" type="OutputFile"/>
+  <Dynamics><StateVariable name="t" dimension="time"/></Dynamics>
+  <Simulation><Run component="target" variable="t" increment="step" total="length"/></Simulation>
+</ComponentType>
+</Lems>"""
 _FLAGS = {"true": True, "false": False}
 _TEXTS = {"name", "source", "target", "kind", "quantity", "targets"}
 _KEY = re.compile(r"(neuron|connection|input|output|channels|gates|targets)_([1-9]\d{0,6})(?:_(.+))?")
@@ -92,7 +110,7 @@ def lems_text(
     for number, name in enumerate(network.inputs, start=1):
         fields[f"input_{number}_{INPUT_CURRENT}"] = float((currents_nA or {}).get(name, 0.0))
     root.append(_type(network, fields))
-    root.extend(_simulation_types())
+    root.extend(ET.fromstring(_SIMULATION))
     values = {key: _text(value, _unit(key)) for key, value in fields.items()}
     for key, value in values.items():
         if not _IN_XML.fullmatch(value):
@@ -176,8 +194,9 @@ def _tables(component: ET.Element) -> dict[str, Any]:
         except (AttributeError, TypeError):
             raise ConfigError(f"attribute {shown(name)} of the network is none that annelid writes") from None
     for entry in tables.get("input", {}).values():
-        entry.pop(INPUT_CURRENT, None)
-        entry.setdefault("targets", {})
+        if isinstance(entry, dict):
+            entry.pop(INPUT_CURRENT, None)
+            entry.setdefault("targets", {})
     return _listed(tables)
 
 
@@ -230,6 +249,7 @@ def _type(network: Network, fields: Mapping[str, Any]) -> ET.Element:
                 made, "Parameter", name=key, dimension=DIMENSIONS[unit][0] if (unit := _unit(key)) else "none"
             )
     ET.SubElement(made, "Constant", name="one_per_mV", dimension="per_voltage", value="1per_mV")
+    ET.SubElement(made, "Constant", name="one_ms", dimension="time", value="1ms")
     for number in range(1, len(network.neurons) + 1):
         ET.SubElement(made, "Exposure", name=f"neuron_{number}_v", dimension="voltage")
     made.append(_Dynamics(network).element)
@@ -261,9 +281,12 @@ class _Dynamics:
             elif each["kind"] == "modulatory_synapse":
                 factors.setdefault((each["quantity"], post), []).append(f"({here}_factor ^ {here}_open)")
             elif each["kind"] == "spiking_synapse":
-                release = f"{here}_release"
-                self._state(release, "none", "0", f"(0 - {release}) / {here}_time_constant_ms")
-                resets[pre][release] = _at_most_1(f"({release} + {here}_increment)")
+                # The time since the last spike is exact in Euler steps too, a decay by its rate would not be.
+                age, peak = f"{here}_age", f"{here}_peak"
+                self._state(peak, "none", "0", "0 / one_ms")
+                self._state(age, "time", "0 * one_ms", "1")
+                release = f"({peak} * exp((0 - {age}) / {here}_time_constant_ms))"
+                resets[pre] |= {peak: _at_most_1(f"({release} + {here}_increment)"), age: "0 * one_ms"}
                 currents[post].append(f"{here}_conductance_uS * {release} * ({here}_reversal_mV - {post}_v)")
             else:
                 difference = f"({pre}_v - {post}_v)"
@@ -326,7 +349,7 @@ class _Dynamics:
         """Writes states before what is derived of them, then rates, starts and events."""
         start = ET.Element("OnStart")
         for place, (name, dimension, first, rate) in enumerate(self._states):
-            shown_as = {"exposure": name} if dimension == "voltage" and name.endswith("_v") else {}
+            shown_as = {"exposure": name} if name.endswith("_v") else {}
             self.element.insert(place, ET.Element("StateVariable", {"name": name, "dimension": dimension, **shown_as}))
             ET.SubElement(start, "StateAssignment", variable=name, value=first)
             ET.SubElement(self.element, "TimeDerivative", variable=name, value=rate)
@@ -339,26 +362,3 @@ class _Dynamics:
 
 def _at_most_1(value: str) -> str:
     return f"({value} + 1 - abs({value} - 1)) / 2"
-
-
-def _simulation_types() -> Iterator[ET.Element]:
-    """What LEMS has no built-in types for: a simulation, the file that it writes, and the columns of that."""
-    made = ET.Element("ComponentType", name="OutputColumn")
-    ET.SubElement(made, "Path", name="quantity")
-    ET.SubElement(ET.SubElement(made, "Simulation"), "Record", quantity="quantity")
-    yield made
-    made = ET.Element("ComponentType", name="OutputFile")
-    ET.SubElement(made, "Text", name="path")
-    ET.SubElement(made, "Text", name="fileName")
-    ET.SubElement(made, "Children", name="columns", type="OutputColumn")
-    ET.SubElement(ET.SubElement(made, "Simulation"), "DataWriter", path="path", fileName="fileName")
-    yield made
-    made = ET.Element("ComponentType", name="Simulation")
-    for name in ("length", "step"):
-        ET.SubElement(made, "Parameter", name=name, dimension="time")
-    ET.SubElement(made, "ComponentReference", name="target", type=TYPE)
-    ET.SubElement(made, "Children", name="outputs", type="OutputFile")
-    ET.SubElement(ET.SubElement(made, "Dynamics"), "StateVariable", name="t", dimension="time")
-    run = ET.SubElement(made, "Simulation")
-    ET.SubElement(run, "Run", component="target", variable="t", increment="step", total="length")
-    yield made

@@ -55,31 +55,32 @@ def write_nwb(run: Run, path: Path, progress: Progress) -> list[Path]:
             "an NWB file would be empty: signals of meshes and of the engine (qpos) have no NWB type; choose others"
         )
     file = _described(run)
-    device = file.create_device(name="annelid", description=str(run.data.attrs.get("source", "simulation")))
+    device = file.create_device(name="annelid", description=printable(str(run.data.attrs.get("source", "simulation"))))
     behaviour: Any = BehavioralTimeSeries()
     position: Any = Position()
     neural: list[TimeSeries] = []
     frame = "world axes x, y, z: z is up, and the worm heads towards -x unless body.heading_deg says otherwise"
     clock = _clock(run.data["time"].values)
-    for done, name in enumerate(names):
+    electrodes: dict[str, Any] = {}
+    for done, (recorded, name) in enumerate(zip(names, numbered(map(_key, names)), strict=True)):
         progress(done, len(names) + 1)
-        signal = run.data[name]
+        signal = run.data[recorded]
         data, labels = _packed(signal.values), _labels(signal)
-        unit, conversion = UNITS.get(signal.attrs.get("units", "1"), (str(signal.attrs.get("units", "1")), 1.0))
+        units = printable(str(signal.attrs.get("units", "1")))
+        unit, conversion = UNITS.get(units, (units, 1.0))
         common = {"conversion": conversion, "description": printable(str(signal.attrs.get("long_name", name))), **clock}
         if signal.dims == ("time", "neuron") and unit == "volts":
             cells = [printable(str(neuron)) for neuron in signal["neuron"].values]
             for column, (cell, key) in enumerate(zip(cells, numbered(map(_key, cells)), strict=True)):
+                if key not in electrodes:
+                    electrodes[key] = file.create_icephys_electrode(
+                        name=f"electrode_{key}", cell_id=cell, device=device, description=f"simulated neuron {cell}"
+                    )
                 file.add_acquisition(
                     CurrentClampSeries(
                         name=f"{name}_{key}",
                         data=_packed(signal.values[:, column]),
-                        electrode=file.create_icephys_electrode(
-                            name=f"electrode_{key}",
-                            cell_id=cell,
-                            device=device,
-                            description=f"neuron {cell}, simulated",
-                        ),
+                        electrode=electrodes[key],
                         stimulus_description="none: no current but those of the network itself",
                         **common,
                     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -18,8 +19,9 @@ from wire_line import FakeClock
 import annelid
 from annelid.cli import app
 from annelid.errors import ConfigError, SimulationStopped
+from annelid.export import controller_firmware
 from annelid.hardware import Interface, Limits, Peer, PseudoRobot, Role, UdpLink, Wiring, drive, open_link, pseudo_robot
-from annelid.hardware.links import MOST_READ
+from annelid.hardware.links import MOST_READ, Link
 from annelid.hardware.peer import serve
 from annelid.hardware.servos import ServoPlant
 from annelid.hardware.session import Pace, Times
@@ -28,6 +30,7 @@ from annelid.simulation.runfile import open_run
 
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
 WIRING = Wiring()
+ARM = Path(__file__).parents[2] / "benchmarks" / "arm"
 
 
 @given(st.lists(st.integers(0, 900_000), min_size=1, max_size=200), st.sampled_from([50.0, 99.0, 99.9, 100.0]))
@@ -240,13 +243,51 @@ def test_firmware_over_udp_walks_as_python_does(tmp_path: Path) -> None:
     end = served(listening, code)  # type: ignore[arg-type]
     link = UdpLink("127.0.0.1", listening._socket.getsockname()[1])
     try:
-        driven = drive(config, tmp_path / "firmware", firmware=link, rate_hz=50.0, watchdog=50, progress=False)
+        walks_as_python_does(config, link, tmp_path)
     finally:
         end()
         link.close()
-    python = annelid.simulate(config, tmp_path / "python", progress=False)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
+    reason="gcc-arm-none-eabi or qemu-system-arm is not installed",
+)
+def test_firmware_on_a_cortex_m4_walks_as_python_does(tmp_path: Path) -> None:
+    """The same without an operating system, under QEMU, whose serial port is a pseudo-terminal."""
+    pytest.importorskip("serial")
+    config = annelid.load_config("riddle2023-rods", {"duration_s": 8.0})
+    controller = annelid.build_controller(config, annelid.build_plant(config))
+    controller_firmware(controller, "worm", real="float").write(tmp_path, wire=True)
+    names = {"RECEIVE": "worm_wire_receive", "ELAPSED": "worm_wire_elapsed", "INIT": "worm_init"}
+    names |= {"ANSWER": "WORM_WIRE_ANSWER"}
+    lines = ['#include "worm_wire.h"', *(f"#define {name} {value}" for name, value in names.items())]
+    (tmp_path / "wire_names.h").write_text("\n".join(lines) + "\n")
+    flags = ["-std=gnu99", "-O2", "-ffp-contract=off", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mthumb"]
+    flags += ["-mfloat-abi=hard", "-nostartfiles", "-T", str(ARM / "mps2.ld"), "--specs=nosys.specs"]
+    sources = [ARM / "wire.c", ARM / "start.c", tmp_path / "worm.c", tmp_path / "worm_wire.c"]
+    elf = str(tmp_path / "worm.elf")
+    subprocess.run(["arm-none-eabi-gcc", *flags, f"-I{tmp_path}", *map(str, sources), "-o", elf, "-lm"], check=True)
+    command = ["qemu-system-arm", "-M", "mps2-an386", "-kernel", elf, "-display", "none", "-monitor", "none"]
+    with subprocess.Popen([*command, "-serial", "pty"], stdout=subprocess.PIPE, text=True) as board:
+        assert board.stdout is not None
+        link = None
+        try:
+            terminal = next(word for line in board.stdout for word in line.split() if word.startswith("/dev/"))
+            link = open_link(terminal)
+            walks_as_python_does(config, link, tmp_path)
+        finally:
+            board.kill()
+            if link is not None:
+                link.close()
+
+
+def walks_as_python_does(config: annelid.RunConfig, link: Link, folder: Path) -> None:
+    driven = drive(config, folder / "firmware", firmware=link, rate_hz=50.0, watchdog=50, progress=False)
+    python = annelid.simulate(config, folder / "python", progress=False)
     here, there = annelid.summary(driven.run), annelid.summary(python)
-    assert driven.run.status == "complete"
+    assert driven.run.status == "complete", driven.run.message
     assert here.order == there.order
     assert here.period_s == pytest.approx(there.period_s, rel=0.005)
     assert here.elongation_mean_max_m == pytest.approx(there.elongation_mean_max_m, rel=0.01)

@@ -104,7 +104,7 @@ def global_attributes(config: RunConfig, parts: Sequence[Recordable]) -> dict[st
     cited = (key for section in sections if section is not None for key, _ in section.cited())
     return {name: value for part in parts for name, value in part.attrs.items()} | {
         "Conventions": "CF-1.11",
-        "title": f"simulated run of {config.name}",
+        "title": f"run of {config.name}",
         "source": f"annelid {version}, a simulation of a soft earthworm robot",
         # Its time is in `created`: all else of two runs of one configuration is the same.
         "history": f"run by annelid {version}",

@@ -41,6 +41,9 @@ WITH: dict[str, tuple[str, ...]] = {
     "challenge": ("nothing",),
     "calibrate": ("nothere.toml",),
     "export-network": ("riddle2023-rods", "-o", "c"),
+    "loop": ("riddle2022-planar", "--servos", "/no/such/port", "-o", "out"),
+    "pseudo-robot --duration": ("riddle2022-planar", "--lag", "nan"),
+    "pseudo-robot": ("riddle2022-planar", "--duration", "0.1"),
     "experiment": ("--cluster", "nothing"),
     "experiment load-frame": ("riddle2022-planar",),
 }

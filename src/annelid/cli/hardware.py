@@ -189,9 +189,13 @@ def pseudo_robot_command(
     annelid pseudo-robot riddle2023-rods                     prints, for example, /dev/pts/5
     annelid loop riddle2023-rods --servos /dev/pts/5         in another terminal
     """
+    from annelid.errors import require_finite, require_positive
     from annelid.hardware import PseudoRobot, Wiring, serve_terminal
     from annelid.simulation import build_plant
 
+    if duration is not None:
+        require_finite(duration=duration)
+        require_positive(duration=duration)
     body = build_plant(config_of(preset, {}, segments))
     wiring = Wiring(*ticks, *potentiometer)
     robot = PseudoRobot(

@@ -12,7 +12,7 @@ from time import monotonic
 
 import numpy as np
 
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, require_at_least, require_finite, require_positive
 from annelid.hardware.servos import EVERYONE, WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
 
 _SIZES = {
@@ -54,7 +54,13 @@ class PseudoRobot:
             latency_s: Time from a packet to its answer, s.
             seed: Of the noise.
             wiring: Positions and counts.
+
+        Raises:
+            ConfigError: A number is negative, not finite, or a lag is 0.
         """
+        require_finite(reach_m=reach_m, lag_s=lag_s, noise_m=noise_m, latency_s=latency_s)
+        require_at_least(0, reach_m=reach_m, noise_m=noise_m, latency_s=latency_s, seed=seed)
+        require_positive(lag_s=lag_s)
         self.wiring = wiring or Wiring()
         self._n_segments, self._n = n_segments, n_muscles
         self._reach_m, self._lag_s, self._noise_m, self._latency_s = reach_m, lag_s, noise_m, latency_s

@@ -7,11 +7,14 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from annelid.cli import app
 from annelid.config import LEVELS, load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid_studies.bench import benchmark as store_module
@@ -24,13 +27,23 @@ from annelid_studies.bench.benchmark import (
     errors,
     exponent,
     front,
+    in_yardsticks,
     judge,
     slowdowns,
 )
 from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
 from annelid_studies.bench.measure import measure, peak_memory_bytes
 from annelid_studies.bench.report import bench_figure, bench_table
-from annelid_studies.bench.timing import ENGINE_PHASES, PHASES, EngineTimes, Stopwatch, laps_s, shares, yardstick_ms
+from annelid_studies.bench.timing import (
+    ENGINE_PHASES,
+    PHASES,
+    YARDSTICK,
+    EngineTimes,
+    Stopwatch,
+    laps_s,
+    shares,
+    yardstick_ms,
+)
 from annelid_studies.worms import CHAIN, RODS
 
 positive = st.floats(1e-3, 1e3)
@@ -54,25 +67,45 @@ def timings(**steps_ms: tuple[float | None, float | None]) -> dict[str, Any]:
     }
 
 
+def slower(now: dict[str, Any], before: dict[str, Any]) -> dict[str, float]:
+    return slowdowns(in_yardsticks(now), in_yardsticks(before))
+
+
 class TestSlowdowns:
     @given(positive, positive, st.floats(0.1, 10.0))
     def test_a_slower_machine_is_no_slowdown_and_a_slower_step_is(self, step: float, yardstick: float, factor: float):
         before = timings(a=(step, yardstick))
-        assert slowdowns(timings(a=(factor * step, factor * yardstick)), before)["a"] == pytest.approx(0.0, abs=1e-9)
-        assert slowdowns(timings(a=(factor * step, yardstick)), before)["a"] == pytest.approx(factor - 1.0)
+        assert slower(timings(a=(factor * step, factor * yardstick)), before)["a"] == pytest.approx(0.0, abs=1e-9)
+        assert slower(timings(a=(factor * step, yardstick)), before)["a"] == pytest.approx(factor - 1.0)
 
     def test_only_cases_that_both_have_measured_count(self) -> None:
         now = timings(a=(2.0, 1.0), b=(2.0, None), c=(2.0, 1.0)) | {"peer": None}
         before = timings(a=(1.0, 1.0), b=(1.0, 1.0), d=(1.0, 1.0))
-        assert slowdowns(now, before) == {"a": 1.0}
+        assert slower(now, before) == {"a": 1.0}
+        with pytest.raises(RunFileError, match="no case in common"):
+            slower(timings(a=(1.0, 1.0)), timings(b=(1.0, 1.0)))
 
     @pytest.mark.parametrize("before", [{}, [], {"cases": [1]}, {"cases": []}, timings(a=(1.0, None))])
     def test_what_is_no_benchmark_is_refused(self, before: Any) -> None:
-        with pytest.raises(RunFileError, match=r"no bench\.json|measure both again"):
-            slowdowns(timings(a=(1.0, 1.0)), before)
+        with pytest.raises(RunFileError, match=r"must be a bench\.json|measure it again"):
+            in_yardsticks(before)
 
-    def test_the_yardstick_is_a_moving_body(self) -> None:
-        assert 0.0 < yardstick_ms(0.01) < 1e3
+    def test_the_yardstick_moves_and_touches_the_ground(self) -> None:
+        model = mujoco.MjModel.from_xml_string(YARDSTICK)
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 200)
+        assert np.isfinite(data.qpos).all()
+        assert np.abs(data.qvel).max() > 1e-3
+        assert data.ncon > 0
+        assert yardstick_ms(0.01) > 0.0
+
+    def test_what_is_no_benchmark_is_refused_before_anything_is_measured(self, tmp_path: Path) -> None:
+        (tmp_path / "other.json").write_text('{"cases": []}')
+        words = ["bench", "-o", str(tmp_path / "now"), "--against", str(tmp_path / "other.json")]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 2
+        assert "measure it again" in " ".join(done.output.split())
+        assert not (tmp_path / "now").exists()
 
 
 class TestErrors:

@@ -27,7 +27,7 @@ from annelid.cli.common import (
     print_results,
     refuse_existing,
 )
-from annelid.cli.entry import EXIT_ALL_FAILED, complain, end_study, lock, typed_command
+from annelid.cli.entry import EXIT_ALL_FAILED, EXIT_SOME_FAILED, complain, end_study, lock, typed_command
 from annelid.cli.result import refuse_json, wants_json
 from annelid.errors import RunFileError
 
@@ -123,17 +123,17 @@ def bench_command(
     """
     from annelid.experiment.progress import study_progress
     from annelid.textfiles import read_json
-    from annelid_studies.bench.benchmark import SLOWDOWN, bench, slowdowns
+    from annelid_studies.bench.benchmark import SLOWDOWN, bench, in_yardsticks, slowdowns
     from annelid_studies.bench.report import bench_figure, bench_table, slowdown_table
 
-    before = None if against is None else read_json(against)
+    before = None if against is None else in_yardsticks(read_json(against))
 
     lock(output)
     with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
         path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
     report = json.loads(path.read_text(encoding="utf-8"))
     tables = [] if quiet else [bench_table(report)]
-    slower = {} if before is None else slowdowns(report, before)
+    slower = {} if before is None else slowdowns(in_yardsticks(report), before)
     if slower and not quiet:
         tables.append(slowdown_table(slower, SLOWDOWN))
     print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
@@ -142,7 +142,7 @@ def bench_command(
         load = max(case.get("load_average_1min") or 0.0 for case in report["cases"])
         doubt = "; other programs ran meanwhile, so measure again alone" if load > 1.0 else ""
         complain(f"slower than in {against} by over {100 * SLOWDOWN:.0f} %: {', '.join(worst)}{doubt}")
-        raise typer.Exit(1)
+        raise typer.Exit(EXIT_SOME_FAILED)
 
 
 def robustness_command(

@@ -10,7 +10,7 @@ import numpy as np
 from annelid.control.base import SENSED, Coded, ControllerCode
 from annelid.errors import ConfigError
 from annelid.export.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer, filled
-from annelid.hardware.frames import MOST_STEPS, VERSION, Interface
+from annelid.hardware.frames import MOST_STEPS, VERSION, Interface, most_stuffed
 from annelid.nervous import Network, Scheme
 from annelid.protocols import Controller, Sensation
 
@@ -72,8 +72,6 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
 
 
 def _wire(name: str, interface: Interface) -> tuple[str, ...]:
-    # Header, the larger of a hello and a frame of numbers, checksum. Stuffing adds a byte for each 254, and two zeros.
-    room = 8 + max(15, 4 * interface.n_sensed, 4 * interface.n_muscles) + 4
     words = {
         "name": name,
         "NAME": name.upper(),
@@ -83,8 +81,9 @@ def _wire(name: str, interface: Interface) -> tuple[str, ...]:
         "n_sensed": interface.n_sensed,
         "digest": interface.digest,
         "most_steps": MOST_STEPS,
-        "room": room,
-        "most_answer": room + room // 254 + 3,
+        "room": interface.most_bytes,
+        # A zero stands before and behind.
+        "most_answer": most_stuffed(interface.most_bytes) + 2,
     }
     return filled("wire.h.txt", words), filled("wire.c.txt", words)
 

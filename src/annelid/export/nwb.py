@@ -74,7 +74,7 @@ def write_nwb(run: Run, path: Path, progress: Progress) -> list[Path]:
             for column, (cell, key) in enumerate(zip(cells, numbered(map(_key, cells)), strict=True)):
                 if key not in electrodes:
                     electrodes[key] = file.create_icephys_electrode(
-                        name=f"electrode_{key}", cell_id=cell, device=device, description=f"simulated neuron {cell}"
+                        name=f"electrode_{key}", cell_id=cell, device=device, description=f"model neuron {cell}"
                     )
                 file.add_acquisition(
                     CurrentClampSeries(
@@ -134,15 +134,15 @@ def _described(run: Run) -> Any:
         session_description=printable(f"{run.data.attrs.get('title', run.config.name)}, status {run.status}"),
         identifier=str(uuid4()),
         session_start_time=start,
-        experiment_description=printable(run.config.summary) or "a simulated soft robot",
-        keywords=["simulation", "soft robotics", "peristalsis", "synthetic nervous system"],
+        experiment_description=printable(run.config.summary) or "a soft robot",
+        keywords=["soft robotics", "peristalsis", "synthetic nervous system"],
         notes=json.dumps(about(run)),
         related_publications=[f"doi:{doi}" for doi in _DOI.findall(bibliography)],
         was_generated_by=[["annelid", version]],
         # NWB's checks also ask for a species, which a robot has not.
         subject=Subject(
             subject_id=printable(run.config.name),
-            description="a simulated soft robot, no animal, made when the session starts",
+            description="a soft robot, no animal; its age counts from the session",
             sex="U",
             date_of_birth=start,
         ),

@@ -119,6 +119,11 @@ def stuffed(data: bytes) -> bytes:
     return bytes(result)
 
 
+def most_stuffed(n_bytes: int) -> int:
+    """Returns how long so many bytes are at most once they are `stuffed`."""
+    return n_bytes + n_bytes // 254 + 1
+
+
 def unstuffed(data: bytes) -> bytes:
     """Returns what `stuffed` was given; `FrameError` where the blocks do not fit together."""
     result, place = bytearray(), 0
@@ -168,8 +173,7 @@ class Decoder:
         self.rejected[reason if reason in self.rejected or len(self.rejected) < 16 else "other errors"] += 1
 
     def _hold(self, part: bytes) -> None:
-        # As stuffed a frame is longer by a byte for each 254 of it.
-        self._is_long |= len(self._held) + len(part) > MOST_BYTES + MOST_BYTES // 254 + 1
+        self._is_long |= len(self._held) + len(part) > most_stuffed(MOST_BYTES)
         if not self._is_long:
             self._held += part
 
@@ -213,6 +217,11 @@ class Interface:
     def n_sensed(self) -> int:
         """Numbers in a frame of sensation."""
         return sum(int(np.prod(shape)) for shape in self.shapes.values())
+
+    @property
+    def most_bytes(self) -> int:
+        """Bytes of the longest frame, a hello or one of numbers, before they are stuffed."""
+        return _LEAST + max(_HELLO.size, 4 * self.n_sensed, 4 * self.n_muscles)
 
     @property
     def digest(self) -> int:

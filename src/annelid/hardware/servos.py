@@ -17,7 +17,7 @@ import numpy as np
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.hardware.links import Link
 from annelid.hardware.remote import PacedPlant
-from annelid.hardware.session import ANSWER, Limits, Pace, Partner
+from annelid.hardware.session import ANSWER, STOP_TRIES, STOP_WAIT_S, Limits, Pace, Partner
 from annelid.protocols import Array
 
 MARK = b"\xff\xff\xfd"
@@ -227,12 +227,12 @@ class ServoPlant(PacedPlant):
             return None
         self._is_open = False
         error: object = ""
-        for _ in range(5):
+        for _ in range(STOP_TRIES):
             try:
                 # Without its watchdog, which would hold a servo on its way to where it is relaxed.
                 self._write(Register.WATCHDOG, 1, [0] * self.n_muscles)
                 self._write(Register.GOAL, 4, self._wiring.goals(self.command))
-                if len(self._read(Register.GOAL, 0.05, 4)) == self.n_muscles:
+                if len(self._read(Register.GOAL, STOP_WAIT_S, 4)) == self.n_muscles:
                     return None
             except (OSError, SimulationStopped) as reason:
                 error = f": {reason}"
@@ -260,8 +260,5 @@ class ServoPlant(PacedPlant):
                     )
                 else:
                     found[servo] = int.from_bytes(parameters[1:], "little")
-            for reason, n in self._decoder.rejected.items():
-                for _ in range(n):
-                    self.partner.wrong(f"a packet with {reason}")
-            self._decoder.rejected.clear()
+            self.partner.rejected(self._decoder.rejected, "packet")
         return found

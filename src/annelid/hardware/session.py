@@ -18,11 +18,12 @@ from annelid.protocols import Array
 
 ON_TIME = 0.1
 """A command is on time if it leaves within this share of a period."""
+STOP_TRIES, STOP_WAIT_S = 5, 0.05
+"""How often a stop is sent, and how long each time its confirmation is waited for, s."""
 ANSWER = 0.5
 """An answer is lost unless it comes within this share of a period; the rest is for computing."""
 _CONNECT_S = 5.0
 _ASK_EVERY_S = 0.5
-_STOP_TRIES, _STOP_WAIT_S = 5, 0.05
 _AHEAD_S = 0.0005
 
 
@@ -176,6 +177,12 @@ class Partner:
         """Takes note of something that came and is no answer."""
         self._wrong[what] += 1
 
+    def rejected(self, counts: Counter[str], what: str) -> None:
+        """Takes over a decoder's counts of what was not valid, by the reason."""
+        for reason, n in counts.items():
+            self._wrong[f"a {what} with {reason}"] += n
+        counts.clear()
+
     def what_came(self) -> str:
         """Returns what came since the last answer, in words."""
         return ", ".join(f"{n} x {what}" for what, n in sorted(self._wrong.items())) or "nothing came"
@@ -274,13 +281,13 @@ class WirePartner(Partner):
             return None
         self._is_open = False
         error: object = ""
-        for _ in range(_STOP_TRIES):
+        for _ in range(STOP_TRIES):
             try:
                 for numbers in last:
                     self._sequence = (self._sequence + 1) & 0xFFFF
                     self.link.send(Frame(self._sent, self._session, self._sequence, packed(numbers)).encoded())
                 self.link.send(Frame(Kind.STOP, self._session, self._sequence).encoded())
-                if self._await(Kind.STOP, self.pace.clock() + _STOP_WAIT_S) is not None:
+                if self._await(Kind.STOP, self.pace.clock() + STOP_WAIT_S) is not None:
                     return None
             except (OSError, SimulationStopped) as reason:
                 error = f": {reason}"
@@ -309,7 +316,5 @@ class WirePartner(Partner):
                     self.wrong("an answer that is late, twice or out of order")
                 else:
                     return frame
-            for reason, n in self._decoder.rejected.items():
-                self._wrong[f"a frame with {reason}"] += n
-            self._decoder.rejected.clear()
+            self.rejected(self._decoder.rejected, "frame")
         return None

@@ -222,36 +222,37 @@ def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[st
     return found | {"largest": _largest([found["elongation_max"], found["period"]])}
 
 
-def slowdowns(now: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, float]:
-    """Compares the quiet steps of two benchmarks, each over what its yardstick took at that time.
+def in_yardsticks(content: Any) -> dict[str, float]:
+    """Returns what a quiet step of each case takes, over what its yardstick took at that time, by the case's name.
 
     Args:
-        now: The content of a ``bench.json``.
-        before: The same of an earlier one.
-
-    Returns:
-        By how much each case that both have measured takes longer now, as a share; negative if it is faster.
+        content: Of a ``bench.json``; cases that have neither are left out.
 
     Raises:
-        RunFileError: The earlier one is none, or they have no case in common whose yardstick was taken.
+        RunFileError: It is none, or has no such case.
     """
-    cases = before.get("cases") if isinstance(before, dict) else None
+    cases = content.get("cases") if isinstance(content, dict) else None
     if not isinstance(cases, list) or not all(isinstance(case, dict) and "name" in case for case in cases):
-        raise RunFileError("the earlier benchmark is no bench.json: it has no list of cases with names")
-    then, found = {str(case["name"]): _in_yardsticks(case) for case in cases}, {}
-    for case in now["cases"]:
-        old, new = then.get(case["name"]), _in_yardsticks(case)
-        if old and new:
-            found[case["name"]] = new / old - 1.0
+        raise RunFileError("a benchmark to compare with must be a bench.json, with a list of cases that have names")
+    found: dict[str, float] = {}
+    for case in cases:
+        step, yardstick = case.get("step_quiet_ms"), case.get("yardstick_ms")
+        if isinstance(step, int | float) and isinstance(yardstick, int | float) and step > 0 and yardstick > 0:
+            found[str(case["name"])] = step / yardstick
     if not found:
-        raise RunFileError("the two benchmarks have no case in common whose yardstick was taken: measure both again")
+        raise RunFileError("a benchmark to compare with has no case whose yardstick was taken: measure it again")
     return found
 
 
-def _in_yardsticks(case: Mapping[str, Any]) -> float | None:
-    step, yardstick = (case.get(key) for key in ("step_quiet_ms", "yardstick_ms"))
-    usable = all(isinstance(one, int | float) and one > 0 for one in (step, yardstick))
-    return step / yardstick if usable and step and yardstick else None
+def slowdowns(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:
+    """Returns by which share each case of both takes longer now, both `in_yardsticks`; negative if it is faster.
+
+    Raises:
+        RunFileError: They have no case in common.
+    """
+    if not (common := [name for name in now if name in before]):
+        raise RunFileError(f"the benchmarks have no case in common: {len(now)} cases now, {len(before)} before")
+    return {name: now[name] / before[name] - 1.0 for name in common}
 
 
 def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:

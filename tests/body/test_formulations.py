@@ -8,12 +8,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import build_spec, mesh_of
+from annelid.body import build_spec, compile_spec, mesh_of
+from annelid.body.assemble import mjcf_text
+from annelid.body.formulations.rods.net import curvature_weights
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
+from annelid.morphology import MeshGeometry, helical_mesh
 
 RODS = {"kind": "rods"}
+RODS_AS_CHAIN = RODS | {"curvature": "constant"}
 TIGHT_CHAIN = {
     "kind": "chain",
     "pins": "direct",
@@ -39,7 +43,7 @@ def tendon_lengths(model: mujoco.MjModel, data: mujoco.MjData, prefix: str) -> n
 
 def contracted(config: RunConfig, force_N: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Ring and spring lengths after the middle ring has pulled with a constant force, ramped up over 1 s."""
-    model = build_spec(config).compile()
+    model = compile_spec(build_spec(config))
     data = mujoco.MjData(model)
     pull = np.zeros(model.nu)
     model.actuator_gaintype[:] = mujoco.mjtGain.mjGAIN_FIXED
@@ -76,6 +80,85 @@ def test_the_paper_s_worm_has_its_published_mass_and_degrees_of_freedom() -> Non
     chain = build_spec(worm(TIGHT_CHAIN)).compile()
     assert rods.body_mass.sum() == pytest.approx(0.260, abs=0.0005)
     assert (rods.nv, chain.nv) == (2070, 1764)
+
+
+def mesh(elements: int) -> MeshGeometry:
+    return helical_mesh(
+        n_segments=3, radius_m=0.16, angular_rate_rad_per_m=8.0, n_helices=12, elements_per_side=elements,
+        planes_between_rings=3, free_planes_at_ends=2,
+    )  # fmt: skip
+
+
+def sag_m(forces_N: np.ndarray, elements: int, weights: np.ndarray) -> np.ndarray:
+    """How far a straight rod of unit rigidity, held at its two ends, is pushed sideways at unit distances.
+
+    Its elements' angles, times their stiffness, are in balance with the forces, ``(n,)``.
+    """
+    length, n = 1.0 / elements, elements * (len(forces_N) + 1)
+    angles = (np.eye(n - 1, k=1) - 2.0 * np.eye(n - 1) + np.eye(n - 1, k=-1)) / length
+    loads = np.zeros(n - 1)
+    loads[elements - 1 :: elements] = forces_N
+    return np.linalg.solve(angles.T @ np.diag(weights / length) @ angles, loads)[elements - 1 :: elements]
+
+
+def beam_sag_m(forces_N: np.ndarray) -> np.ndarray:
+    """The same of a beam, in closed form: the sum over its forces of the textbook's deflection by one of them."""
+    length = len(forces_N) + 1.0
+    at = np.arange(1.0, length)
+    low, high = np.minimum.outer(at, at), np.maximum.outer(at, at)
+    return (length - high) * low * (length**2 - (length - high) ** 2 - low**2) / (6.0 * length) @ forces_N
+
+
+@pytest.mark.parametrize("elements", [2, 3, 4, 6])
+def test_forces_at_crossings_bend_a_strand_as_they_bend_a_beam(elements: int) -> None:
+    geometry = mesh(elements)
+    first, last = geometry.crossing_vertex[[0, -1]]
+    weights = curvature_weights(geometry)[first : last - 1]
+    n = len(geometry.crossing_vertex) - 2
+    back_and_forth, one_way = (-1.0) ** np.arange(n), np.ones(n)
+    for forces in (back_and_forth, one_way):
+        wanted = beam_sag_m(forces)
+        assert sag_m(forces, elements, weights) == pytest.approx(wanted, rel=1e-9)
+        assert np.abs(sag_m(forces, elements, np.ones_like(weights)) - wanted).max() > 1e-3
+
+
+def test_weights_integrate_products_of_linear_moments_and_leave_free_ends_alone() -> None:
+    for elements in (2, 3, 5):
+        geometry = mesh(elements)
+        weights, (first, last) = curvature_weights(geometry), geometry.crossing_vertex[[0, -1]]
+        assert (1.0 / weights[first : first + elements]).sum() == pytest.approx(elements)
+        assert (weights[:first] == 1.0).all()
+        assert (weights[last - 1 :] == 1.0).all()
+    assert (curvature_weights(mesh(1)) == 1.0).all()
+
+
+def test_a_worm_of_linear_curvature_is_written_with_what_mjcf_has() -> None:
+    linear = worm(RODS)
+    with pytest.warns(UserWarning, match="written with body.formulation.curvature = 'constant'"):
+        written = mjcf_text(linear)
+    constant = worm(RODS_AS_CHAIN)
+    assert written == mjcf_text(constant)
+    models = [compile_spec(build_spec(one)) for one in (linear, constant)]
+    records = [model.flex_bending.reshape(12, -1)[:, 1:].reshape(12, -1, 10) for model in models]
+    # Bending and twist.
+    shares = np.divide(*(one[..., [4, 8]] for one in records))
+    assert shares.max() == pytest.approx(4 / 3)
+    assert shares.min() == pytest.approx(8 / 9)
+
+
+@pytest.mark.slow
+def test_two_elements_of_linear_curvature_are_as_exact_as_six() -> None:
+    """Of a ring that is pulled to half of its length; with a constant curvature two elements are far off."""
+
+    def rings(elements: int, curvature: str) -> np.ndarray:
+        changes = {"arena.gravity_m_per_s2": 0.0, "body.mesh.elements_per_side": elements}
+        return contracted(worm(RODS | {"curvature": curvature}, **changes), 2.5, 4.0)[0]
+
+    fine = rings(6, "linear")
+    errors = {curvature: np.abs(rings(2, curvature) / fine - 1.0).max() for curvature in ("linear", "constant")}
+    print(errors)
+    assert errors["linear"] < 0.01
+    assert errors["constant"] > 0.05
 
 
 def test_tension_only_springs_are_slack_below_their_rest_length() -> None:
@@ -126,7 +209,7 @@ def test_written_xml_is_the_same_model() -> None:
 
 def assert_rings_and_springs_agree(force_N: float, seconds: float, **overrides: Any) -> float:
     """Compares the formulations to 3 % and returns the length of the middle ring."""
-    rings, springs = contracted(worm(RODS, **overrides), force_N, seconds)
+    rings, springs = contracted(worm(RODS_AS_CHAIN, **overrides), force_N, seconds)
     other_rings, other_springs = contracted(worm(TIGHT_CHAIN, **overrides), force_N, seconds)
     assert rings == pytest.approx(other_rings, rel=0.03)
     assert springs == pytest.approx(other_springs, rel=0.03)

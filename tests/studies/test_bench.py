@@ -21,6 +21,7 @@ from annelid_studies.bench import benchmark as store_module
 from annelid_studies.bench import peer as peer_module
 from annelid_studies.bench.benchmark import (
     JSON_NAME,
+    QUANTITIES,
     MeasurementFailed,
     Measurements,
     bench,
@@ -31,7 +32,7 @@ from annelid_studies.bench.benchmark import (
     judge,
     slowdowns,
 )
-from annelid_studies.bench.cases import LINES, BenchCase, bench_cases, converged, judged, timed
+from annelid_studies.bench.cases import LINES, N_PERTURBED, BenchCase, bench_cases, converged, judged, timed
 from annelid_studies.bench.measure import measure, peak_memory_bytes
 from annelid_studies.bench.report import bench_figure, bench_table
 from annelid_studies.bench.timing import (
@@ -49,12 +50,13 @@ from annelid_studies.worms import CHAIN, RODS
 positive = st.floats(1e-3, 1e3)
 
 
-def numbers(ring: float = 0.4, elongation: float = 0.08, period: float = 2.6, travel: float = -0.2) -> dict[str, Any]:
+def numbers(elongation: float = 0.08, period: float = 2.6, travel: float = -0.2, work: float = 4.0) -> dict[str, Any]:
     return {
-        "ring_length_min_m": ring,
         "elongation_mean_max_m": [elongation, 0.9 * elongation],
         "period_s": period,
         "travel_m": travel,
+        "travel_path_m": 0.3,
+        "muscle_work_J": [work, 0.5 * work],
     }
 
 
@@ -108,38 +110,44 @@ class TestSlowdowns:
         assert not (tmp_path / "now").exists()
 
 
+def error(measured: dict[str, Any], reference: dict[str, Any]) -> dict[str, float | None]:
+    return {name: found for name, (found,) in errors([measured], [reference]).items()}
+
+
 class TestErrors:
-    @given(positive, positive, positive, st.floats(-1, 1))
-    def test_a_run_has_no_error_against_itself(self, ring: float, elongation: float, period: float, travel: float):
-        same = numbers(ring, elongation, period, travel)
-        found = errors(same, same)
-        assert found["elongation"] == [0.0, 0.0]
-        assert all(found[name] == 0.0 for name in found if name != "elongation")
+    @given(positive, positive, positive, positive)
+    def test_a_run_has_no_error_against_itself(self, elongation: float, period: float, travel: float, work: float):
+        same = numbers(elongation, period, travel, work)
+        assert error(same, same) == dict.fromkeys([*QUANTITIES, "largest"], 0.0)
 
     @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
     def test_the_larger_of_elongation_and_period_counts(self, a: float, b: float) -> None:
-        found = errors(numbers(elongation=0.08 * (1 + a), period=2.6 * (1 + b)), numbers())
-        assert found["elongation_max"] == pytest.approx(abs(a), abs=1e-12)
+        found = error(numbers(elongation=0.08 * (1 + a), period=2.6 * (1 + b)), numbers())
+        assert found["elongation"] == pytest.approx(abs(a), abs=1e-12)
         assert found["period"] == pytest.approx(abs(b), abs=1e-12)
         assert found["largest"] == pytest.approx(max(abs(a), abs(b)), abs=1e-12)
 
-    def test_travel_is_a_difference_in_metres(self) -> None:
-        assert errors(numbers(travel=-0.2), numbers(travel=0.1))["travel_m"] == pytest.approx(0.3)
+    def test_travel_work_and_slip_are_relative(self) -> None:
+        found = error(numbers(travel=-0.3, work=5.0), numbers(travel=-0.2, work=4.0))
+        assert (found["travel"], found["work"]) == (pytest.approx(0.5), pytest.approx(0.25))
+        assert found["slip"] == pytest.approx(1.0 / 3.0), "path over travel: 1 instead of 1.5"
 
-    @pytest.mark.parametrize("missing", ["period_s", "elongation_mean_max_m", "ring_length_min_m", "travel_m"])
+    @pytest.mark.parametrize(
+        "missing", ["period_s", "elongation_mean_max_m", "travel_m", "travel_path_m", "muscle_work_J"]
+    )
     def test_what_is_missing_is_unknown_and_not_small(self, missing: str) -> None:
-        for found in (
-            errors(numbers() | {missing: None}, numbers()),
-            errors(numbers(), numbers() | {missing: None}),
-        ):
-            judging = missing in ("period_s", "elongation_mean_max_m")
-            assert (found["largest"] is None) == judging
-            assert list(found.values()).count(None) == {"period_s": 2, "elongation_mean_max_m": 3}.get(missing, 1)
+        for found in (error(numbers() | {missing: None}, numbers()), error(numbers(), numbers() | {missing: None})):
+            assert (found["largest"] is None) == (missing in ("period_s", "elongation_mean_max_m"))
+            n_unknown = 1 if missing in ("travel_path_m", "muscle_work_J") else 2
+            assert list(found.values()).count(None) == n_unknown
 
     def test_one_unknown_segment_makes_the_elongation_unknown(self) -> None:
-        found = errors(numbers() | {"elongation_mean_max_m": [0.08, None]}, numbers())
-        assert found["elongation"] == [0.0, None]
-        assert found["elongation_max"] is None
+        found = error(numbers() | {"elongation_mean_max_m": [0.08, None]}, numbers())
+        assert (found["elongation"], found["period"]) == (None, 0.0)
+
+    def test_perturbed_runs_are_compared_in_pairs(self) -> None:
+        pairs = errors([numbers(0.08), numbers(0.04)], [numbers(0.08), numbers(0.05)])
+        assert pairs["elongation"] == [0.0, pytest.approx(0.2)]
 
 
 @given(st.floats(0.5, 3.0), positive, st.lists(st.integers(1, 100), min_size=2, unique=True))
@@ -231,7 +239,7 @@ class TestCases:
 
     def test_converged_runs_are_there_where_something_is_judged(self) -> None:
         assert [case.name for case in bench_cases("full", ["steps"]) if case.kind == "converged"] == [
-            "converged, 3 elements",
+            "converged, 4 elements",
             "converged, 6 elements",
         ]
         assert all(case.kind == "speed" for case in bench_cases("full", ["segments", "chain"]))
@@ -243,9 +251,20 @@ class TestCases:
         other = coarse.body.model_dump()
         other["formulation"].pop("friction_impedance_ratio")
         assert body == other
-        assert fine.clock.physics_timestep_s == 0.0005
+        assert fine.clock.physics_timestep_s == 0.001
         assert fine.clock.control_timestep_s == coarse.clock.control_timestep_s == 0.001
         assert (fine.controller, fine.sensor, fine.arena) == (coarse.controller, coarse.sensor, coarse.arena)
+
+    def test_perturbed_runs_differ_in_friction_and_seed_only(self) -> None:
+        case = judged(3, 20, "steps")
+        for one in case.perturbed:
+            config = case.case.config
+            assert one.arena is not None
+            assert config.arena is not None
+            assert 0.0 < abs(one.arena.friction - config.arena.friction) <= 0.01
+            same = {"arena": config.arena, "seed": config.seed}
+            assert one.model_copy(update=same) == config
+        assert timed(RODS, 3, 1.0, "duration").perturbed == []
 
     def test_an_unknown_line_is_refused(self) -> None:
         with pytest.raises(ConfigError, match="did you mean 'segments'"):
@@ -261,6 +280,7 @@ SPEED = {
     "peak_memory_MB": 150.0,
     "rhythm": {"verdict": "ordered", "reason": "in order"},
     "summary": numbers(),
+    "perturbed": [numbers()] * N_PERTURBED,
 }
 
 
@@ -277,10 +297,11 @@ class TestJudging:
         fastest["summary"] = numbers(elongation=0.081)
         report = judge(cases, measured)
         entry = next(entry for entry in report["cases"] if entry["name"] == "rods, 2 elements, 20 ms")
-        assert entry["errors"]["converged, 3 elements"]["largest"] == pytest.approx(0.001 / 0.08)
+        assert entry["errors"]["converged, 4 elements"]["largest"] == [pytest.approx(0.001 / 0.08), 0.0, 0.0]
         assert entry["rhythm"]["reason"] == "out of order"
-        assert len(report["fronts"]["converged, 3 elements"]) == 1
-        assert entry["name"] not in report["fronts"]["converged, 3 elements"]
+        for best in report["fronts"]["converged, 4 elements"].values():
+            assert len(best) == 1
+            assert entry["name"] not in best
 
     def test_the_meshes_are_compared_with_both_converged_runs(self) -> None:
         cases = bench_cases("full", ["steps"])
@@ -289,8 +310,8 @@ class TestJudging:
         for entry in judge(cases, measured)["cases"]:
             if entry["kind"] == "judged":
                 found = entry["errors"]
-                assert found["converged, 3 elements"]["largest"] == 0.0
-                assert found["converged, 6 elements"]["period"] == pytest.approx(0.1 / 2.5)
+                assert found["converged, 4 elements"]["largest"] == [0.0, 0.0, 0.0]
+                assert found["converged, 6 elements"]["period"] == [pytest.approx(0.1 / 2.5), 0.0, 0.0]
 
     def test_exponents_over_both_ranges(self) -> None:
         cases = bench_cases("full", ["segments"])
@@ -302,7 +323,7 @@ class TestJudging:
         cases = bench_cases("quick", ["steps"])
         measured = as_measured(cases)
         measured["rods, 3 elements, 5 ms"] = {"failed": "not enough memory"}
-        measured["converged, 3 elements"] = {"failed": "not enough memory"}
+        measured["converged, 4 elements"] = {"failed": "not enough memory"}
         report = judge(cases, measured)
         assert [entry["failed"] for entry in report["cases"] if "failed" in entry] == ["not enough memory"] * 2
         assert report["fronts"] == {}
@@ -447,7 +468,8 @@ class TestPicture:
         path = bench_figure(self.report("full"), tmp_path / "bench")
         assert path.read_bytes().startswith(b"\x89PNG")
         text = path.with_suffix(".svg").read_text()
-        for words in ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..30)", "constraint"):
+        words_of_all = ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..30)", "constraint")
+        for words in (*words_of_all, "Elongation", "Slip"):
             assert f"<!-- {words}" in text or words in text, words
 
     @pytest.mark.parametrize("lines", [["peer"], ["chain"], ["levels"], ["duration"], ["steps"]])

@@ -137,6 +137,11 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
             "the same in both directions: leave it out or run the worm with annelid"
         )
+    if isinstance(config.body, WormBody):
+        formulation, lacks = config.body.formulation.for_mjcf()
+        if lacks:
+            warnings.warn(lacks, stacklevel=2)
+        config = config.model_copy(update={"body": config.body.model_copy(update={"formulation": formulation})})
     spec = build_spec(config)
     assert isinstance(config.body, WormBody)
     if config.body.strands.stiffness_differs and spec.flexes:

@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import version
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,9 @@ from annelid_studies.worms import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"
+
+QUANTITIES = ("elongation", "period", "travel", "work", "slip")
+"""What a run is judged by."""
 
 SCALED_SEGMENTS = (12, 30)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
@@ -45,11 +49,13 @@ SCHEMA = {
     "cases[].shares": "fractions of the wall-clock time: the engine's own timers over the first 2.7 s, the rest of the "
     "plant, the network with its control, and recording with the loop; they add up to 1",
     "cases[].rhythm": "the score of the rhythm; errors of a rhythm that is not ordered are stated all the same",
-    "cases[].errors": "by converged run: relative errors as fractions of the shortest ring, of each segment's "
-    "elongation and the largest of these, and of the period; largest of the last two; difference of travel in m",
+    "cases[].errors": "by converged run and quantity, of the case as it is and of each perturbed one against the "
+    "converged run of its friction: relative errors as fractions, of the elongation of the segment that is furthest "
+    "off, the period, the travel, the muscles' work, and the slip (path over travel); largest: elongation or period",
     "cases[].load_average_1min": "processes that competed for the cores when the case began; quiet below 1",
     "cost_exponents": "slope of log(step_median_ms) against log(segments), by preset and range of segments",
-    "fronts": "by converged run: the cases that no other beats in both speed and largest error, the fastest first",
+    "fronts": "by converged run and quantity: the cases that no other beats in both speed and mean error, the fastest "
+    "first",
     "levels": "the case of each level of fidelity",
     "peer": "free rods without joints, contact or muscles; step_limit_us is the closed form of the largest stable step",
 }
@@ -131,15 +137,11 @@ def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]])
     usable = [entry for entry in entries if "failed" not in entry]
     # The period of a run that is not ordered is no measure of it.
     ordered = [entry for entry in usable if entry["kind"] == "judged" and entry["rhythm"]["verdict"] == "ordered"]
-    fronts = {}
-    for name, run in references.items():
-        if "failed" not in run:
-            points = {
-                entry["name"]: (entry["real_time_factor"], error)
-                for entry in ordered
-                if (error := entry["errors"][name]["largest"]) is not None
-            }
-            fronts[name] = front(points)
+    fronts = {
+        name: {quantity: front(_points(ordered, name, quantity)) for quantity in QUANTITIES}
+        for name, run in references.items()
+        if "failed" not in run
+    }
     return {
         "cases": entries,
         "cost_exponents": {preset: _exponents(usable, line) for preset, line in ((RODS, "segments"), (CHAIN, "chain"))},
@@ -148,11 +150,21 @@ def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]])
     }
 
 
+def _points(entries: Sequence[Mapping[str, Any]], reference: str, quantity: str) -> dict[str, tuple[float, float]]:
+    """Speed and mean error of those entries that have both."""
+    return {
+        entry["name"]: (entry["real_time_factor"], float(np.mean(found)))
+        for entry in entries
+        if None not in (found := entry["errors"][reference][quantity])
+    }
+
+
 def _cost_s(case: BenchCase | None) -> float:
     if case is None:
         return _PEER_COST_S
     growth = _GROWTH[case.body.formulation.kind]
-    return case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
+    n_runs = 1 + len(case.perturbed)
+    return n_runs * case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
 
 
 def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -173,7 +185,7 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
     }
     if case.kind != "speed" and "failed" not in measured:
         entry["errors"] = {
-            name: errors(measured["summary"], reference["summary"])
+            name: errors(_summaries(measured), _summaries(reference))
             for name, reference in references.items()
             if name != case.name and "failed" not in reference
         }
@@ -196,30 +208,42 @@ def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, flo
     return found
 
 
-def errors(measured: Mapping[str, Any], reference: Mapping[str, Any]) -> dict[str, Any]:
-    """Compares a run with a converged one.
+def _summaries(measured: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [measured["summary"], *measured["perturbed"]]
+
+
+def errors(
+    measured: Sequence[Mapping[str, Any]], reference: Sequence[Mapping[str, Any]]
+) -> dict[str, list[float | None]]:
+    """Compares runs with converged ones, in pairs.
 
     Args:
-        measured: A `annelid.analysis.Summary` as a mapping.
-        reference: The same of the converged run.
+        measured: Of each run a `annelid.analysis.Summary` as a mapping.
+        reference: The same of the converged run of the same perturbation.
 
     Returns:
-        Relative errors, as fractions, of the shortest ring, of each segment's elongation and the largest of these, and
-        of the period; ``travel_m``, the difference of the travel, m; and ``largest``, of the largest elongation's and
-        the period's, which decides. Each is None where one of the two runs lacks the quantity, or the reference's is
-        zero.
+        By `QUANTITIES` and ``largest``, the larger of elongation's and period's, the relative errors of each pair, as
+        fractions. One is None where a run of the pair lacks the quantity, or the reference's is zero.
     """
-    elongations = measured["elongation_mean_max_m"], reference["elongation_mean_max_m"]
-    elongation = None if None in elongations else [_relative(*pair) for pair in zip(*elongations, strict=True)]
-    travels = measured["travel_m"], reference["travel_m"]
-    found: dict[str, Any] = {
-        "ring_length_min": _relative(measured["ring_length_min_m"], reference["ring_length_min_m"]),
-        "elongation": elongation,
-        "elongation_max": _largest(elongation),
-        "period": _relative(measured["period_s"], reference["period_s"]),
-        "travel_m": None if None in travels else abs(travels[0] - travels[1]),
+    pairs = [(_quantities(one), _quantities(other)) for one, other in zip(measured, reference, strict=True)]
+    found = {
+        name: [_largest([_relative(*values) for values in zip_longest(one[name], other[name])]) for one, other in pairs]
+        for name in QUANTITIES
     }
-    return found | {"largest": _largest([found["elongation_max"], found["period"]])}
+    both = zip(found["elongation"], found["period"], strict=True)
+    return found | {"largest": [_largest(pair) for pair in both]}
+
+
+def _quantities(summary: Mapping[str, Any]) -> dict[str, list[float | None]]:
+    """The `QUANTITIES` of a run; the elongation has a number for each segment."""
+    works, travel, path = summary["muscle_work_J"] or [None], summary["travel_m"], summary["travel_path_m"]
+    return {
+        "elongation": list(summary["elongation_mean_max_m"] or [None]),
+        "period": [summary["period_s"]],
+        "travel": [travel],
+        "work": [None if None in works else sum(works)],
+        "slip": [path / abs(travel) if path is not None and travel else None],
+    }
 
 
 def in_yardsticks(content: Any) -> dict[str, float]:
@@ -283,10 +307,10 @@ def _relative(value: float | None, reference: float | None) -> float | None:
     return None if value is None or not reference else abs(value - reference) / abs(reference)
 
 
-def _largest(values: Sequence[float | None] | None) -> float | None:
+def _largest(values: Sequence[float | None]) -> float | None:
     """The largest, or None where one is missing: an error that is not known is not small."""
-    known = [value for value in values or () if value is not None]
-    return max(known) if values and len(known) == len(values) else None
+    known = [value for value in values if value is not None]
+    return max(known) if known and len(known) == len(values) else None
 
 
 class MeasurementFailed(AnnelidError):
@@ -312,7 +336,10 @@ class Measurements:
         Raises:
             MeasurementFailed: The process died, or the case cannot be built.
         """
-        request = {} if case is None else {"config": case.case.config.model_dump(mode="json")}
+        request: dict[str, Any] = {}
+        if case is not None:
+            config, *perturbed = (one.model_dump(mode="json") for one in (case.case.config, *case.perturbed))
+            request = {"config": config, "perturbed": perturbed}
         measured = _in_a_process(request, progress)
         # A peer that is missing may be installed before the next call.
         if measured.get("installed", True):

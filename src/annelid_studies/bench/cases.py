@@ -11,12 +11,13 @@ from annelid.body import WormBody
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case
-from annelid_studies.worms import CHAIN, RODS, Effort
+from annelid_studies.worms import CHAIN, RODS, Effort, drawn_frictions
 
 LINES = {
     "levels": "the levels of --fidelity, and the paper's own worm beside them",
     "steps": "3 segments, physics steps of 1 to 40 ms, 2 and 3 elements a side",
     "elements": "3 segments, 1 to 6 elements a side, physics steps of 5 and 20 ms",
+    "settings": "3 segments as `fast`, with other settings of solver, contact and rods; and as a chain of capsules",
     "segments": "rods as their preset has them, 3 to 30 segments",
     "chain": "the paper's formulation, 3 to 12 segments",
     "duration": "rods as their preset has them, 10 and 60 s, for the memory",
@@ -25,15 +26,36 @@ LINES = {
 """The lines by name, with what they vary."""
 
 JUDGED_S = 8.0
-CONVERGED_STEP_S = 0.0005
+CONVERGED_STEP_S = 0.001
 CONVERGED_IMPEDANCE_RATIO = 1000.0
-PAPER_ELEMENTS, FINE_ELEMENTS = 3, 6
+CONVERGED_ELEMENTS = {"full": (4, 6), "quick": (4,)}
+N_PERTURBED = 2
+"""Runs that are judged are repeated so often with slightly other friction, against converged runs of that friction."""
 CHAIN_S, SEGMENTS_S = 0.05, 2.0
 """Durations of the runs that are timed but not judged, s: fifty steps of the chain, a hundred of rods."""
 
 _STEPS_MS = {"full": (1, 2, 5, 10, 20, 40), "quick": (5, 20)}
 _ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
 _ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
+_SETTINGS = {
+    "tolerance 1e-6": {"body.formulation.solver_tolerance": 1e-6},
+    "tolerance 1e-2": {"body.formulation.solver_tolerance": 1e-2},
+    "impedance ratio 1": {"body.formulation.friction_impedance_ratio": 1.0},
+    "pyramidal cones": {"arena.friction_cone": "pyramidal"},
+    "edges in 1 ms": {"body.formulation.edge_time_constant_s": 0.001},
+    "constant curvature": {"body.formulation.curvature": "constant"},
+}
+# The paper's formulation of the same worm: crossings that hardly part, and steps at which it is stable.
+_CHAIN: dict[str, Any] = {
+    "body.formulation": {
+        "kind": "chain",
+        "pins": "direct",
+        "pin_time_constant_s": 0.004,
+        "pin_impedance": [0.99, 0.999, 0.001],
+        "joint": "hinges",
+        "integrator": "Euler",
+    }
+}
 # 31 segments of three elements a side are beyond the limit of the engine (docs/upstream/sparse_ordering.md).
 _SEGMENTS = {"full": (3, 6, 12, 24, 30), "quick": (3, 6, 12)}
 # Twelve segments of chain take seconds to compile and most of a second a step; both grow about with the cube of N.
@@ -57,6 +79,13 @@ class BenchCase:
         """The 3D worm's body."""
         return _worm_body(self.case.config)
 
+    @property
+    def perturbed(self) -> list[RunConfig]:
+        """The same runs with slightly other friction, where errors count."""
+        if self.kind == "speed" or self.case.config.arena is None:
+            return []
+        return [self.case.but(one).config for one in drawn_frictions(self.case.config.arena.friction, N_PERTURBED)]
+
 
 def bench_cases(effort: Effort, lines: Sequence[str] | None = None) -> list[BenchCase]:
     """Returns the cases of the lines, each once, the converged runs last.
@@ -74,8 +103,7 @@ def bench_cases(effort: Effort, lines: Sequence[str] | None = None) -> list[Benc
         before = found.setdefault(case.name, case)
         found[case.name] = replace(before, lines=tuple(dict.fromkeys((*before.lines, *case.lines))))
     if any(case.kind == "judged" for case in found.values()):
-        meshes = (PAPER_ELEMENTS, FINE_ELEMENTS) if effort == "full" else (PAPER_ELEMENTS,)
-        found |= {case.name: case for case in map(converged, meshes)}
+        found |= {case.name: case for case in map(converged, CONVERGED_ELEMENTS[effort])}
     return list(found.values())
 
 
@@ -93,7 +121,7 @@ def check_lines(lines: Sequence[str] | None) -> list[str]:
 
 
 def converged(elements: int) -> BenchCase:
-    """The run that the judged ones are compared with, for one mesh: short steps, and contact that does not creep."""
+    """A run that the judged ones are compared with, of one mesh: short steps, and contact that does not creep."""
     changes = {
         **_resolution(elements, CONVERGED_STEP_S),
         "body.formulation.friction_impedance_ratio": CONVERGED_IMPEDANCE_RATIO,
@@ -102,10 +130,11 @@ def converged(elements: int) -> BenchCase:
     return BenchCase(f"converged, {elements} elements", "converged", Case(RODS, changes), ())
 
 
-def judged(elements: int, step_ms: float, line: str) -> BenchCase:
-    """Three segments of rods, long enough for three cycles."""
-    changes = {**_resolution(elements, step_ms / 1e3), "duration_s": JUDGED_S}
-    return BenchCase(f"rods, {elements} elements, {step_ms:g} ms", "judged", Case(RODS, changes), (line,))
+def judged(elements: int, step_ms: float, line: str, what: str = "", **settings: Any) -> BenchCase:
+    """Three segments, long enough for three cycles, with other settings if they are given and named."""
+    changes = {**_resolution(elements, step_ms / 1e3), "duration_s": JUDGED_S, **settings}
+    name = f"{'chain' if settings == _CHAIN else 'rods'}, {elements} elements, {step_ms:g} ms{what and f', {what}'}"
+    return BenchCase(name, "judged", Case(RODS, changes), (line,))
 
 
 def timed(preset: str, n_segments: int, duration_s: float, line: str) -> BenchCase:
@@ -141,6 +170,9 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
         case "elements":
             steps = _ELEMENT_STEPS_MS[effort]
             return [judged(elements, step, line) for step in steps for elements in _ELEMENTS[effort]]
+        case "settings":
+            others = [judged(3, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
+            return [*others, judged(3, 1, line, **_CHAIN)] if effort == "full" else others[-1:]
         case "segments":
             return [timed(RODS, n, SEGMENTS_S, line) for n in _SEGMENTS[effort]]
         case "chain":

@@ -10,6 +10,7 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from annelid.experiment import end_after
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
+    from annelid.simulation import Run
 
 ENGINE_S, ENGINE_WALL_S = 2.7, 5.0
 """The engine's timers run for a cycle of the paper's worm, but no longer than the second on the clock, s."""
@@ -34,7 +36,7 @@ def main() -> None:
         if "config" in request:
             from annelid.config import load_config
 
-            _say(measured=measure(load_config(request["config"])))
+            _say(measured=measure(load_config(request["config"]), [load_config(one) for one in request["perturbed"]]))
         else:
             from annelid_studies.bench.peer import peer
 
@@ -49,8 +51,10 @@ def keep_to_one_core() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
 
 
-def measure(config: RunConfig) -> dict[str, Any]:
+def measure(config: RunConfig, perturbed: Sequence[RunConfig] = ()) -> dict[str, Any]:
     """Runs the closed loop of a 3D worm with its recording and returns its times, shares, memory and results.
+
+    Perturbed runs are computed after it, of which the results count and not the times.
 
     Returns:
         Numbers with their units in the keys, ready for JSON. A run that a guard stopped is measured as far as it came.
@@ -71,23 +75,26 @@ def measure(config: RunConfig) -> dict[str, Any]:
     stepping = Stopwatch(plant, "step", "stride", reading=lambda: plant.data.time)
     watching, controlling = Stopwatch(plant, "alarm"), Stopwatch(controller, "step", "stride")
     before_ms = yardstick_ms()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run"
+    n_runs = 1 + len(perturbed)
+
+    def finished(number: int, config: RunConfig, folder: str, **parts: Any) -> Run:
+        path = Path(folder) / str(number)
         try:
             run = simulate(
-                config,
-                path,
-                plant=plant,
-                controller=controller,
-                progress=lambda simulated_s, _: _say(share=0.9 * simulated_s / config.duration_s),
+                config, path, progress=lambda s, _: _say(share=(number + 0.9 * s / config.duration_s) / n_runs), **parts
             )
         except SimulationStopped:
             run = open_run(path)
-        peak = peak_memory_bytes()
         if run.status == "interrupted":
             raise KeyboardInterrupt
+        return run
+
+    with tempfile.TemporaryDirectory() as folder:
+        run = finished(0, config, folder, plant=plant, controller=controller)
+        peak = peak_memory_bytes()
         after_ms = yardstick_ms()
         numbers, rhythm = summary(run), rhythm_score(run)
+        others = [summary(finished(number, one, folder)) for number, one in enumerate(perturbed, 1)]
     total_s = run.wall_time_s
     plant_s, control_s = stepping.seconds + watching.seconds, controlling.seconds
     simulated_s = numbers.duration_s or 0.0
@@ -120,6 +127,7 @@ def measure(config: RunConfig) -> dict[str, Any]:
         "solver_iterations_max": max(engine.iterations, default=0),
         "rhythm": {"verdict": rhythm.verdict, "reason": rhythm.reason},
         "summary": numbers.to_dict(),
+        "perturbed": [other.to_dict() for other in others],
         "load_average_1min": load,
     }
 

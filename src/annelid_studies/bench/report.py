@@ -15,6 +15,7 @@ from rich.table import Table as TerminalTable
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid_studies.tables import terminal_table
+from annelid_studies.worms import CHAIN
 
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""
@@ -58,7 +59,7 @@ def _row(entry: Mapping[str, Any], references: Sequence[str]) -> list[str]:
     compared = entry.get("errors", {})
     if compared and entry["rhythm"]["verdict"] != "ordered":
         name = f"{name}: {entry['rhythm']['reason']}"
-    percents = [_shown(compared[name]["largest"], ".2f", 100.0) if name in compared else "" for name in references]
+    percents = [_percent(compared[name]["largest"]) if name in compared else "" for name in references]
     return [name, *_numbers(entry), _shown(entry["peak_memory_MB"], ".0f"), *percents]
 
 
@@ -66,17 +67,23 @@ def _numbers(entry: Mapping[str, Any]) -> list[str]:
     return [_shown(entry[key], ".3g") for key in ("step_mean_ms", "real_time_factor")]
 
 
-def _shown(value: float | None, digits: str, scale: float = 1.0) -> str:
-    return "-" if value is None else format(scale * value, digits)
+def _percent(errors: Sequence[float | None]) -> str:
+    """The range of an error over the perturbed runs, in percent."""
+    known = [100.0 * error for error in errors if error is not None]
+    return f"{min(known):.2f} to {max(known):.2f}" if len(known) == len(errors) else "-"
+
+
+def _shown(value: float | None, digits: str) -> str:
+    return "-" if value is None else format(value, digits)
 
 
 def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
     """Draws a benchmark, the content of ``bench.json``.
 
-    Above: error (the larger of elongation's and period's) against times real time, one panel for each converged run;
-    one colour for each number of elements, one marker for each step, hollow where the rhythm is not ordered; the dotted
-    line joins the cases that no other beats. Below: time of a step against the number of segments with the slope, and
-    its shares by phase. Panels for which nothing was measured stay out.
+    Above: errors against the finest converged run over times real time, one panel for each quantity, with bars over the
+    perturbed runs; one colour for each number of elements, one marker for each step, hollow where the rhythm is not
+    ordered; the dotted line joins the cases that no other beats. Below: time of a step against the number of segments
+    with the slope, and its shares by phase. Panels for which nothing was measured stay out.
     """
     measured = [entry for entry in report["cases"] if "failed" not in entry]
     judged = [entry for entry in measured if entry["kind"] == "judged"]
@@ -84,7 +91,7 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
     divided = _divided(measured)
     panels: list[tuple[float, Callable[[SubFigure], None]]] = []
     if judged and report["fronts"]:
-        panels.append((2.9, lambda part: _fronts(part, report, judged)))
+        panels.append((5.4, lambda part: _fronts(part, report, judged)))
     if scaled:
         panels.append((2.7, lambda part: _cost(part, scaled, report["cost_exponents"])))
     if divided:
@@ -99,29 +106,31 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
 
 
 def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -> None:
-    references = list(report["fronts"])
+    reference = list(report["fronts"])[-1]
     elements = sorted({entry["elements_per_side"] for entry in judged})
     steps = sorted({entry["physics_step_ms"] for entry in judged})
     colors = dict(zip(elements, segment_colors(len(elements)), strict=True))
     markers = dict(zip(steps, _MARKERS, strict=False))
-    panels = part.subplots(1, len(references), sharey=True, squeeze=False)[0]
-    for axes, reference in zip(panels, references, strict=True):
-        points = {
-            entry["name"]: (speed, max(100.0 * error, _LEAST_PERCENT))
-            for entry in judged
-            if (error := entry["errors"][reference]["largest"]) is not None
-            and (speed := entry["real_time_factor"]) is not None
-        }
-        best = [points[name] for name in report["fronts"][reference] if name in points]
-        axes.plot(*np.reshape(best, (-1, 2)).T, ":", color=_FADED, linewidth=1.0, zorder=1)
+    *panels, legend = part.subplots(2, 3, sharex=True, squeeze=True).ravel()
+    for axes, (quantity, front) in zip(panels, report["fronts"][reference].items(), strict=True):
+        means = {}
         for entry in judged:
-            if entry["name"] in points:
-                color = colors[entry["elements_per_side"]]
-                face = color if entry["rhythm"]["verdict"] == "ordered" else "none"
-                look = {"color": color, "markerfacecolor": face, "markersize": 5.5, "zorder": 2}
-                axes.plot(*points[entry["name"]], markers[entry["physics_step_ms"]], **look)
-        _front_axes(axes, report, f"Against {reference} (0.5 ms)")
-    panels[0].set_ylabel("error of elongation or period (%)")
+            errors = entry["errors"][reference][quantity]
+            if None in (*errors, entry["real_time_factor"]):
+                continue
+            low, mean, high = np.maximum(100.0 * np.array([min(errors), np.mean(errors), max(errors)]), _LEAST_PERCENT)
+            means[entry["name"]] = point = entry["real_time_factor"], mean
+            color = colors[entry["elements_per_side"]]
+            face = color if entry["rhythm"]["verdict"] == "ordered" else "none"
+            look: dict[str, Any] = {"color": color, "markerfacecolor": face, "markersize": 5.0, "elinewidth": 0.8}
+            bar = [[mean - low], [high - mean]]
+            axes.errorbar(*point, yerr=bar, fmt=markers[entry["physics_step_ms"]], zorder=2, **look)
+        best = [means[name] for name in front if name in means]
+        axes.plot(*np.reshape(best, (-1, 2)).T, ":", color=_FADED, linewidth=1.0, zorder=1)
+        _front_axes(axes, report, quantity.capitalize(), limit=quantity in ("elongation", "period"))
+    panels[0].set_ylabel("error (%)")
+    panels[3].set_ylabel("error (%)")
+    legend.set_axis_off()
     meshes = [
         Line2D([], [], color=color, linewidth=4, label=f"{n} element{'s' if n > 1 else ''}")
         for n, color in colors.items()
@@ -130,21 +139,20 @@ def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -
     paces = [Line2D([], [], marker=marker, label=f"{step:g} ms", **grey) for step, marker in markers.items()]
     if any(entry["rhythm"]["verdict"] != "ordered" for entry in judged):
         paces.append(Line2D([], [], marker="o", markerfacecolor="none", label="not ordered", **grey))
-    spacing: dict[str, Any] = {"columnspacing": 1.2, "handletextpad": 0.5}
-    part.legend(handles=meshes, loc="outside lower left", ncols=(len(meshes) + 1) // 2, **spacing)
-    part.legend(handles=paces, loc="outside lower right", ncols=(len(paces) + 1) // 2, **spacing)
+    legend.legend(handles=[*meshes, *paces], loc="center", ncols=2, title=f"Against {reference} (1 ms)")
 
 
-def _front_axes(axes: Axes, report: Mapping[str, Any], title: str) -> None:
+def _front_axes(axes: Axes, report: Mapping[str, Any], title: str, *, limit: bool) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.axhline(TOLERATED_PERCENT, color="#c2410c", linewidth=0.8, linestyle="--", zorder=0)
     words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5}
-    limit = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "right", "color": "#c2410c"}
-    axes.annotate(f"{TOLERATED_PERCENT:g} %", (1.0, TOLERATED_PERCENT), **limit, **words)
+    if limit:
+        axes.axhline(TOLERATED_PERCENT, color="#c2410c", linewidth=0.8, linestyle="--", zorder=0)
+        look = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "right", "color": "#c2410c"}
+        axes.annotate(f"{TOLERATED_PERCENT:g} %", (1.0, TOLERATED_PERCENT), **look, **words)
     axes.axvline(1.0, color=_FADED, linewidth=0.8, zorder=0)
     # Speeds to compare with that have no error of the same kind: the paper's formulation and the peer.
-    chains = [one for one in report["cases"] if one["formulation"] == "chain" and one["n_segments"] == 3]
+    chains = [one for one in report["cases"] if one["preset"] == CHAIN and one["n_segments"] == 3]
     named = [*((one, "paper's chain") for one in chains), (report.get("peer") or {}, "PyElastica, free rods")]
     outsiders = sorted({speed: name for one, name in named if (speed := one.get("real_time_factor"))}.items())
     for speed, _ in outsiders:

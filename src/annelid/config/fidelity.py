@@ -14,6 +14,7 @@ from annelid.errors import ConfigError, suggest
 
 RESOLUTION = (
     "body.mesh.elements_per_side",
+    "body.formulation.curvature",
     "clock.physics_timestep_s",
     "record.signals_interval_s",
     "record.frames_interval_s",
@@ -39,17 +40,17 @@ class Fidelity:
 
 LEVELS = {
     "accurate": Fidelity(
-        "rods, six elements a rhombus side, 5 ms",
+        "rods, three elements a rhombus side, 5 ms",
         {
-            "body.mesh.elements_per_side": 6,
+            "body.mesh.elements_per_side": 3,
             "clock.physics_timestep_s": 0.005,
             "record.signals_interval_s": 0.005,
         },
     ),
-    "fast": Fidelity("rods, three elements a rhombus side, 20 ms; as riddle2023-rods has it"),
+    "fast": Fidelity("rods, two elements a rhombus side, 20 ms; as riddle2023-rods has it"),
     "preview": Fidelity(
         "rods, two elements a side, 40 ms: edges stretch by up to 3 %",
-        {"body.mesh.elements_per_side": 2, "clock.physics_timestep_s": 0.04, "record.signals_interval_s": 0.04},
+        {"clock.physics_timestep_s": 0.04, "record.signals_interval_s": 0.04},
     ),
 }
 """The levels by name, from the slowest to the fastest."""

@@ -15,7 +15,7 @@ from annelid_studies.worms import CHAIN, RODS, Effort, drawn_frictions
 
 LINES = {
     "levels": "the levels of --fidelity, and the paper's own worm beside them",
-    "steps": "3 segments, physics steps of 1 to 40 ms, 2 and 3 elements a side",
+    "steps": "3 segments, physics steps of 1 to 60 ms, 2 and 3 elements a side",
     "elements": "3 segments, 1 to 6 elements a side, physics steps of 5 and 20 ms",
     "settings": "3 segments as `fast`, with other settings of solver, contact and rods; and as a chain of capsules",
     "segments": "rods as their preset has them, 3 to 30 segments",
@@ -34,7 +34,7 @@ N_PERTURBED = 2
 CHAIN_S, SEGMENTS_S = 0.05, 2.0
 """Durations of the runs that are timed but not judged, s: fifty steps of the chain, a hundred of rods."""
 
-_STEPS_MS = {"full": (1, 2, 5, 10, 20, 40), "quick": (5, 20)}
+_STEPS_MS = {"full": (1, 2, 5, 10, 20, 40, 60), "quick": (5, 20)}
 _ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
 _ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
 _SETTINGS = {
@@ -171,7 +171,7 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
             steps = _ELEMENT_STEPS_MS[effort]
             return [judged(elements, step, line) for step in steps for elements in _ELEMENTS[effort]]
         case "settings":
-            others = [judged(3, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
+            others = [judged(2, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
             return [*others, judged(3, 1, line, **_CHAIN)] if effort == "full" else others[-1:]
         case "segments":
             return [timed(RODS, n, SEGMENTS_S, line) for n in _SEGMENTS[effort]]

@@ -29,7 +29,7 @@ from annelid.plausibility import tolerance_window_m
 from annelid.simulation import locks
 from annelid.textfiles import read_json
 from annelid_studies.tables import grouped
-from annelid_studies.worms import RODS
+from annelid_studies.worms import PAPERS_RODS, RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
 """The paper's with the preset's tolerance, and with the tolerance that the body needs; ours; a wave without sensing."""
@@ -74,6 +74,7 @@ class Point:
         case = Case(
             RODS,
             {
+                **PAPERS_RODS,
                 "sensor.noise_m": self.noise_m,
                 "arena.friction": self.friction,
                 "clock.physics_timestep_s": self.physics_timestep_ms / 1e3,

@@ -16,7 +16,7 @@ from annelid.body.formulations.rods import net
 from annelid.config import load_config
 from annelid.morphology import Array, Indices
 
-SHORT = {"body.mesh.elements_per_side": 1}
+SHORT: dict[str, object] = {"body.mesh.elements_per_side": 1}
 LONG = {
     "body.mesh.n_segments": 12,
     "body.formulation.curvature": "constant",
@@ -112,7 +112,7 @@ def test_short_worms_and_chains_keep_the_engines_order() -> None:
 
 
 def test_beyond_the_engines_limit_bodies_stand_along_the_worm(monkeypatch: pytest.MonkeyPatch) -> None:
-    config = load_config("riddle2023-rods", SHORT)
+    config = load_config("riddle2023-rods", SHORT | {"body.formulation.solver_tolerance": 1e-12})
     below = build_spec(config).compile()
     monkeypatch.setattr(net, "MOST_ORDERED_BODIES", np.unique(below.dof_bodyid).size)
     beyond = build_spec(config).compile()

@@ -172,7 +172,7 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
             return [judged(elements, step, line) for step in steps for elements in _ELEMENTS[effort]]
         case "settings":
             others = [judged(2, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
-            return [*others, judged(3, 1, line, **_CHAIN)] if effort == "full" else others[-1:]
+            return [*others, judged(3, 2, line, **_CHAIN)] if effort == "full" else others[-1:]
         case "segments":
             return [timed(RODS, n, SEGMENTS_S, line) for n in _SEGMENTS[effort]]
         case "chain":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import re
 import shutil
 import subprocess
@@ -78,7 +79,10 @@ def test_a_network_gives_the_same_bits_where_sums_are_in_the_same_order(
     seed: int, benchmark: ModuleType, tmp_path: Path
 ) -> None:
     network, scheme = benchmark.random_network(seed), ("euler", "toolbox", "heun")[seed % 3]
-    assert benchmark.largest_difference(network, tmp_path, 500, scheme, ordered=True) == 0.0
+    # Where the processor has AVX-512, numpy's exponential is its own and may differ from C's in the last digit.
+    values = np.linspace(-20.0, 20.0, 4001)
+    most = 0.0 if np.exp(values).tolist() == [math.exp(value) for value in values] else 1e-12
+    assert benchmark.largest_difference(network, tmp_path, 500, scheme, ordered=True) <= most
     # With the sums of BLAS only last digits differ, so the order is the only difference.
     assert benchmark.largest_difference(network, tmp_path, 500, scheme, ordered=False) < 1e-9
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.body import build_spec
+from annelid.body import build_spec, compile_spec
 from annelid.config import load_config
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.worm import WormPlant, compile_worm
@@ -77,7 +77,7 @@ def test_contact_sensors_change_nothing_in_the_motion() -> None:
     plant.reset(0)
     spec = build_spec(config)
     spec.option.disableflags = plant.model.opt.disableflags
-    plain = spec.compile()
+    plain = compile_spec(spec)
     data = mujoco.MjData(plain)
     pull = np.array([1.0, 0.0, 0.5])
     for _ in range(100):

@@ -358,7 +358,7 @@ def test_finer_steps_fit_the_control_step(control_ms: int, ratio: int, faster: b
 
 
 def test_elements_end_where_the_mesh_does() -> None:
-    assert more_elements(load_config(RODS)) == [4, 5]
+    assert more_elements(load_config(RODS)) == [3, 4]
     assert more_elements(load_config(RODS, {"body.mesh.elements_per_side": 31})) == [32]
     assert more_elements(load_config("riddle2023")) == [4, 5]
 
@@ -454,7 +454,7 @@ def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> Non
     table = uncertainty_table(tiny)
     assert "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)" in str(table.title)
     words = str(table.caption)
-    assert "20 ms against 10 and 5 ms; elements a side: 3 against 4 and 5" in words
+    assert "20 ms against 10 and 5 ms; elements a side: 2 against 3 and 4" in words
     assert f"dry_friction, softening_strain, spring_rest_length, viscous_friction ({ABSENT})" in words
 
 

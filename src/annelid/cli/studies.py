@@ -83,7 +83,7 @@ def paper_command(
 
 def bench_command(
     output: ResultsFolder = Path("bench"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, one converged run: 3 minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, one converged run: 7 minutes.")] = False,
     cases: Annotated[
         list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
     ] = None,
@@ -95,19 +95,21 @@ def bench_command(
     """Measure speed and error side by side.
 
     Times closed loops with their recording, each in a process of its own on one core, and compares their
-    elongation and period with runs that are converged in time. Writes bench.json, bench.png and bench.svg:
-    error against speed, cost against the number of segments, and where the time of a step goes.
+    elongation, period, travel, work and slip with converged runs, three times with slightly different friction.
+    Writes bench.json, bench.png and bench.svg: error against speed, cost against the number of segments, and where
+    the time of a step goes.
 
     \b
     --cases levels      the levels of --fidelity
-    --cases steps       physics steps of 1 to 40 ms
+    --cases steps       physics steps of 1 to 60 ms
     --cases elements    1 to 6 elements a rhombus side
+    --cases settings    other settings of solver, contact and rods; the worm as a chain
     --cases segments    rods of 3 to 30 segments
     --cases chain       the paper's formulation, 3 to 12 segments
     --cases duration    10 and 60 s, for the memory
     --cases peer        free rods of PyElastica, if it is installed
 
-    The whole takes about 15 minutes. Leave the machine alone meanwhile: what else runs is measured too.
+    The whole takes about half an hour. Leave the machine alone meanwhile: what else runs is measured too.
     Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
     a full run takes over what --quick measured. Delete that folder to measure again.
 

@@ -153,9 +153,9 @@ def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]])
 def _points(entries: Sequence[Mapping[str, Any]], reference: str, quantity: str) -> dict[str, tuple[float, float]]:
     """Speed and mean error of those entries that have both."""
     return {
-        entry["name"]: (entry["real_time_factor"], float(np.mean(found)))
+        entry["name"]: (entry["real_time_factor"], float(np.mean(errors)))
         for entry in entries
-        if None not in (found := entry["errors"][reference][quantity])
+        if None not in (errors := entry["errors"][reference][quantity])
     }
 
 
@@ -241,7 +241,7 @@ def _quantities(summary: Mapping[str, Any]) -> dict[str, list[float | None]]:
         "elongation": list(summary["elongation_mean_max_m"] or [None]),
         "period": [summary["period_s"]],
         "travel": [travel],
-        "work": [None if None in works else sum(works)],
+        "work": [None if None in works else float(np.sum(works))],
         "slip": [path / abs(travel) if path is not None and travel else None],
     }
 

@@ -236,7 +236,8 @@ def errors(
 
 def _quantities(summary: Mapping[str, Any]) -> dict[str, list[float | None]]:
     """The `QUANTITIES` of a run; the elongation has a number for each segment."""
-    works, travel, path = summary["muscle_work_J"] or [None], summary["travel_m"], summary["travel_path_m"]
+    works: list[Any] = summary["muscle_work_J"] or [None]
+    travel, path = summary["travel_m"], summary["travel_path_m"]
     return {
         "elongation": list(summary["elongation_mean_max_m"] or [None]),
         "period": [summary["period_s"]],

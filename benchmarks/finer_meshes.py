@@ -82,7 +82,8 @@ def reshaped(geometry: MeshGeometry, ratio: float, outwards: float) -> MeshGeome
 
 def shaped(n_elements: int, step_s: float, ratio: float = 1.0, outwards: float = 0.0) -> None:
     """Prints how far the segments of such a mesh elongate."""
-    changes = {"body.mesh.elements_per_side": n_elements, "clock.physics_timestep_s": step_s, "duration_s": 8.0}
+    mesh = {"body.mesh.elements_per_side": n_elements, "body.formulation.curvature": "constant"}
+    changes = {**mesh, "clock.physics_timestep_s": step_s, "duration_s": 8.0}
     with patch("annelid.body.assemble.helical_mesh", lambda *a, **k: reshaped(helical_mesh(*a, **k), ratio, outwards)):
         done, _ = run(load_config("riddle2023-rods", changes))
     lengths = [f"{100 * (each or np.nan):.2f}" for each in summary(done).elongation_mean_max_m or ()]

@@ -219,6 +219,21 @@ def test_simulating_needs_neither_opengl_nor_matplotlib_nor_torch() -> None:
     assert loaded & {"OpenGL", "torch", "matplotlib", "sns_toolbox"} == set()
 
 
+def test_a_run_comes_to_its_table_without_what_only_pictures_and_studies_need(tmp_path: Path) -> None:
+    barred = ("OpenGL", "dask", "imageio", "markdown_it", "matplotlib", "optuna", "scipy", "tomlkit", "torch", "viser")
+    program = (
+        f"import sys; sys.modules.update(dict.fromkeys({barred}))\n"
+        "import annelid.draw.gallery as gallery; gallery.draw_all = lambda *_, **__: ()\n"
+        f"from annelid.cli import app; app(['run', '--duration', '0.01', '-o', {str(tmp_path / 'run')!r}])"
+    )
+    quiet = {name: value for name, value in os.environ.items() if name != "MUJOCO_GL"}
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120, env=quiet
+    )
+    assert done.returncode == 0, done.stderr
+    assert "quantity" in done.stdout
+
+
 @pytest.mark.parametrize("room", ["", *sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))])
 def test_every_public_name_can_be_had(room: str) -> None:
     package = import_module(f"annelid.{room}" if room else "annelid")

@@ -137,9 +137,13 @@ def changed_fields(config: RunConfig) -> tuple[str, list[str]]:
     recorded and when the guard stops the run do not count, nor does the seed where nothing is drawn. A section of
     another kind counts as its kind.
     """
-    presets = {name: load_config(name) for name in preset_names()}
-    same = [name for name, preset in presets.items() if preset.published == config.published]
-    changed = {name: _changes(presets[name], config) for name in ([config.name] if config.name in presets else same)}
+    named = config.name in preset_names()
+    presets = {name: load_config(name) for name in ([config.name] if named else preset_names())}
+    changed = {
+        name: _changes(preset, config)
+        for name, preset in presets.items()
+        if named or preset.published == config.published
+    }
     return min(changed.items(), key=lambda each: len(each[1]))
 
 

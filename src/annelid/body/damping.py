@@ -212,7 +212,9 @@ class MaterialDamping:
         shape = (*tendons.shape, _PER_ROW + 1)
         assert np.array_equal(model.tendon_adr[tendons].ravel(), np.arange(first, last, _PER_ROW + 1))
         self._row = model.wrap_prm[first:last].reshape(shape)[..., :_PER_ROW]
-        self._dof = model.jnt_dofadr[model.wrap_objid[first:last]].reshape(shape)[..., :_PER_ROW]
+        dofs = model.jnt_dofadr[model.wrap_objid[first:last]].reshape(shape)[..., :_PER_ROW]
+        # numpy would convert other integers at every step.
+        self._dof = dofs.astype(np.intp)
         bodies = model.flex_vertbodyid.reshape(n_strands, n_edges + 1)
         # A vertex sits on three slides along the world's axes.
         self._slide = model.jnt_qposadr[model.body_jntadr[bodies]] + np.arange(3)[:, None, None]
@@ -224,5 +226,5 @@ class MaterialDamping:
 
     def loss_W(self, qvel: Array) -> float:
         """Power that the rows take at velocities, ``(nv,)``, W."""
-        rate = (self._row * qvel[self._dof]).sum(axis=-1)
+        rate = (self._row * qvel.take(self._dof)).sum(axis=-1)
         return float((self._damping * rate * rate).sum())

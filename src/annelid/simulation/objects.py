@@ -101,7 +101,7 @@ class Objects:
         values = engine["sensordata"]
         many = values.shape[:-1]
         if not self._is_scene:
-            return Met(*(np.broadcast_to(part, (*many, *part.shape)) for part in NOTHING))
+            return Met(*(np.broadcast_to(part, (*many, *part.shape)) for part in NOTHING)) if many else NOTHING
         first, last = self._first, self._first + 4 * self.n_skin
         deepest = values[..., first:last].reshape(*many, -1, 4)
         forces = values[..., last : last + 3 * self.n_skin * len(self.names)]

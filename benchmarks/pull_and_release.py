@@ -24,9 +24,9 @@ Needs ``pip install -c constraints.txt ".[bench]" dismech-newton==0.1.0.post2`` 
 from __future__ import annotations
 
 import argparse
-import platform
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from math import ceil, cos, nan, pi
@@ -55,22 +55,22 @@ Place = tuple[int, int]
 """A strand and one of its vertices."""
 Step = Callable[[Array], Array]
 """A step under forces on the pulled vertices, N, which returns their positions, m, ``(n_pulled, 3)`` both."""
-DAMPING_S = 0.005
-STRANDS = Strands(damping_time_s=DAMPING_S)
-LENGTH_M, RADIUS_M, RATE_RAD_PER_M = 0.3, 0.16, 14.0
+MATERIAL = Strands()
+YOUNG_PA, SHEAR_PA = MATERIAL.one_number("young_modulus_Pa"), MATERIAL.one_number("shear_modulus_Pa")
+DENSITY = MATERIAL.one_number("linear_density_kg_per_m") / (pi * MATERIAL.radius_m**2)
+TORSION = SHEAR_PA * pi * MATERIAL.radius_m**4 / 2
+WORM_DAMPING_S = 0.145
+"""Of the preset riddle2023-rods."""
+RADIUS_M, RATE_RAD_PER_M = 0.16, 14.0
 RISEN_S, RELEASED_S, END_S, SAMPLE_S = 0.3, 0.6, 1.0, 0.01
-DENSITY = STRANDS.one_number("linear_density_kg_per_m") / (pi * STRANDS.radius_m**2)
-YOUNG_PA, SHEAR_PA = STRANDS.one_number("young_modulus_Pa"), STRANDS.one_number("shear_modulus_Pa")
-TORSION = SHEAR_PA * pi * STRANDS.radius_m**4 / 2
 CLAMP_KG = 1e6
-REFINED = (1, 2, 4)
-ANNELID_S = DISMECH_S = 1e-3
-"""Steps on the coarsest mesh."""
-CHAIN_KG_M2, CHAIN_PIN_S, CHAIN_S, CHAIN_INTEGRATOR = 1e-5, 0.004, 2e-3, "RK4"
-TOL = 1e-20
-NET_N, EDGE_S = 0.5, 0.0002
-ELASTICA_HEAVIER, ELASTICA_SAFE = 100.0, 0.8
-ERRORS = ("held", "released", "held_own", "released_own")
+LENGTH_M = 0.05
+"""Of the element that the numerics below are for; they are as the square of an element's length."""
+ANNELID_S, EDGE_S, TOLERANCE = 2.2e-3, 0.0002, 1e-20
+CHAIN_S, CHAIN_KG_M2, CHAIN_PIN_S = 4e-3, 6e-6, 0.005
+DISMECH_S, DISMECH_THETA = 8e-3, 0.5
+ELASTICA_HEAVIER, ELASTICA_SHARE = 600.0, 0.4
+"""Multiple of the rotary inertia, and the step over the closed form of the largest; half of that is not stable."""
 PLANAR = ("riddle2022-planar", "daltorio2013", "boxerbaum2012")
 
 
@@ -81,29 +81,40 @@ class Scene:
     vertices_m: Array  # (n_strands, n_vertices, 3)
     crossings: list[tuple[Place, Place]]
     pulled: list[Place]
-    forces_N: Callable[[Array], Array]  # on the pulled vertices while they are held, from their positions, (n_pulled, 3)
+    forces_N: Callable[
+        [Array], Array
+    ]  # on the pulled vertices while they are held, from their positions, (n_pulled, 3)
     seen_m: Callable[[Array], Array]  # what is compared, from the same
     clamped: bool  # the first edge of every strand, or free
-    coarseness: float  # square of an element's length over that of the coarsest mesh
+    damping_s: float
 
     @property
     def element_m(self) -> float:
         """Length of an element."""
         return float(np.linalg.norm(self.vertices_m[0, 1] - self.vertices_m[0, 0]))
 
+    @property
+    def coarseness(self) -> float:
+        """What multiplies the numerics."""
+        return (self.element_m / LENGTH_M) ** 2
+
+    @property
+    def strands(self) -> Strands:
+        """The material."""
+        return Strands(damping_time_s=self.damping_s)
+
 
 def strand(refined: int) -> Scene:
     """A helical cantilever; the clamp is the middle of the first edge, which every simulator holds."""
     elements = 4 * refined
-    arc = (np.arange(elements + 2) - 0.5) * LENGTH_M / (elements + 0.5)
+    arc = (np.arange(elements + 2) - 0.5) * 0.3 / (elements + 0.5)
     angle = arc * RATE_RAD_PER_M / np.hypot(1.0, RADIUS_M * RATE_RAD_PER_M)
     place = np.stack([angle / RATE_RAD_PER_M, RADIUS_M * np.cos(angle), RADIUS_M * np.sin(angle)], axis=-1)
     force_N = -0.025 * place[None, -1] * [0.0, 1.0, 1.0] / RADIUS_M
-    end, coarseness = (0, elements + 1), (4.5 / (elements + 0.5)) ** 2
-    return Scene(place[None], [], [end], lambda _: force_N, lambda at: at, True, coarseness)
+    return Scene(place[None], [], [(0, elements + 1)], lambda _: force_N, lambda at: at, True, 0.005)
 
 
-def net(refined: int) -> Scene:
+def net(refined: int, damping_s: float) -> Scene:
     """A free braid of six strands with three planes of crossings, the middle one pulled."""
     mesh = helical_mesh(
         1,
@@ -121,11 +132,11 @@ def net(refined: int) -> Scene:
         return np.linalg.norm(np.roll(at, -1, axis=0) - at, axis=1, keepdims=True)
 
     def tension_N(at: Array) -> Array:
-        along = NET_N * (np.roll(at, -1, axis=0) - at) / sides_m(at)
+        along = 0.2 * (np.roll(at, -1, axis=0) - at) / sides_m(at)
         return along - np.roll(along, 1, axis=0)
 
     pulled = [crossings[crossing][0] for crossing in mesh.rings[0]]
-    return Scene(mesh.vertices_m, crossings, pulled, tension_N, sides_m, False, refined**-2.0)
+    return Scene(mesh.vertices_m, crossings, pulled, tension_N, sides_m, False, damping_s)
 
 
 def share(time_s: float) -> float:
@@ -165,9 +176,9 @@ def annelid(scene: Scene) -> tuple[Step, float]:
     engine(spec, step_s)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    rods = Rods(edge_time_constant_s=EDGE_S)
-    spec.option.tolerance = TOL
-    masses = np.array([lumped_masses(one, STRANDS.linear_density_kg_per_m) for one in scene.vertices_m])
+    rods, strands = Rods(edge_time_constant_s=EDGE_S), scene.strands
+    spec.option.tolerance = TOLERANCE
+    masses = np.array([lumped_masses(one, strands.one_number("linear_density_kg_per_m")) for one in scene.vertices_m])
     names = [[f"vertex_{s}_{v}" for v in range(n_vertices)] for s in range(n_strands)]
     for first, second in scene.crossings:
         masses[first] += masses[second]
@@ -180,13 +191,13 @@ def annelid(scene: Scene) -> tuple[Step, float]:
     for place in [*crossing, *(place for place in np.ndindex(masses.shape) if place not in shared)]:
         add_vertex(spec, names[place[0]][place[1]], scene.vertices_m[place], masses[place])
     for s, vertices_m in enumerate(scene.vertices_m):
-        add_rod(spec, f"strand_{s}", vertices_m, names[s], STRANDS, rods)
+        add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, rods)
         if scene.clamped:
             spec.joint(f"strand_{s}_twist_0").armature = CLAMP_KG
     add_damper_rows(spec)
     model = compile_spec(spec)
     data = mujoco.MjData(model)
-    damping = MaterialDamping(model, STRANDS)
+    damping = MaterialDamping(model, strands)
     pulled = [model.body(names[s][v]).id for s, v in scene.pulled]
     slides = model.jnt_qposadr[model.body_jntadr[pulled]][:, None] + np.arange(3)
 
@@ -200,17 +211,21 @@ def annelid(scene: Scene) -> tuple[Step, float]:
 
 
 def chain(scene: Scene) -> tuple[Step, float]:
-    """The paper's capsules on joints that resist torsion too, with the paper's integrator and solver.
+    """The paper's capsules on joints, which here resist torsion as the material does.
 
-    Its numerics are the inertia of the joints and the time constant of the pins, and its step is the longest stable one.
+    The paper's method, Runge-Kutta, is explicit in the damping too; the formulation's other one is implicit in it. The
+    joints have the paper's added inertia no more, which was for that, but one that vanishes with the mesh.
     """
     settings = Chain(
-        joint="hinges", armature_kg_m2=CHAIN_KG_M2 * scene.coarseness, pin_time_constant_s=CHAIN_PIN_S * scene.coarseness
+        joint="hinges",
+        integrator="Euler",
+        armature_kg_m2=CHAIN_KG_M2 * scene.coarseness,
+        pin_time_constant_s=CHAIN_PIN_S * scene.coarseness,
     )
     step_s = dividing(CHAIN_S * scene.coarseness)
     spec = mujoco.MjSpec()
     engine(spec, step_s)
-    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{CHAIN_INTEGRATOR.upper()}")
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
     spec.option.iterations = settings.solver_iterations
     spec.option.tolerance = settings.solver_tolerance
@@ -218,7 +233,7 @@ def chain(scene: Scene) -> tuple[Step, float]:
     n_elements = scene.vertices_m.shape[1] - 1
     root = 0 if scene.clamped else n_elements // 2
     for s, vertices_m in enumerate(scene.vertices_m):
-        add_chain(spec, f"strand_{s}", vertices_m, STRANDS, settings, root=root, fixed_root=scene.clamped)
+        add_chain(spec, f"strand_{s}", vertices_m, scene.strands, settings, root=root, fixed_root=scene.clamped)
 
     def attached(place: Place) -> tuple[str, Array]:
         """An element that ends at a vertex, and the vertex in the axes of that element."""
@@ -255,11 +270,11 @@ def pyelastica(scene: Scene) -> tuple[Step, float]:
     """Cosserat rods with an enlarged rotary inertia, at the longest stable step."""
     ea: Any = import_module("elastica")
     heavier = ELASTICA_HEAVIER * scene.coarseness
-    # Rotation against shear, stretch, and the viscous bending, which is explicit here.
-    shear = STRANDS.radius_m * np.sqrt(heavier * DENSITY / (SHEAR_CORRECTION * SHEAR_PA))
+    # The limits of shear, of stretch, and half that of the viscous bending, which is explicit here.
+    shear = MATERIAL.radius_m * np.sqrt(heavier * DENSITY / (SHEAR_CORRECTION * SHEAR_PA))
     stretch = scene.element_m * np.sqrt(DENSITY / YOUNG_PA)
-    viscous = DENSITY * heavier * scene.element_m**2 / (4.0 * YOUNG_PA * DAMPING_S)
-    step_s = dividing(ELASTICA_SAFE * min(shear, stretch, viscous))
+    viscous = DENSITY * heavier * scene.element_m**2 / (4.0 * YOUNG_PA * scene.damping_s)
+    step_s = dividing(ELASTICA_SHARE * min(shear, stretch, viscous))
 
     class System(ea.BaseSystemCollection, ea.Constraints, ea.Forcing, ea.Connections):
         pass
@@ -273,7 +288,7 @@ def pyelastica(scene: Scene) -> tuple[Step, float]:
         def apply_forces(self, system: Any, time: float = 0.0) -> None:
             for index, vertex in self.pulled:
                 system.external_forces[:, vertex] += now_N[index]
-            system.rest_kappa[:] = self.rest - DAMPING_S / step_s * (system.kappa - self.before)
+            system.rest_kappa[:] = self.rest - scene.damping_s / step_s * (system.kappa - self.before)
             self.before[:] = system.kappa
 
     system, rods, now_N = System(), [], np.zeros((len(scene.pulled), 3))
@@ -288,7 +303,7 @@ def pyelastica(scene: Scene) -> tuple[Step, float]:
             tangents[0],
             across[0],
             float(np.linalg.norm(edges, axis=1).sum()),
-            STRANDS.radius_m,
+            MATERIAL.radius_m,
             DENSITY,
             youngs_modulus=YOUNG_PA,
             shear_modulus=SHEAR_PA,
@@ -301,10 +316,11 @@ def pyelastica(scene: Scene) -> tuple[Step, float]:
         system.append(rod)
         rods.append(rod)
         if scene.clamped:
-            system.constrain(rod).using(ea.FixedConstraint, constrained_position_idx=(0, 1), constrained_director_idx=(0,))
+            held = {"constrained_position_idx": (0, 1), "constrained_director_idx": (0,)}
+            system.constrain(rod).using(ea.FixedConstraint, **held)
         system.add_forcing_to(rod).using(Pull, rod, [(i, v) for i, (of, v) in enumerate(scene.pulled) if of == s])
     # As stiff as the step allows: two nodes on a spring, a fourth of the stable frequency.
-    stiffness = 0.5 * DENSITY * pi * STRANDS.radius_m**2 * scene.element_m * (0.5 / step_s) ** 2
+    stiffness = 0.5 * DENSITY * pi * MATERIAL.radius_m**2 * scene.element_m * (0.5 / step_s) ** 2
     for (a, v), (b, w) in scene.crossings:
         joined = system.connect(rods[a], rods[b], first_connect_idx=v, second_connect_idx=w)
         joined.using(ea.FreeJoint, k=stiffness, nu=0.0)
@@ -327,13 +343,13 @@ def dismech(scene: Scene) -> tuple[Step, float]:
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
     peer.register_custom_attributes(builder)
     for place in scene.vertices_m:
-        rod = newton.Rod(points=place, radius=STRANDS.radius_m, youngs_modulus=YOUNG_PA, shear_modulus=SHEAR_PA)
+        rod = newton.Rod(points=place, radius=MATERIAL.radius_m, youngs_modulus=YOUNG_PA, shear_modulus=SHEAR_PA)
         edges = peer.add_rod(
             builder,
             rod,
             cfg=newton.ModelBuilder.ShapeConfig(density=DENSITY),
-            bend_damping=DAMPING_S * STRANDS.bending_rigidity_Nm2 / scene.element_m,
-            twist_damping=DAMPING_S * TORSION / scene.element_m,
+            bend_damping=scene.damping_s * MATERIAL.bending_rigidity_Nm2 / scene.element_m,
+            twist_damping=scene.damping_s * TORSION / scene.element_m,
             proxies=False,
         )
         if scene.clamped:
@@ -347,7 +363,7 @@ def dismech(scene: Scene) -> tuple[Step, float]:
                 if node == replaced:
                     nodes[edge] = kept
     model = builder.finalize(device="cpu")
-    solver = peer.DiSMechSolver(model)
+    solver = peer.DiSMechSolver(model, theta=DISMECH_THETA)
     states = [model.state(), model.state()]
     pulled = [s * n_vertices + v for s, v in scene.pulled]
     forces = np.zeros((builder.particle_count, 3), dtype=np.float32)
@@ -369,6 +385,14 @@ SIMULATORS: dict[str, tuple[Callable[[Scene], tuple[Step, float]], str]] = {
     "chain": (chain, "mujoco-core"),
 }
 """What runs a scene, and the package whose version counts."""
+ALL = (1, 2, 4)
+SCENES: dict[str, tuple[Callable[[int], Scene], dict[str, tuple[int, ...]]]] = {
+    "strand": (strand, {"annelid": (1, 2, 4, 8)}),
+    "net": (partial(net, damping_s=0.005), {"PyElastica": (1, 2)}),
+    "net, the worm's damping": (partial(net, damping_s=WORM_DAMPING_S), {"PyElastica": (1,)}),
+}
+"""Meshes, and who has not all three: annelid one more, and PyElastica those that take less than some minutes."""
+ERRORS = ("held", "released", "held_own", "released_own")
 HELD = round(RELEASED_S / SAMPLE_S)
 
 
@@ -386,22 +410,26 @@ def slower(cost: float, error: float, costs: Array, errors: Array) -> str:
     return f"{bound}{factor:.{0 if factor >= 10 else 1}f}"
 
 
-def compared(name: str, scene_of: Callable[[int], Scene]) -> Iterator[dict[str, Any]]:
+def compared(name: str) -> Iterator[dict[str, Any]]:
     """Yields the rows of a scene."""
-    scenes = [scene_of(refined) for refined in REFINED]
+    scene_of, own = SCENES[name]
     limit, ours = np.zeros(0), np.zeros(0)
     for simulator, (build, package) in SIMULATORS.items():
+        scenes = [scene_of(refined) for refined in own.get(simulator, ALL)]
         try:
             steppers = [build(scene) for scene in scenes]
         except (ImportError, TypeError) as failed:
             print(f"{name}: {simulator} is not there: {failed}")
             continue
-        paths, costs = zip(*(sampled(*stepper) for stepper in steppers), strict=True)
-        best = paths[-1] + (paths[-1] - paths[-2]) / (scenes[-2].coarseness / scenes[-1].coarseness - 1.0)
+        runs = [sampled(scene, *stepper) for scene, stepper in zip(scenes, steppers, strict=True)]
+        best = np.full_like(runs[0][0], nan)
+        if len(runs) > 1:
+            (rough, _), (fine, _) = runs[-2:]
+            best = fine + (fine - rough) / (scenes[-2].coarseness / scenes[-1].coarseness - 1.0)
         limit = best if simulator == "annelid" else limit
-        points = np.array([[cost, *rms_mm(path - limit), *rms_mm(path - best)] for path, cost in zip(paths, costs)])
+        points = np.array([[cost, *rms_mm(path - limit), *rms_mm(path - best)] for path, cost in runs])
         ours = points if simulator == "annelid" else ours
-        apart, moved = rms_mm(best - limit), rms_mm(best - best[:1])
+        apart, moved = rms_mm(best - limit), rms_mm(limit - limit[:1])
         for scene, (_, step_s), point in zip(scenes, steppers, points, strict=True):
             factors = [slower(point[0], point[k], ours[:, 0], ours[:, k]) for k in range(1, 5)]
             yield {
@@ -411,7 +439,7 @@ def compared(name: str, scene_of: Callable[[int], Scene]) -> Iterator[dict[str, 
                 "elements": scene.vertices_m.shape[1] - 1 - scene.clamped,
                 "step_ms": 1e3 * step_s,
                 "s_per_s": point[0],
-                **dict(zip([f"{error}_mm" for error in ERRORS], point[1:], strict=True)),
+                **dict(zip([f"{error}_mm" for error in ERRORS], point[1:].tolist(), strict=True)),
                 **dict(zip([f"slower_{error}" for error in ERRORS], factors, strict=True)),
                 "apart_held_mm": apart[0],
                 "apart_released_mm": apart[1],
@@ -424,7 +452,12 @@ def planar() -> Iterator[dict[str, Any]]:
     """Yields the rows of planar worms, which have a speed only."""
     for preset in PLANAR:
         run = simulate(load_config(preset))
-        yield {"scene": "planar", "simulator": preset, "version": version("annelid"), "s_per_s": 1.0 / run.real_time_factor}
+        yield {
+            "scene": "planar",
+            "simulator": preset,
+            "version": version("annelid"),
+            "s_per_s": 1.0 / run.real_time_factor,
+        }
 
 
 def main() -> None:
@@ -434,7 +467,7 @@ def main() -> None:
     chosen = parser.parse_args()
     keep_to_one_core()
     rows: list[dict[str, Any]] = []
-    for each in (compared("strand", strand), compared("net", net), planar()):
+    for each in (*map(compared, SCENES), planar()):
         for row in each:
             rows.append(row)
             shown = (f"{key} {value:.4g}" if isinstance(value, float) else str(value) for key, value in row.items())

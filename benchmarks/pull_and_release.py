@@ -31,6 +31,7 @@ from importlib import import_module
 from importlib.metadata import version
 from math import ceil, cos, nan, pi
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
@@ -189,7 +190,7 @@ def annelid(scene: Scene) -> tuple[Step, float]:
     crossing = [first for first, _ in scene.crossings]
     shared = {place for pair in scene.crossings for place in pair}
     for place in [*crossing, *(place for place in np.ndindex(masses.shape) if place not in shared)]:
-        add_vertex(spec, names[place[0]][place[1]], scene.vertices_m[place], masses[place])
+        add_vertex(spec, names[place[0]][place[1]], scene.vertices_m[place], float(masses[place]))
     for s, vertices_m in enumerate(scene.vertices_m):
         add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, rods)
         if scene.clamped:
@@ -396,10 +397,10 @@ ERRORS = ("held", "released", "held_own", "released_own")
 HELD = round(RELEASED_S / SAMPLE_S)
 
 
-def rms_mm(difference: Array) -> tuple[float, float]:
-    """Root mean squares of a path's length, ``(n_samples, n_pulled, 3)``: at the end of the hold, and from the release."""
+def rms_mm(difference: Array) -> list[float]:
+    """Root mean squares of a difference of paths at the end of the hold, and from the release on."""
     square = (1e3 * difference) ** 2
-    return tuple(float(np.sqrt(part.sum(axis=-1).mean())) for part in (square[HELD], square[HELD + 1 :]))
+    return [float(np.sqrt(part.sum(axis=-1).mean())) for part in (square[HELD], square[HELD + 1 :])]
 
 
 def slower(cost: float, error: float, costs: Array, errors: Array) -> str:
@@ -449,15 +450,11 @@ def compared(name: str) -> Iterator[dict[str, Any]]:
 
 
 def planar() -> Iterator[dict[str, Any]]:
-    """Yields the rows of planar worms, which have a speed only."""
+    """Yields the rows of planar worms, in the closed loop and with recording, which have a speed only."""
     for preset in PLANAR:
-        run = simulate(load_config(preset))
-        yield {
-            "scene": "planar",
-            "simulator": preset,
-            "version": version("annelid"),
-            "s_per_s": 1.0 / run.real_time_factor,
-        }
+        with TemporaryDirectory() as folder:
+            cost = 1.0 / simulate(load_config(preset), folder).real_time_factor
+        yield {"scene": "planar worm", "simulator": preset, "version": version("annelid"), "s_per_s": cost}
 
 
 def main() -> None:

@@ -58,6 +58,7 @@ NO_WORM = {
     "robust_network.csv": "networks without a body",
     "firmware_random.csv": "the same",
     "lateral_damping.csv": "rods with and without the damping that it is about",
+    "peers.csv": "a strand and a net without a worm",
     "calibration_default.json": "a fit with a body of its own",
     "identify_recovery.csv": "synthetic robots",
     "identify_recovery_table.csv": "the same",

@@ -52,12 +52,13 @@ from annelid.morphology import Array, helical_mesh
 from annelid.output import write_csv
 from annelid.simulation import simulate
 from annelid_studies.bench.measure import keep_to_one_core
-from annelid_studies.bench.peer import SHEAR_CORRECTION
 
 Place = tuple[int, int]
 """A strand and one of its vertices."""
 Step = Callable[[Array], Array]
 """A step under forces on the pulled vertices, N, which returns their positions, m, ``(n_pulled, 3)`` both."""
+SHEAR_CORRECTION = 27.0 / 28.0
+"""PyElastica's shear correction factor of a round cross-section."""
 MATERIAL = Strands()
 YOUNG_PA, SHEAR_PA = MATERIAL.one_number("young_modulus_Pa"), MATERIAL.one_number("shear_modulus_Pa")
 DENSITY = MATERIAL.one_number("linear_density_kg_per_m") / (pi * MATERIAL.radius_m**2)

@@ -15,7 +15,6 @@ REPORT = {
     "fronts": {},
     "cost_exponents": {},
     "levels": {},
-    "peer": {"installed": False, "install": "pip install pyelastica"},
 }
 
 Asked = list[tuple[Path, str, Sequence[str] | None]]
@@ -42,15 +41,14 @@ def test_prints_the_table_and_the_paths(annelid: Command, asked: Asked) -> None:
     assert done.exit_code == 0, done.err
     assert done.out.splitlines()[-2:] == ["bench/bench.json", "bench/bench.png"]
     assert Path("bench/bench.svg").is_file()
-    assert "pip install pyelastica" in done.out
     assert asked == [(Path("bench"), "full", None)]
 
 
 def test_hands_its_options_on(annelid: Command, asked: Asked) -> None:
-    done = annelid("bench", "-o", "a/b", "--quick", "--cases", "steps", "--cases", "peer", "-q")
+    done = annelid("bench", "-o", "a/b", "--quick", "--cases", "steps", "--cases", "levels", "-q")
     assert done.out.split() == ["a/b/bench.json", "a/b/bench.png"]
     assert done.err == ""
-    assert asked == [(Path("a/b"), "quick", ["steps", "peer"])]
+    assert asked == [(Path("a/b"), "quick", ["steps", "levels"])]
 
 
 def test_an_unknown_line_is_one_sentence(annelid: Command) -> None:

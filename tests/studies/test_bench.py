@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +17,6 @@ from annelid.cli import app
 from annelid.config import LEVELS, load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid_studies.bench import benchmark as store_module
-from annelid_studies.bench import peer as peer_module
 from annelid_studies.bench.benchmark import (
     JSON_NAME,
     QUANTITIES,
@@ -81,7 +79,7 @@ class TestSlowdowns:
         assert slower(timings(a=(factor * step, yardstick)), before)["a"] == pytest.approx(factor - 1.0)
 
     def test_only_cases_that_both_have_measured_count(self) -> None:
-        now = timings(a=(2.0, 1.0), b=(2.0, None), c=(2.0, 1.0)) | {"peer": None}
+        now = timings(a=(2.0, 1.0), b=(2.0, None), c=(2.0, 1.0))
         before = timings(a=(1.0, 1.0), b=(1.0, 1.0), d=(1.0, 1.0))
         assert slower(now, before) == {"a": 1.0}
         with pytest.raises(RunFileError, match="no case in common"):
@@ -221,7 +219,7 @@ class TestCases:
     def test_each_is_a_valid_configuration_and_there_once(self, effort: Any) -> None:
         cases = bench_cases(effort)
         assert len({case.name for case in cases}) == len({case.case.config.model_dump_json() for case in cases})
-        assert {line for case in cases for line in case.lines} == set(LINES) - {"peer"}
+        assert {line for case in cases for line in case.lines} == set(LINES)
 
     def test_the_full_benchmark_takes_over_what_the_quick_one_measured(self) -> None:
         full = {case.name: case.case.config for case in bench_cases("full")}
@@ -355,7 +353,6 @@ class TestStore:
         assert [share for *_, share in told] == sorted(share for *_, share in told)
         report = json.loads(path.read_text())
         assert len(report["cases"]) == n_cases
-        assert report["peer"] is None
 
     @pytest.mark.parametrize("reads", ["read request", "exec <&-"])
     def test_a_dead_process_is_told_and_not_kept(
@@ -412,48 +409,6 @@ def test_peak_memory_grows_by_what_is_allocated() -> None:
     assert after >= block.nbytes > before
 
 
-class TestPeer:
-    def test_the_step_is_the_stability_limit_of_a_section_turning_against_shear(self) -> None:
-        body = peer_module.papers_body()
-        strands = body.strands
-        area, inertia = math.pi * strands.radius_m**2, math.pi * strands.radius_m**4 / 4
-        stiffness = peer_module.SHEAR_CORRECTION * strands.one_number("shear_modulus_Pa") * area
-        per_length = strands.one_number("linear_density_kg_per_m") / area * inertia
-        rate = stiffness / per_length
-
-        def grows(step: float) -> bool:
-            angle, speed = 1.0, 0.0
-            for _ in range(2000):
-                angle += 0.5 * step * speed
-                speed -= step * rate * angle
-                angle += 0.5 * step * speed
-            return abs(angle) > 100.0
-
-        limit = peer_module.stable_step_s(body)
-        assert not grows(0.99 * limit)
-        assert grows(1.01 * limit)
-
-    def test_a_missing_peer_is_told_with_the_line_that_installs_it(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(peer_module, "PACKAGE", "annelid-has-no-such-peer")
-        assert peer_module.peer() == {"installed": False, "install": "pip install pyelastica"}
-
-    def test_a_missing_peer_is_asked_for_again(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        answers = iter([{"installed": False, "install": "-"}, {"installed": True, "real_time_factor": 0.1}])
-        monkeypatch.setattr(store_module, "_in_a_process", lambda request, progress: next(answers))
-        assert [json.loads(bench(tmp_path, lines=["peer"]).read_text())["peer"]["installed"] for _ in range(3)] == [
-            False,
-            True,
-            True,
-        ]
-
-    @pytest.mark.slow
-    def test_pyelastica_is_stable_up_to_the_limit(self) -> None:
-        pytest.importorskip("elastica")
-        found = peer_module.peer()
-        assert found["stable"]
-        assert found["step_us"] == pytest.approx(found["step_limit_us"], rel=0.03)
-
-
 class TestPicture:
     def report(self, effort: Any, lines: list[str] | None = None) -> dict[str, Any]:
         cases = bench_cases(effort, lines)
@@ -461,18 +416,17 @@ class TestPicture:
         for case in cases:
             if case.kind == "judged":
                 measured[case.name]["summary"] = numbers(period=2.6 + 0.01 * case.body.mesh.elements_per_side)
-        peer = {"installed": True, "rods": 12, "step_mean_ms": 0.1, "real_time_factor": 0.05}
-        return {"machine": "2 cores", "peer": peer, **judge(cases, measured)}
+        return {"machine": "2 cores", **judge(cases, measured)}
 
     def test_holds_all_panels(self, tmp_path: Path) -> None:
         path = bench_figure(self.report("full"), tmp_path / "bench")
         assert path.read_bytes().startswith(b"\x89PNG")
         text = path.with_suffix(".svg").read_text()
-        words_of_all = ("2 elements", "40 ms", "real time", "PyElastica, free rods", "N^1.00 (3..30)", "constraint")
+        words_of_all = ("2 elements", "40 ms", "real time", "paper's chain", "N^1.00 (3..30)", "constraint")
         for words in (*words_of_all, "Elongation", "Slip"):
             assert f"<!-- {words}" in text or words in text, words
 
-    @pytest.mark.parametrize("lines", [["peer"], ["chain"], ["levels"], ["duration"], ["steps"]])
+    @pytest.mark.parametrize("lines", [["chain"], ["levels"], ["duration"], ["steps"]])
     def test_leaves_out_what_was_not_measured(self, tmp_path: Path, lines: list[str]) -> None:
         text = bench_figure(self.report("quick", lines), tmp_path / "bench").with_suffix(".svg").read_text()
         assert ("Cost of a step" in text) == (lines == ["chain"])

@@ -107,7 +107,6 @@ def bench_command(
     --cases segments    rods of 3 to 30 segments
     --cases chain       the paper's formulation, 3 to 12 segments
     --cases duration    10 and 60 s, for the memory
-    --cases peer        free rods of PyElastica, if it is installed
 
     The whole takes about half an hour. Leave the machine alone meanwhile: what else runs is measured too.
     Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and

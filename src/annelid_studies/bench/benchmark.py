@@ -23,7 +23,7 @@ from annelid.experiment import StudyProgress, case_key, code_fingerprint
 from annelid.output import write_json, write_text
 from annelid.simulation import locks
 from annelid.textfiles import read_json
-from annelid_studies.bench.cases import BenchCase, bench_cases, check_lines, level_of
+from annelid_studies.bench.cases import BenchCase, bench_cases, level_of
 from annelid_studies.worms import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
@@ -57,16 +57,14 @@ SCHEMA = {
     "fronts": "by converged run and quantity: the cases that no other beats in both speed and mean error, the fastest "
     "first",
     "levels": "the case of each level of fidelity",
-    "peer": "free rods without joints, contact or muscles; step_limit_us is the closed form of the largest stable step",
 }
 
-MEASURING, PEER_CODE = "annelid_studies.bench.measure", "annelid_studies.bench.peer"
-"""The code that a measurement depends on beside the physics, and that of the peer."""
+MEASURING = "annelid_studies.bench.measure"
+"""The code that a measurement depends on beside the physics."""
 
 Share = Callable[[float], object]
 """Called with the share of a case that is done."""
 
-_PEER_COST_S = 15.0
 # Importing, compiling, and the pass with the engine's timers.
 _OVERHEAD_S = 5.0
 # Exponents by which the cost of a step grows with the number of segments, beyond proportion.
@@ -94,9 +92,7 @@ def bench(
         KeyboardInterrupt: The case in progress is dropped, all others kept.
     """
     cases = bench_cases(effort, lines)
-    wanted: dict[str, BenchCase | None] = {case.name: case for case in cases}
-    if "peer" in check_lines(lines):
-        wanted["peer"] = None
+    wanted = {case.name: case for case in cases}
     store = Measurements(folder / CASES_FOLDER)
     measured = {name: kept for name, case in wanted.items() if (kept := store.find(case)) is not None}
     costs_s = {name: _cost_s(case) for name, case in wanted.items() if name not in measured}
@@ -120,7 +116,6 @@ def bench(
         | {"python": platform.python_version()},
         "schema": SCHEMA,
         **judge(cases, measured),
-        "peer": measured.get("peer"),
     }
     return write_json(folder / JSON_NAME, content)
 
@@ -159,9 +154,7 @@ def _points(entries: Sequence[Mapping[str, Any]], reference: str, quantity: str)
     }
 
 
-def _cost_s(case: BenchCase | None) -> float:
-    if case is None:
-        return _PEER_COST_S
+def _cost_s(case: BenchCase) -> float:
     growth = _GROWTH[case.body.formulation.kind]
     n_runs = 1 + len(case.perturbed)
     return n_runs * case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
@@ -319,38 +312,33 @@ class MeasurementFailed(AnnelidError):
 
 
 class Measurements:
-    """A folder of measurements of cases, and of the peer for None; it is made with the first."""
+    """A folder of measurements of cases; it is made with the first."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def find(self, case: BenchCase | None) -> dict[str, Any] | None:
+    def find(self, case: BenchCase) -> dict[str, Any] | None:
         """Returns what was measured before with the same configuration, code and engine, or None."""
         try:
             return read_json(self._path(case))
         except (OSError, ValueError):
             return None
 
-    def measure(self, case: BenchCase | None, progress: Share) -> dict[str, Any]:
+    def measure(self, case: BenchCase, progress: Share) -> dict[str, Any]:
         """Measures a case, and keeps the numbers.
 
         Raises:
             MeasurementFailed: The process died, or the case cannot be built.
         """
-        request: dict[str, Any] = {}
-        if case is not None:
-            config, *perturbed = (one.model_dump(mode="json") for one in (case.case.config, *case.perturbed))
-            request = {"config": config, "perturbed": perturbed}
-        measured = _in_a_process(request, progress)
-        # A peer that is missing may be installed before the next call.
-        if measured.get("installed", True):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            write_text(self._path(case), json.dumps(measured, indent=1, allow_nan=False))
+        config, *perturbed = (one.model_dump(mode="json") for one in (case.case.config, *case.perturbed))
+        measured = _in_a_process({"config": config, "perturbed": perturbed}, progress)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_text(self._path(case), json.dumps(measured, indent=1, allow_nan=False))
         return measured
 
-    def _path(self, case: BenchCase | None) -> Path:
-        code = code_fingerprint(PEER_CODE) if case is None else case_key(case.case) + code_fingerprint(MEASURING)
-        stem = "peer" if case is None else case.name.replace(", ", "-").replace(" ", "-")
+    def _path(self, case: BenchCase) -> Path:
+        code = case_key(case.case) + code_fingerprint(MEASURING)
+        stem = case.name.replace(", ", "-").replace(" ", "-")
         return self.folder / f"{stem}-{hashlib.sha256(code.encode()).hexdigest()[:12]}.json"
 
 

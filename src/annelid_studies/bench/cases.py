@@ -21,7 +21,6 @@ LINES = {
     "segments": "rods as their preset has them, 3 to 30 segments",
     "chain": "the paper's formulation, 3 to 12 segments",
     "duration": "rods as their preset has them, 10 and 60 s, for the memory",
-    "peer": "free rods of PyElastica",
 }
 """The lines by name, with what they vary."""
 

@@ -33,14 +33,9 @@ def main() -> None:
     request: dict[str, Any] = json.loads(sys.stdin.readline())
     end_after(lambda: os.read(sys.stdin.fileno(), 1))
     try:
-        if "config" in request:
-            from annelid.config import load_config
+        from annelid.config import load_config
 
-            _say(measured=measure(load_config(request["config"]), [load_config(one) for one in request["perturbed"]]))
-        else:
-            from annelid_studies.bench.peer import peer
-
-            _say(measured=peer())
+        _say(measured=measure(load_config(request["config"]), [load_config(one) for one in request["perturbed"]]))
     except AnnelidError as error:
         _say(error=str(error))
 

@@ -33,13 +33,7 @@ def bench_table(report: Mapping[str, Any]) -> TerminalTable:
     references = list(report["fronts"])
     header = ["case", "ms a step", "x real time", "memory, MB", *(f"error, %, against {name}" for name in references)]
     rows = [_row(entry, references) for entry in report["cases"]]
-    peer, caption = report["peer"] or {}, ""
-    if peer.get("real_time_factor"):
-        rows.append([f"PyElastica, {peer['rods']} free rods", *_numbers(peer)])
-    elif peer:
-        rows.append(["PyElastica", peer.get("failed") or "not installed"])
-        caption = f"for the peer: {peer['install']}" if "install" in peer else ""
-    return terminal_table(Table(header, rows), f"{report['machine']}, recording on", caption=caption)
+    return terminal_table(Table(header, rows), f"{report['machine']}, recording on")
 
 
 def slowdown_table(slowdowns: Mapping[str, float], tolerated: float) -> TerminalTable:
@@ -150,18 +144,13 @@ def _front_axes(axes: Axes, report: Mapping[str, Any], title: str, *, limit: boo
         axes.axhline(TOLERATED_PERCENT, color="#c2410c", linewidth=0.8, linestyle="--", zorder=0)
         look = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "right", "color": "#c2410c"}
         axes.annotate(f"{TOLERATED_PERCENT:g} %", (1.0, TOLERATED_PERCENT), **look, **words)
-    axes.axvline(1.0, color=_FADED, linewidth=0.8, zorder=0)
-    # Speeds to compare with that have no error of the same kind: the paper's formulation and the peer.
+    # A speed to compare with that has no error of the same kind: the paper's own worm.
     chains = [one for one in report["cases"] if one["preset"] == CHAIN and one["n_segments"] == 3]
-    named = [*((one, "paper's chain") for one in chains), (report.get("peer") or {}, "PyElastica, free rods")]
-    outsiders = sorted({speed: name for one, name in named if (speed := one.get("real_time_factor"))}.items())
-    for speed, _ in outsiders:
-        axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
-    # Words stand to the left of their lines, but for the faster outsider's: the two lines may be close.
+    papers = [one.get("real_time_factor") for one in chains]
     upright = {"xycoords": axes.get_xaxis_transform(), "rotation": 90, "va": "top", "color": _FADED}
-    for index, (speed, name) in enumerate([*outsiders, (1.0, "real time")]):
-        side, offset = ("left", (2, 0)) if 0 < index < len(outsiders) else ("right", (-2, 0))
-        axes.annotate(name, (speed, 0.99), xytext=offset, ha=side, **upright, **words)
+    for speed, name in [(1.0, "real time"), *((speed, "paper's chain") for speed in papers if speed)]:
+        axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
+        axes.annotate(name, (speed, 0.99), xytext=(-2, 0), ha="right", **upright, **words)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.margins(x=0.08, y=0.12)

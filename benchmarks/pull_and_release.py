@@ -81,18 +81,16 @@ PLANAR = ("riddle2022-planar", "daltorio2013", "boxerbaum2012")
 
 @dataclass(frozen=True)
 class Scene:
-    """Strands at rest, where they cross, and how they are pulled."""
+    """Strands at rest, where they cross, and how they are pulled; functions of the pulled vertices' positions, m."""
 
     vertices_m: Array  # (n_strands, n_vertices, 3)
     crossings: list[tuple[Place, Place]]
     pulled: list[Place]
-    forces_N: Callable[
-        [Array], Array
-    ]  # on the pulled vertices while they are held, from their positions, (n_pulled, 3)
-    seen_m: Callable[[Array], Array]  # what is compared, from the same
+    forces_N: Callable[[Array], Array]  # on the pulled vertices while they are held, (n_pulled, 3)
+    seen_m: Callable[[Array], Array]  # what is compared, (n, 1 or 3)
     clamped: bool  # the first edge of every strand, or free
     damping_s: float
-    longer: float = 1.0
+    longer: float = 1.0  # multiplies the numerics
 
     @property
     def element_m(self) -> float:
@@ -121,7 +119,7 @@ def strand(refined: int) -> Scene:
 
 
 def net(refined: int, damping_s: float) -> Scene:
-    """A free braid with five planes of crossings, the middle one a ring; zero is the coarsest mesh at four steps in one."""
+    """A free braid with five planes of crossings, the middle one a ring; 0 is mesh 1 at four times the step."""
     refined, longer = max(refined, 1), 1.0 if refined else 4.0
     mesh = helical_mesh(
         1,
@@ -400,7 +398,7 @@ SCENES: dict[str, tuple[Callable[[int], Scene], dict[str, tuple[int, ...]]]] = {
     "net": (partial(net, damping_s=0.005), PAPERS | {"annelid": (0, *ALL), "PyElastica": (1, 2)}),
     "worm's material": (partial(net, damping_s=WORM_DAMPING_S), PAPERS | {"annelid": (0, *ALL), "PyElastica": (1,)}),
 }
-"""Meshes, and who has not all three of them: PyElastica those of less than two minutes."""
+"""Meshes, and who has others than the three: annelid more, PyElastica those of less than two minutes."""
 ERRORS = ("held", "released", "held_own", "released_own")
 HELD = round(RELEASED_S / SAMPLE_S)
 

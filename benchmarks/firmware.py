@@ -37,6 +37,7 @@ from annelid.nervous import (
 )
 from annelid.output import write_csv
 from annelid.protocols import Controller, Sensation
+from annelid_studies.worms import PAPERS_RODS
 
 ARM = Path(__file__).parent / "arm"
 CORES = {
@@ -242,7 +243,7 @@ def largest_shift_ms(ours: np.ndarray, theirs: np.ndarray, timestep_ms: float) -
 def rows(folder: Path, n_steps: int, *, arm: bool) -> Iterator[dict[str, Any]]:
     """Rows of the result file, one after the other."""
     for name, changes in WORMS.items():
-        config = annelid.load_config("riddle2023-rods", {**changes, "duration_s": RECORDED_S})
+        config = annelid.load_config("riddle2023-rods", {**PAPERS_RODS, **changes, "duration_s": RECORDED_S})
         plant = annelid.build_plant(config)
         controller: Any = annelid.build_controller(config, plant)
         double, single = (controller_firmware(controller, name, real=real) for real in ("double", "float"))

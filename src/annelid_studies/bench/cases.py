@@ -36,10 +36,11 @@ CHAIN_S, SEGMENTS_S = 0.05, 2.0
 _STEPS_MS = {"full": (1, 2, 5, 10, 20, 40, 60), "quick": (5, 20)}
 _ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
 _ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
+_CREEPING = {"body.formulation.friction_impedance_ratio": 1.0}
 _SETTINGS = {
     "tolerance 1e-6": {"body.formulation.solver_tolerance": 1e-6},
     "tolerance 1e-2": {"body.formulation.solver_tolerance": 1e-2},
-    "impedance ratio 1": {"body.formulation.friction_impedance_ratio": 1.0},
+    "impedance ratio 1": _CREEPING,
     "pyramidal cones": {"arena.friction_cone": "pyramidal"},
     "edges in 1 ms": {"body.formulation.edge_time_constant_s": 0.001},
     "constant curvature": {"body.formulation.curvature": "constant"},
@@ -161,16 +162,23 @@ def level_of(config: RunConfig) -> str | None:
 def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
     match line:
         case "levels":
-            configs = [load_config(RODS, level.changes) for level in LEVELS.values()]
-            meshes = [(_worm_body(one).mesh.elements_per_side, 1e3 * one.clock.physics_timestep_s) for one in configs]
-            return [timed(CHAIN, 3, CHAIN_S, line), *(judged(*mesh, line) for mesh in meshes)]
+            found = [timed(CHAIN, 3, CHAIN_S, line)]
+            for level in LEVELS.values():
+                config = load_config(RODS, level.changes)
+                settings = (
+                    {"what": "impedance ratio 1", **_CREEPING} if _CREEPING.items() <= level.changes.items() else {}
+                )
+                step_ms = 1e3 * config.clock.physics_timestep_s
+                found.append(judged(_worm_body(config).mesh.elements_per_side, step_ms, line, **settings))
+            return found
         case "steps":
             return [judged(elements, step, line) for elements in (2, 3) for step in _STEPS_MS[effort]]
         case "elements":
             steps = _ELEMENT_STEPS_MS[effort]
             return [judged(elements, step, line) for step in steps for elements in _ELEMENTS[effort]]
         case "settings":
-            others = [judged(2, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
+            others = [judged(2, step, line, "impedance ratio 1", **_CREEPING) for step in (40, 60)]
+            others += [judged(2, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
             return [*others, judged(3, 2, line, **_CHAIN)] if effort == "full" else others[-1:]
         case "segments":
             return [timed(RODS, n, SEGMENTS_S, line) for n in _SEGMENTS[effort]]

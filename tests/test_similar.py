@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from annelid.analysis import lengthening_score, rhythm_score, summary
 from annelid.body import mesh_of
-from annelid.body.elimination import MOST_ORDERED_BODIES
+from annelid.body.assemble import MOST_ORDERED_BODIES
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError

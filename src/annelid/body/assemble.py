@@ -25,6 +25,8 @@ from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh
 
+MOST_ORDERED_BODIES = 8192
+"""Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
 _SHORT = "lengthen body.mesh.rear_overhang_m and body.mesh.radius_m, or lessen body.mesh.elements_per_side"
 _REMEDIES = {
     "mass and inertia of moving bodies": "a part is too light, so raise body.strands.linear_density_kg_per_m, "
@@ -104,6 +106,13 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         raise ConfigError(f"the engine refuses this body: {remedy}") from None
     stiffen(model)
     order_elimination(model)
+    moving = np.unique(model.dof_bodyid).size
+    if model.nflex and moving > MOST_ORDERED_BODIES:
+        warnings.warn(
+            f"the worm has {moving} moving bodies: above {MOST_ORDERED_BODIES} the engine takes fifty times as long "
+            "a step; fewer body.mesh.n_segments or body.mesh.elements_per_side help",
+            stacklevel=2,
+        )
     return model
 
 

@@ -18,8 +18,6 @@ import numpy as np
 
 from annelid.morphology import Array, Indices
 
-MOST_ORDERED_BODIES = 8192
-"""Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
 SHORT_TUBE = 850
 """Vertices below which the engine's own order does as well: 6 segments of three elements a side."""
 LARGEST_PART = 200

@@ -24,7 +24,6 @@ import numpy as np
 from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, add_row, shares_name, twist_name
-from annelid.body.elimination import MOST_ORDERED_BODIES
 from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
@@ -40,8 +39,6 @@ EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
 HIDDEN_GROUP = 4
 STRAIGHT_RAD = 1e-4
 """Vertices less bent than this at rest count as straight; there the engine damps bending in every direction."""
-SCENE_BODIES = 32
-"""At most so many of the moving bodies are no part of the net."""
 TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
 
@@ -102,53 +99,35 @@ def _add_vertices(
     arena: ArenaKind,
     density_kg_per_m: Array,
 ) -> list[list[str]]:
-    """Adds a body for every vertex; returns their names by strand."""
+    """Adds a body for every vertex, crossings first (which the solver is fastest with); returns each strand's names."""
     n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
     masses = lumped_masses(geometry.vertices_m[0], density_kg_per_m).tolist()
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
     contact = skin_options(arena, geometry, body.relative_frictions, x)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
     shared = formulation.pins == "shared"
-
-    def add_crossings(crossings: range) -> None:
-        for crossing in crossings:
-            name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
-            place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
-            pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
-            pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if shared else 0.0))
-            mark_crossing(pin, name, body.pins.radius_m, 0.0, ORIGIN)
-            if shared:
-                add_touch(pin, body.strands.radius_m, contact[vertex])
-                for strand in strands:
-                    names[strand][vertex] = name
-                continue
+    for crossing in range(geometry.n_crossings):
+        name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
+        place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
+        pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
+        pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if shared else 0.0))
+        mark_crossing(pin, name, body.pins.radius_m, 0.0, ORIGIN)
+        if shared:
+            add_touch(pin, body.strands.radius_m, contact[vertex])
             for strand in strands:
-                point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
+                names[strand][vertex] = name
+            continue
+        for strand in strands:
+            point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
+            add_touch(point, body.strands.radius_m, contact[vertex])
+            _tie(spec, pin, point, formulation)
+
+    between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
+    for strand in range(geometry.n_strands):
+        with _built_apart(spec, vertex_name(strand, "")) as part:
+            for vertex in between:
+                point = add_vertex(part, str(vertex), geometry.vertices_m[strand, vertex], masses[vertex])
                 add_touch(point, body.strands.radius_m, contact[vertex])
-                _tie(spec, pin, point, formulation)
-
-    def add_between(vertices: list[int]) -> None:
-        for strand in range(geometry.n_strands):
-            with _built_apart(spec, vertex_name(strand, "")) as part:
-                for vertex in vertices:
-                    point = add_vertex(part, str(vertex), geometry.vertices_m[strand, vertex], masses[vertex])
-                    add_touch(point, body.strands.radius_m, contact[vertex])
-
-    between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex)
-    per_crossing = 1 if shared else 3
-    n_bodies = per_crossing * geometry.n_crossings + geometry.n_strands * (len(between) + len(masses) - 1)
-    # Below the limit the solver is fastest with crossings first. A scene may have some bodies of its own.
-    if n_bodies + SCENE_BODIES < MOST_ORDERED_BODIES:
-        add_crossings(range(geometry.n_crossings))
-        add_between(between.tolist())
-        return names
-    # The engine then eliminates bodies in the order in which they stand. From one end to the other, fill grows with the
-    # length alone.
-    stretches = np.split(between, np.searchsorted(between, geometry.crossing_vertex))
-    add_between(stretches[0].tolist())
-    for plane, stretch in enumerate(stretches[1:]):
-        add_crossings(range(plane * geometry.n_per_plane, (plane + 1) * geometry.n_per_plane))
-        add_between(stretch.tolist())
     return names
 
 

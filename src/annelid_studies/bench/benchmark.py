@@ -174,7 +174,7 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
         "physics_step_ms": round(1e3 * config.clock.physics_timestep_s, 9),
         "duration_s": config.duration_s,
         "command": case.case.command,
-        **measured,
+        **{name: value for name, value in measured.items() if name != "perturbed"},
     }
     if case.kind != "speed" and "failed" not in measured:
         entry["errors"] = {

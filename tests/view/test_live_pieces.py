@@ -205,7 +205,7 @@ def test_a_turned_knob_changes_the_model_and_a_bad_value_changes_nothing() -> No
 def test_a_poke_pushes_and_ends() -> None:
     worm, left_alone = (LivingWorm(load_config("riddle2023-rods")) for _ in range(2))
     place = worm.plant.geometry.crossings_m[20]
-    worm.poke(place, np.array([0.0, 4.0, 0.0]))
+    worm.poke(place, np.array([0.0, 3.0, 0.0]))
     for each in (worm, left_alone):
         each.advance(0.1, math.inf)
     shift = worm.simulation.sensation.center_of_mass_m - left_alone.simulation.sensation.center_of_mass_m

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from annelid.live.show import Show
 
 PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
-STRONGEST_POKE = 3.0  # in weights of the worm; more would tear the thinnest
+STRONGEST_POKE = 1.5  # in weights of the worm; more would tear it
 PLOT_HEIGHT = 190  # of the plots, pixels
 MOST_SEGMENTS = 4  # with more than these the expansion neurons are left out of the first plot
 MOST_NEURONS = 24  # with more than these the diagram is folded at first

@@ -160,10 +160,11 @@ def test_a_motion_is_damped_alike_whichever_way_the_worm_lies(plant: WormPlant) 
 
 @pytest.mark.slow
 def test_a_worm_walks_alike_along_x_along_y_and_between_them(tmp_path: Path) -> None:
-    """Over two cycles: mean elongation within 0.5 %, travel within 5 %."""
+    """Over two cycles, at steps that resolve travel: mean elongation within 0.5 %, travel within 5 %."""
     elongation, travel = [], []
     for heading in HEADINGS:
-        config = load_config("riddle2023-rods", ALIKE | {"body.heading_deg": heading, "duration_s": 8.0})
+        changes = ALIKE | {"body.heading_deg": heading, "duration_s": 8.0}
+        config = load_config("riddle2023-rods", changes, fidelity="accurate")
         run = simulate(config, tmp_path / f"{heading:g}", progress=False)
         numbers, marks = summary(run), cycle_marks(run)
         assert numbers.wave

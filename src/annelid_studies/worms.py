@@ -19,6 +19,16 @@ PAPERS_RODS: dict[str, Any] = {"body.mesh.elements_per_side": 3, "body.formulati
 PAPERS_MESH: dict[str, Any] = {**PAPERS_RODS, "body.formulation.solver_tolerance": 1e-6}
 """How the rods are compared with the chain; their preset solves less sharply."""
 
+TIGHT_CHAIN: dict[str, Any] = {
+    "kind": "chain",
+    "pins": "direct",
+    "pin_time_constant_s": 0.004,
+    "pin_impedance": [0.99, 0.999, 0.001],
+    "joint": "hinges",
+    "integrator": "Euler",
+}
+"""The paper's formulation with crossings that hardly part, to lay beside the rods."""
+
 RODS_STEP_S = 0.01
 """Step of the rods with rigid crossings in the examinations, s."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import mujoco
@@ -15,17 +16,10 @@ from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh
+from annelid_studies.worms import TIGHT_CHAIN
 
 RODS = {"kind": "rods"}
 RODS_AS_CHAIN = RODS | {"curvature": "constant"}
-TIGHT_CHAIN = {
-    "kind": "chain",
-    "pins": "direct",
-    "pin_time_constant_s": 0.004,
-    "pin_impedance": [0.99, 0.999, 0.001],
-    "joint": "hinges",
-    "integrator": "Euler",
-}
 SOFT_CHAIN = {"kind": "chain"}
 
 
@@ -138,6 +132,10 @@ def test_a_worm_of_linear_curvature_is_written_with_what_mjcf_has() -> None:
         written = mjcf_text(linear)
     constant = worm(RODS_AS_CHAIN)
     assert written == mjcf_text(constant)
+    # With one element a side both laws are the same, and nothing is lost.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mjcf_text(worm(RODS, **{"body.mesh.elements_per_side": 1}))
     models = [compile_spec(build_spec(one)) for one in (linear, constant)]
     records = [model.flex_bending.reshape(12, -1)[:, 1:].reshape(12, -1, 10) for model in models]
     # Bending and twist.

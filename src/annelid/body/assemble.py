@@ -137,10 +137,9 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
             "the same in both directions: leave it out or run the worm with annelid"
         )
+    lacks = ""
     if isinstance(config.body, WormBody):
-        formulation, lacks = config.body.formulation.for_mjcf()
-        if lacks:
-            warnings.warn(lacks, stacklevel=2)
+        formulation, lacks = config.body.formulation.for_mjcf(config.body)
         config = config.model_copy(update={"body": config.body.model_copy(update={"formulation": formulation})})
     spec = build_spec(config)
     assert isinstance(config.body, WormBody)
@@ -163,4 +162,6 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
     for keyframe in (*rest, *keyframes):
         spec.add_key(**{name: value for name, value in keyframe.items() if np.size(value)})
     compile_spec(spec)
+    if lacks:
+        warnings.warn(lacks, stacklevel=2)
     return spec.to_xml()

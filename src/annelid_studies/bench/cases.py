@@ -11,7 +11,7 @@ from annelid.body import WormBody
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case
-from annelid_studies.worms import CHAIN, RODS, Effort, drawn_frictions
+from annelid_studies.worms import CHAIN, RODS, TIGHT_CHAIN, Effort, drawn_frictions
 
 LINES = {
     "levels": "the levels of --fidelity, and the paper's own worm beside them",
@@ -45,17 +45,7 @@ _SETTINGS = {
     "edges in 1 ms": {"body.formulation.edge_time_constant_s": 0.001},
     "constant curvature": {"body.formulation.curvature": "constant"},
 }
-# The paper's formulation of the same worm: crossings that hardly part, and steps at which it is stable.
-_CHAIN: dict[str, Any] = {
-    "body.formulation": {
-        "kind": "chain",
-        "pins": "direct",
-        "pin_time_constant_s": 0.004,
-        "pin_impedance": [0.99, 0.999, 0.001],
-        "joint": "hinges",
-        "integrator": "Euler",
-    }
-}
+_CHAIN: dict[str, Any] = {"body.formulation": TIGHT_CHAIN}
 # 31 segments of three elements a side are beyond the limit of the engine (docs/upstream/sparse_ordering.md).
 _SEGMENTS = {"full": (3, 6, 12, 24, 30), "quick": (3, 6, 12)}
 # Twelve segments of chain take seconds to compile and most of a second a step; both grow about with the cube of N.

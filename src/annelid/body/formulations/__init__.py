@@ -64,8 +64,8 @@ class FormulationKind(Kind):
     def step_cost_ms(self) -> float:
         """About how long a step of three segments with three elements a side takes, ms."""
 
-    def for_mjcf(self) -> tuple[Self, str]:
-        """Returns the section that an MJCF file can hold, with a sentence on what the file lacks, or ""."""
+    def for_mjcf(self, body: WormBody) -> tuple[Self, str]:
+        """Returns the section of a body that an MJCF file can hold, with a sentence on what the file lacks, or ""."""
         return self, ""
 
     @property

@@ -68,9 +68,9 @@ class Rods(FormulationKind):
         """Whether the strands of a crossing share its vertex."""
         return self.pins == "shared"
 
-    def for_mjcf(self) -> tuple[Self, str]:
+    def for_mjcf(self, body: WormBody) -> tuple[Self, str]:
         """Returns the section with one stiffness for a rod, as `FormulationKind.for_mjcf`."""
-        if self.curvature == "constant":
+        if self.curvature == "constant" or body.mesh.elements_per_side == 1:
             return self, ""
         return self.model_copy(update={"curvature": "constant"}), (
             "a rod in MJCF is equally stiff at every vertex, so the worm is written with body.formulation.curvature = "

@@ -117,7 +117,7 @@ def worm(**changes: Any) -> WormPlant:
 
 
 LAWS: dict[str, dict[str, Any]] = {
-    "each joint's own, in plane": {"body.strands.damping_time_s": None},
+    "each joint's own, in plane": {"body.strands.damping_time_s": None, "body.formulation.integrator": "Euler"},
     "the material's": {"body.strands.damping_time_s": 0.145},
     "the material's, pins apart": {"body.strands.damping_time_s": 0.145, "body.formulation.pins": "separate"},
 }

@@ -11,7 +11,7 @@ frequencies come from the equations of a continuous, inextensible rod, solved by
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import pi, sqrt
 from typing import Literal, cast
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eig
 
 from annelid.body.damping import HELD, MaterialDamping, add_damper_rows
+from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
@@ -30,8 +31,10 @@ from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masse
 from annelid.body.worm import Strands
 from annelid.morphology import Array
 from annelid.simulation import worm as _engine_warnings_go_to_the_log  # noqa: F401
+from annelid.simulation.two_step import TwoStep
 
 Motion = Literal["in plane", "across", "twist"]
+Formulation = Literal["rods", "rods by BDF2", "chain"]
 
 RADIUS_M, RATE_RAD_PER_M = 0.16, 14.0
 """The worm's helix."""
@@ -39,7 +42,9 @@ LENGTH_M: dict[Motion, float] = {"in plane": 0.3, "across": 0.3, "twist": 0.06}
 """Twist rings in a shorter rod, where eight elements resolve the bending of its free end that comes with it."""
 DAMPING_RATIO = 0.05
 CONVERGED_STEP = 0.001
-"""Angular frequency times step; an implicit step adds half of it to the damping ratio."""
+"""Angular frequency times step; an implicit step of first order adds half of it to the damping ratio."""
+LONG_STEP = 0.1
+"""Likewise, where a step of first order doubles the damping; one of second order adds a quarter of its cube."""
 DISPLACEMENT = 1e-4
 """Of the rod's length, or rad: small enough for linear theory."""
 CLAMP_KG = 1e6
@@ -158,6 +163,10 @@ def rod(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.Mj
     return spec
 
 
+def rod_by_bdf2(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.MjSpec:
+    return rod(case, elements, strands, BDF2_SHARE * step_s)
+
+
 def chain(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.option.timestep = step_s
@@ -167,7 +176,11 @@ def chain(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.
     return spec
 
 
-BUILDERS: dict[str, Callable[[Case, int, Strands, float], mujoco.MjSpec]] = {"rods": rod, "chain": chain}
+BUILDERS: dict[str, Callable[[Case, int, Strands, float], mujoco.MjSpec]] = {
+    "rods": rod,
+    "rods by BDF2": rod_by_bdf2,
+    "chain": chain,
+}
 
 
 class Cantilever:
@@ -180,6 +193,8 @@ class Cantilever:
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.damping = MaterialDamping(self.model, strands) if self.model.nflex else None
+        two_step = formulation == "rods by BDF2"
+        self.two_step = TwoStep(self.model, self.data.qpos, self.data.qvel, self.data.act) if two_step else None
         held = [self.model.joint(joint).name == HELD for joint in self.model.dof_jntid]
         self.free = (self.model.dof_M0 < CLAMP_KG) & ~np.array(held)
 
@@ -192,8 +207,12 @@ class Cantilever:
         ):
             target[:] = rest
             target[self.free] += part
+        if self.two_step is not None:
+            self.two_step.rest()
 
     def step(self) -> Array:
+        if self.two_step is not None:
+            self.two_step.begin()
         if self.damping is not None:
             self.damping.renew(self.data.qpos)
         mujoco.mj_step(self.model, self.data)
@@ -218,14 +237,14 @@ class Cantilever:
 class Ring:
     """A cantilever of one formulation in one mode."""
 
-    formulation: Literal["rods", "chain"]
+    formulation: Formulation
     case: Case
     elements: int
 
     @property
     def frequency(self) -> float:
         """Undamped angular frequency, rad/s: the chain's elements end in hemispheres, which turn more easily."""
-        if self.formulation == "rods" or self.case.motion != "twist":
+        if self.formulation != "chain" or self.case.motion != "twist":
             return self.case.frequency()
         length, radius = self.case.length_m / (self.elements + 0.5), STRANDS.radius_m
         return self.case.frequency() * sqrt((length + 4 / 3 * radius) / (length + 16 / 15 * radius))
@@ -238,7 +257,7 @@ class Ring:
 
         ``y[k + 2] = a y[k + 1] + b y[k]`` is fitted to the displacement along the shape that the rod starts in.
         """
-        start, rod = mode_shape(self), self.cantilever(step_s)
+        start, rod = mode_shape(replace(self, formulation=self.formulation.removesuffix(" by BDF2"))), self.cantilever(step_s)
         rod.put(start)
         damped = sqrt(1 - DAMPING_RATIO**2)
         period_s = 2 * pi / (self.frequency * damped)
@@ -295,12 +314,12 @@ CASES = [Case(shape, motion) for shape in ("straight", "helix") for motion in LE
     ("formulation", "case"),
     [
         pytest.param(formulation, case, id=f"{formulation} {case}", marks=slow)
-        for formulation in BUILDERS
+        for formulation in ("rods", "chain")
         for case in CASES
         for slow in [[] if (formulation, case.shape, case.motion) in FAST else [pytest.mark.slow]]
     ],
 )
-def test_a_cantilever_rings_down_as_rod_theory_says(formulation: Literal["rods", "chain"], case: Case) -> None:
+def test_a_cantilever_rings_down_as_rod_theory_says(formulation: Formulation, case: Case) -> None:
     ring = Ring(formulation, case, 8)
     errors = ring.down(CONVERGED_STEP / ring.frequency)
     assert errors is not None
@@ -309,10 +328,25 @@ def test_a_cantilever_rings_down_as_rod_theory_says(formulation: Literal["rods",
     assert abs(errors[1]) < 0.05
 
 
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_by_bdf2_a_cantilever_does_so_at_steps_that_double_its_damping_otherwise(case: Case) -> None:
+    """In a curved rod a part of first order is left: the engine's step lacks how bending and twist act on another."""
+    errors, first_order = (
+        Ring(formulation, case, 8).down(LONG_STEP / case.frequency()) for formulation in ("rods by BDF2", "rods")
+    )
+    assert errors is not None
+    assert first_order is not None
+    print(f"{case}: frequency {errors[0]:+.2%}, decrement {errors[1]:+.2%}; by Euler {first_order[1]:+.2%}")
+    assert abs(errors[0]) < 0.02
+    curved = case.shape == "helix" and case.motion != "twist"
+    assert abs(errors[1]) < (0.3 * first_order[1] if curved else 0.05)
+    assert first_order[1] > 0.8
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=str)
 @pytest.mark.parametrize("formulation", BUILDERS)
-def test_errors_fall_with_the_mesh_and_with_the_step(formulation: Literal["rods", "chain"], case: Case) -> None:
+def test_errors_fall_with_the_mesh_and_with_the_step(formulation: Formulation, case: Case) -> None:
     """Prints the errors of frequency and decrement; a dash where the motion is overdamped or unstable."""
     # The shortest is converged for every mesh.
     steps_s = [CONVERGED_STEP / case.frequency(), *STEPS_S]

@@ -28,7 +28,11 @@ def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
     return load_config(preset, {name.replace("__", "."): value for name, value in changes.items()}, arena=arena)
 
 
-QUICK: dict[str, Any] = {"body__strands__damping_time_s": None, "body__strands__joint_damping_Nms_per_rad": 0.02}
+QUICK: dict[str, Any] = {
+    "body__strands__damping_time_s": None,
+    "body__strands__joint_damping_Nms_per_rad": 0.02,
+    "body__formulation__integrator": "Euler",
+}
 """Damped little, so that a worm soon comes to rest."""
 
 

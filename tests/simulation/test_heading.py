@@ -152,7 +152,11 @@ def test_what_lies_along_x_refuses_a_heading(arena: str, where: str) -> None:
 
 
 def test_dampers_that_are_fixed_in_the_world_refuse_a_heading() -> None:
-    world = {"body.strands.damping_time_s": None, "body.formulation.lateral_damping_Nms_per_rad": 0.01}
+    world = {
+        "body.strands.damping_time_s": None,
+        "body.formulation.integrator": "Euler",
+        "body.formulation.lateral_damping_Nms_per_rad": 0.01,
+    }
     changes = world | {"body.heading_deg": 30.0}
     with pytest.raises(
         ConfigError, match=r"body\.heading_deg = 30: must be 0 with .*give body\.strands\.damping_time_s"

@@ -189,6 +189,20 @@ def add_row(
     spec.add_equality(**{"name": name, "type": kind, "objtype": of, "data": [0.0] * 12, **names, **options})
 
 
+class RodVertices:
+    """Where the vertices of a compiled net of rods are, each on three slides along the world's axes."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        """Finds the slides of rods that have as many edges each."""
+        bodies = model.flex_vertbodyid.reshape(model.nflex, -1)
+        self._slide = (model.jnt_qposadr[model.body_jntadr[bodies]] + np.arange(3)[:, None, None]).astype(np.intp)
+        self._place = model.body_pos[bodies].transpose(2, 0, 1).copy()
+
+    def at(self, qpos: Array) -> Array:
+        """Returns the vertices of a posture, ``(..., nq)``: positions, m, ``(..., 3, n_rods, n_vertices)``."""
+        return self._place + qpos.take(self._slide, axis=-1)
+
+
 class MaterialDamping:
     """Renews the rows of one worm, compiled with `add_damper_rows`, for its posture before every step.
 
@@ -215,14 +229,11 @@ class MaterialDamping:
         dofs = model.jnt_dofadr[model.wrap_objid[first:last]].reshape(shape)[..., :_PER_ROW]
         # numpy would convert other integers at every step.
         self._dof = dofs.astype(np.intp)
-        bodies = model.flex_vertbodyid.reshape(n_strands, n_edges + 1)
-        # A vertex sits on three slides along the world's axes.
-        self._slide = model.jnt_qposadr[model.body_jntadr[bodies]] + np.arange(3)[:, None, None]
-        self._place = model.body_pos[bodies].transpose(2, 0, 1).copy()
+        self._vertices = RodVertices(model)
 
     def renew(self, qpos: Array) -> None:
         """Sets the rows for a posture, ``(nq,)``."""
-        self._row[:] = damper_rows(self._place + qpos[self._slide]).transpose(1, 2, 0)
+        self._row[:] = damper_rows(self._vertices.at(qpos)).transpose(1, 2, 0)
 
     def loss_W(self, qvel: Array) -> float:
         """Power that the rows take at velocities, ``(nv,)``, W."""

@@ -18,6 +18,7 @@ from annelid.arena.geoms import touching
 from annelid.arena.surface import Surface, surface_of
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
+from annelid.body.damping import RodVertices
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, heading_turn, norm
@@ -129,8 +130,10 @@ class Anatomy:
         self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
         self.pins_can_part = self._pin_gap is not None
         self.elasticity = Elasticity(model, body)
-        self.energy_meter = EnergyMeter(model, body.rings)
-        edges = ("flexedge_length",) if self.has_edges else ()
+        self.energy_meter = EnergyMeter(model, body.rings, body.formulation.engine_share)
+        # The engine has edge lengths of where its step starts, which under BDF2 is no posture of the worm.
+        self._vertices = RodVertices(model) if self.has_edges and body.formulation.engine_share < 1.0 else None
+        edges = ("flexedge_length" if self._vertices is None else "qpos",) if self.has_edges else ()
         self.outputs: tuple[str, ...] = ("sensordata", *edges, *pin_outputs)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
@@ -168,6 +171,15 @@ class Anatomy:
             self.objects.places(data),
         )
 
+    def _edge_lengths_m(self, engine: Mapping[str, Array]) -> Array:
+        """Lengths of all edges, m, ``(n_edges,)``."""
+        if self._vertices is None:
+            return engine["flexedge_length"]
+        edge = np.diff(self._vertices.at(engine["qpos"]), axis=-1)
+        squares = edge * edge
+        lengths = np.sqrt(squares[..., 0, :, :] + squares[..., 1, :, :] + squares[..., 2, :, :])
+        return lengths.reshape(*lengths.shape[:-2], -1)
+
     def posture(self, crossing: Array, center_of_mass: Array, skin: Array, objects: Array) -> Posture:
         """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
         ends = crossing.take(self.geometry.springs, axis=-2)
@@ -191,7 +203,7 @@ class Anatomy:
         contact = self._segment_rows @ by_geom
         strain = gap = np.zeros(contact.shape[:-2])
         if self.has_edges:
-            strain = np.abs(engine["flexedge_length"] * self._edges_per_m - 1.0).max(axis=-1)
+            strain = np.abs(self._edge_lengths_m(engine) * self._edges_per_m - 1.0).max(axis=-1)
         if self._pin_gap is not None:
             gap = self._pin_gap(engine)
         return Forces(contact, strain, gap, self.objects.met(engine)), by_geom.copy()

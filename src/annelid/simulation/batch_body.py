@@ -85,11 +85,13 @@ class BodyBatch:
             for row in map(int, failure.ids):
                 reasons[row] = engine_stopped(float(self.bound["time"][row]), self.batch.error(row))
         for row in drives.keys() - reasons:
+            self.bound["time"][row] += self.worms[row].beyond_s
             self.worms[row].add_step(drives[row])
         return reasons
 
     def _prepare(self, worm: Worm, row: int) -> None:
-        """Gives one body's dampers their coefficients, and lays the planes under its skin."""
+        """Begins one body's step, gives its dampers their coefficients, and lays the planes under its skin."""
+        worm.begin_step()
         if worm.damping is not None:
             worm.damping.renew(worm.qpos)
         if worm.ground is not None:
@@ -122,6 +124,7 @@ class BatchWorm(Worm):
         self._bodies, self._row = bodies, row
         self.engine = {name: values[row] for name, values in bodies.bound.items()}
         self.qpos, self.plastic, self.act = (self.engine[name] for name in ("qpos", "plastic", "act"))
+        self.two_step = self._two_step()
         self.warned = bodies.batch.warning[row, :, _TIMES_GIVEN]
 
     def move(self, activation: Array, n_steps: int) -> Movement:

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.actuators import ActuatorKind
-from annelid.body.damping import rod_shares, twist_name
+from annelid.body.damping import RodVertices, rod_shares, twist_name
 from annelid.body.worm import WormBody
 from annelid.morphology import Array, cross
 
@@ -77,8 +77,10 @@ class EnergyMeter:
         "moment_rowadr",
     )
 
-    def __init__(self, model: mujoco.MjModel, rings: ActuatorKind) -> None:
-        self._timestep_s = float(model.opt.timestep)
+    def __init__(self, model: mujoco.MjModel, rings: ActuatorKind, engine_share: float = 1.0) -> None:
+        """Takes a compiled worm, and the length of the engine's step over that of a whole step."""
+        self._engine_s = float(model.opt.timestep)
+        self._timestep_s = self._engine_s / engine_share
         # Other integrators take the actuators' forces as they are at the start of a step.
         implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
         self.slopes = rings.slopes(model) if implicit else None
@@ -98,7 +100,7 @@ class EnergyMeter:
         tension = -engine["actuator_force"]
         if self.slopes is not None:
             per_length, per_rate = self.slopes(engine["actuator_length"], earlier, drive, tension)
-            tension = tension + per_length * (h * rate) + per_rate * (rate - earlier)
+            tension = tension + per_length * (self._engine_s * rate) + per_rate * (rate - earlier)
         work = -h * tension * rate
         damped, constrained = (-h * (engine[force] @ velocity) for force in ("qfrc_damper", "qfrc_constraint"))
         taken = np.zeros_like(work) if self.motor_power is None else h * self.motor_power(tension, -rate)
@@ -148,10 +150,7 @@ class _Rods:
     def __init__(self, model: mujoco.MjModel, body: WormBody) -> None:
         n_edges = int(model.flex_edgenum[0])
         self._shape = (model.nflex, n_edges)
-        vertices = model.flex_vertbodyid.reshape(model.nflex, n_edges + 1)
-        # A vertex sits on three slides along the world's axes.
-        self._slide = model.jnt_qposadr[model.body_jntadr[vertices]] + np.arange(3)[:, None, None]
-        self._place = model.body_pos[vertices].transpose(2, 0, 1).copy()
+        self._vertices = RodVertices(model)
         names = [[twist_name(f"strand_{s}", e, n_edges) for e in range(n_edges)] for s in range(model.nflex)]
         self._hinge = np.array([[model.joint(name).qposadr[0] for name in of_strand] for of_strand in names])
         lengths = model.flexedge_length0.reshape(self._shape)
@@ -164,7 +163,7 @@ class _Rods:
         self._seen_at_rest = _seen(*_neighbours(tangent, direction), np.zeros(self._shape))
 
     def energy_J(self, qpos: Array, plastic: Array) -> float:
-        edge = np.diff(self._place + qpos[self._slide], axis=-1)
+        edge = np.diff(self._vertices.at(qpos), axis=-1)
         tangent = edge / np.sqrt(_dot(edge, edge))
         old_tangent, old_direction, turns = self._frames(plastic) if plastic.any() else self._frames_at_rest
         # Transport in time: what is across the old tangent turns with the least turn from the old to the new.

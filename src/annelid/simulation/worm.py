@@ -27,6 +27,7 @@ from annelid.simulation.energies import EnergyTotals, Engine
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.objects import NOTHING
 from annelid.simulation.skin import Touch
+from annelid.simulation.two_step import TwoStep
 from annelid.simulation.watch import Energies, Watch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -149,6 +150,7 @@ class Worm(ABC):
     engine: Engine  # the engine's arrays that a step is read from
     warned: NDArray[np.int32]  # how often the engine has given each of its warnings
     posture: Posture  # where the body is
+    two_step: TwoStep | None  # how a step of second order starts; None for those of first order
     touch: Touch  # what the skin senses of the ground, and how far it has slid
     energies: EnergyTotals  # what the muscles have done so far, and where it went
 
@@ -171,6 +173,8 @@ class Worm(ABC):
         # What needs no moving planes is level.
         self._floor = cast(Plane, arena.ground())
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
+        # By how much a physics step is longer than the engine's.
+        self.beyond_s = config.clock.physics_timestep_s - float(anatomy.model.opt.timestep)
         self._activation: Array = np.zeros(anatomy.n_muscles)
         self.start = laid_down(anatomy, body)
 
@@ -216,12 +220,19 @@ class Worm(ABC):
         time_s = n_steps * self._config.clock.physics_timestep_s
         return self.anatomy.rings.drive(self.model, activation, self.act, self.posture.ring_length, time_s)
 
+    def begin_step(self) -> None:
+        """Moves the state to where the engine's step starts."""
+        if self.two_step is not None:
+            self.two_step.begin()
+
     def drive(self, activation: Array) -> Array:
         """Returns what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
         return self.act.copy() if self.model.na else activation
 
     def add_step(self, drive: Array) -> None:
         """Adds the physics step that was taken to the energy totals, with what `drive` returned before it."""
+        if self.two_step is not None:
+            self.two_step.end()
         self._tension_N, entries = self.anatomy.energy_meter.step(self.engine, drive)
         if self.damping is not None:
             # The engine counts the rows among its constraints.
@@ -234,6 +245,8 @@ class Worm(ABC):
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
         n = self.n_segments
         self._reset_engine()
+        if self.two_step is not None:
+            self.two_step.rest()
         self._control_step = 0
         nothing = NOTHING._replace(force=np.zeros((len(self.anatomy.objects.names), 3)))
         self._forces = Forces(np.zeros((n, 3)), np.zeros(()), np.zeros(()), nothing)
@@ -348,6 +361,12 @@ class Worm(ABC):
         held = self.elastic_energy_J() - self._elastic_at_start_J + self.kinetic_energy_J()
         return Energies(work + max(0.0, sunk), work + sunk - held - lost)
 
+    def _two_step(self) -> TwoStep | None:
+        """Makes what the steps of second order need, of a worm whose engine is there."""
+        if self._body.formulation.engine_share == 1.0:
+            return None
+        return TwoStep(self.model, self.qpos, self.engine["qvel"], self.act)
+
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
         anatomy = self.anatomy
@@ -386,6 +405,7 @@ class Worm(ABC):
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
             **{name: np.array(total) for name, total in self.energies._asdict().items()},
             **({"object_force": forces.met.force.copy()} if self._is_scene else {}),
+            **({} if self.two_step is None else self.two_step.get_state()),
             **self.touch.state(),
             **self._watch.get_state(),
         }
@@ -393,6 +413,8 @@ class Worm(ABC):
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned; the run then continues bit for bit on the same machine."""
         self._reset_engine(np.asarray(state["engine"], dtype=float))
+        if self.two_step is not None:
+            self.two_step.set_state(state)
         self._control_step = int(state["control_step"][0])
         strain, gap = np.asarray(state["extremes"], dtype=float)
         self._tension_N = np.array(state["muscle_force"], dtype=float)
@@ -416,6 +438,7 @@ class WormPlant(Worm):
         self.qpos, self.plastic, self.act, self.warned = data.qpos, data.plastic, data.act, data.warning.number
         names = (*self.anatomy.outputs, *self.anatomy.energy_meter.outputs)
         self.engine = {name: getattr(data, name) for name in names}
+        self.two_step = self._two_step()
         if config.trial is not None:
             ring = self.geometry.rings[self.n_segments // 2]
             self._pushed_N = np.zeros((len(self.anatomy.crossing_body), 3))
@@ -432,12 +455,14 @@ class WormPlant(Worm):
             self.push(self._pushed_N if pushed else np.zeros_like(self._pushed_N))
         try:
             for _ in range(n_steps):
+                self.begin_step()
                 if self.ground is not None:
                     self.ground.lay(data)
                 if self.damping is not None:
                     self.damping.renew(self.qpos)
                 drive = self.drive(activation)
                 mujoco.mj_step(self.model, data)
+                data.time += self.beyond_s
                 self.add_step(drive)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None

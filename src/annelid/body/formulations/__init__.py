@@ -42,6 +42,9 @@ def densities_kg_per_m(geometry: MeshGeometry, strands: Strands) -> Array:
     return geometry.along(each, (x[:-1] + x[1:]) / 2)
 
 
+BDF2_SHARE = 2.0 / 3.0
+"""Length of the engine's step over that of a whole step by BDF2."""
+
 PinReader = Callable[[Mapping[str, Array]], Array]
 """Reads the largest gap at a pin, m, from the engine's arrays."""
 
@@ -58,6 +61,11 @@ class FormulationKind(Kind):
     default: ClassVar[str] = "rods"
     is_papers: ClassVar[bool] = False
     damps_material: ClassVar[bool] = False
+
+    @property
+    def engine_share(self) -> float:
+        """Length of the engine's step over the physics step of a plant: 1, or `BDF2_SHARE` (`simulation.two_step`)."""
+        return 1.0
 
     @property
     @abstractmethod

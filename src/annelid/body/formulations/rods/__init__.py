@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from annelid.body.estimates import Finding
-from annelid.body.formulations import FormulationKind, PinReader
+from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader
 from annelid.config.sections import NonNegative, Positive
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm
@@ -46,6 +46,11 @@ class Rods(FormulationKind):
         description="of a strand between two crossings: linear, as forces at the crossings bend it, or constant about "
         "every vertex, as the engine has it; the same in fine meshes",
     )
+    integrator: Literal["Euler", "BDF2"] = Field(
+        default="Euler",
+        description="implicit time integration: of first order, as the engine has it, which damps motion as one to two "
+        "steps more of damping time do, or of second order, for strands with a damping time",
+    )
     pins: Literal["shared", "separate"] = Field(
         default="shared",
         description="both strands of a crossing share its vertex, or a pin mass is tied to a vertex of each",
@@ -62,6 +67,11 @@ class Rods(FormulationKind):
     def step_cost_ms(self) -> float:
         """About how long a step takes, ms."""
         return 4.5
+
+    @property
+    def engine_share(self) -> float:
+        """Length of the engine's step, as `FormulationKind.engine_share`."""
+        return BDF2_SHARE if self.integrator == "BDF2" else 1.0
 
     @property
     def has_rigid_crossings(self) -> bool:
@@ -88,6 +98,11 @@ class Rods(FormulationKind):
             raise ValueError(
                 "body.strands.damping_time_s = none: must be given for rods whose stiffness differs, since the engine "
                 "damps a rod in proportion to its stiffness"
+            )
+        if self.integrator == "BDF2" and not strands.material_damping_s:
+            raise ValueError(
+                "body.formulation.integrator = 'BDF2': must be 'Euler' where body.strands gives no damping of the "
+                "material (damping_time_s, or loss_factor with loss_frequency_Hz), without which vibrations would grow"
             )
         if lateral > 0 and strands.material_damping_s is not None:
             raise ValueError(

@@ -66,7 +66,7 @@ def test_overrides_win_over_the_level_and_the_level_over_the_file(tmp_path: Path
     file.write_text("[clock]\nphysics_timestep_s = 0.01\n[sensor]\ntolerance_m = 0.017\n", encoding="utf-8")
     assert load_config(file).clock.physics_timestep_s == 0.01
     accurate = load_config(file, fidelity="accurate")
-    assert accurate.clock.physics_timestep_s == 0.005
+    assert accurate.clock.physics_timestep_s == 0.01
     assert accurate.sensor.tolerance_m == 0.017
     own = load_config(file, {"clock.physics_timestep_s": 0.002}, fidelity="accurate")
     assert own.clock.physics_timestep_s == 0.002

@@ -129,7 +129,7 @@ def _steps(config: RunConfig, body: WormBody) -> Iterator[Finding]:
     assert arena is not None
     yield from body.formulation.findings(config)
     # At one step the engine's floor is twice as soft as asked, which has been measured; at less nothing has.
-    if arena.contact_time_constant_s < 0.5 * step:
+    if arena.contact_time_constant_s < 0.5 * step * body.formulation.engine_share:
         yield softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step)
     if not arena.slope_rad:
         return

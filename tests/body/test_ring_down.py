@@ -257,7 +257,10 @@ class Ring:
 
         ``y[k + 2] = a y[k + 1] + b y[k]`` is fitted to the displacement along the shape that the rod starts in.
         """
-        start, rod = mode_shape(replace(self, formulation=self.formulation.removesuffix(" by BDF2"))), self.cantilever(step_s)
+        start, rod = (
+            mode_shape(replace(self, formulation=self.formulation.removesuffix(" by BDF2"))),
+            self.cantilever(step_s),
+        )
         rod.put(start)
         damped = sqrt(1 - DAMPING_RATIO**2)
         period_s = 2 * pi / (self.frequency * damped)

@@ -42,16 +42,16 @@ class Fidelity:
 
 LEVELS = {
     "accurate": Fidelity(
-        "rods, three elements a rhombus side, 5 ms",
+        "rods, three elements a rhombus side, 10 ms",
         {
             "body.mesh.elements_per_side": 3,
-            "clock.physics_timestep_s": 0.005,
-            "record.signals_interval_s": 0.005,
+            "clock.physics_timestep_s": 0.01,
+            "record.signals_interval_s": 0.01,
         },
     ),
     "fast": Fidelity("rods, two elements a rhombus side, 20 ms; as riddle2023-rods has it"),
     "preview": Fidelity(
-        "rods, two elements a side, 40 ms: edges stretch by up to 3 %, and what rests on a slope creeps by 1 mm/s",
+        "rods, two elements a side, 40 ms: edges stretch by up to 2 %, and what rests on a slope creeps by 1 mm/s",
         {
             "body.formulation.friction_impedance_ratio": 1.0,
             "clock.physics_timestep_s": 0.04,

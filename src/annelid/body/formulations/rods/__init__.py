@@ -49,7 +49,7 @@ class Rods(FormulationKind):
     integrator: Literal["Euler", "BDF2"] = Field(
         default="Euler",
         description="implicit time integration: of first order, as the engine has it, which damps motion as one to two "
-        "steps more of damping time do, or of second order, for strands with a damping time",
+        "steps more of damping time do, or of second order, for strands whose material is damped",
     )
     pins: Literal["shared", "separate"] = Field(
         default="shared",
@@ -122,13 +122,14 @@ class Rods(FormulationKind):
         body, step = config.body, config.clock.physics_timestep_s
         assert isinstance(body, WormBody)
         field, time_s = "clock.physics_timestep_s", body.strands.material_damping_s or 0.0
-        if step > 0.04:
-            problem = "rods are measured up to 0.04 s, where their edges stretch by 3 %"
-            yield Finding(field, step, problem, "set at most 0.04")
-        if 0.0 < time_s < 2.0 * step:
-            problem = (
-                f"the step damps rods as one to two steps more of damping time do, and the material has {time_s:g} s"
-            )
+        most = 0.06 if self.integrator == "BDF2" else 0.04
+        if step > most:
+            problem = f"rods are measured up to {most:g} s, where their edges stretch by 3 %"
+            yield Finding(field, step, problem, f"set at most {most:g}")
+        shares = {"Euler": ("one to two steps", 2.0), "BDF2": ("up to half a step", 0.5)}
+        added, share = shares[self.integrator]
+        if 0.0 < time_s < share * step:
+            problem = f"the step damps rods as {added} more of damping time do, and the material has {time_s:g} s"
             yield Finding(field, step, problem, f"set at most {time_s / 5:.1g}")
 
     def add(

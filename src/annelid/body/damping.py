@@ -23,6 +23,7 @@ then is 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -94,16 +95,40 @@ def _coefficients(lengths_m: Array, strands: Strands) -> Array:
     return 2.0 * time_s * strands.bending_rigidity_Nm2 / (lengths_m[..., :-1] + lengths_m[..., 1:])
 
 
-def damper_rows(vertices_m: Array) -> Array:
+class Bends(NamedTuple):
+    """How a rod is bent at its inner vertices."""
+
+    across: Array  # unit vector across the bend over cos(h)^2, (3, ..., n_vertices - 2); zero where it is straight
+    sine: Array  # of the angle 2h between the edges, (..., n_vertices - 2)
+    cosine: Array  # likewise
+    per_length: Array  # one over the length of every edge, 1/m, (..., n_vertices - 1)
+
+
+def damped_edge(vertex: int) -> int:
+    """Number of the edge in whose frame an inner vertex, from 1, is damped: that behind an odd one, before an even."""
+    return vertex - 1 + vertex % 2
+
+
+def damper_rows(bent: Bends) -> Array:
     """How the sideways rate of curvature follows from the rates of three vertices and a hinge.
 
     Args:
-        vertices_m: Positions along a rod, m, ``(3, ..., n_vertices)``.
+        bent: How the rod is bent.
 
     Returns:
         Coefficients of x, y, z of the vertex in front, of the vertex, of the one behind, 1/m, and of the hinge,
         ``(10, ..., n_vertices - 2)``; zero where the rod is straight.
     """
+    b, sine, cosine, per_length = bent
+    # Vertices 1, 3, 5 are damped in the frame of the edge behind, the others in that of the edge in front.
+    in_rear = np.arange(1, sine.shape[-1] + 1) % 2 == 1
+    front = b * (per_length[..., :-1] * np.where(in_rear, 1.0, cosine))
+    rear = b * (per_length[..., 1:] * np.where(in_rear, cosine, 1.0))
+    return np.concatenate([front, -front - rear, rear, -(sine * (2.0 / (1.0 + cosine)))[None]])
+
+
+def bends(vertices_m: Array) -> Bends:
+    """Returns how a rod with vertices ``(3, ..., n_vertices)``, m, is bent."""
     edge = vertices_m[..., 1:] - vertices_m[..., :-1]
     per_length = 1.0 / np.sqrt((edge * edge).sum(axis=0))
     tangent = edge * per_length
@@ -112,11 +137,7 @@ def damper_rows(vertices_m: Array) -> Array:
     sine, cosine = np.sqrt((across * across).sum(axis=0)), (t0 * t1).sum(axis=0)
     per_cosine = 2.0 / (1.0 + cosine)
     b = across * (per_cosine * (sine > STRAIGHT) / np.maximum(sine, STRAIGHT))
-    # Vertices 1, 3, 5 are damped in the frame of the edge behind, the others in that of the edge in front.
-    in_rear = np.arange(1, sine.shape[-1] + 1) % 2 == 1
-    front = b * (per_length[..., :-1] * np.where(in_rear, 1.0, cosine))
-    rear = b * (per_length[..., 1:] * np.where(in_rear, cosine, 1.0))
-    return np.concatenate([front, -front - rear, rear, -(sine * per_cosine)[None]])
+    return Bends(b, sine, cosine, per_length)
 
 
 def add_held_coordinate(spec: mujoco.MjSpec) -> None:
@@ -155,11 +176,11 @@ def add_dampers(
     bending, ``(n_vertices - 2,)``, and the first edge of a clamped rod has no twist hinge.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
-    damping, rows = _coefficients(lengths, strands) * shares, damper_rows(vertices_m.T)
+    damping, rows = _coefficients(lengths, strands) * shares, damper_rows(bends(vertices_m.T))
     clamped_hinge = twist_name(rod, 0, len(lengths)) if clamped else ""
     for vertex in range(1, len(bodies) - 1):
         joints = [f"{body}_{axis}" for body in bodies[vertex - 1 : vertex + 2] for axis in "xyz"]
-        joints.append(twist_name(rod, vertex - 1 + vertex % 2, len(lengths)))
+        joints.append(twist_name(rod, damped_edge(vertex), len(lengths)))
         tendon = spec.add_tendon(name=damper_name(rod, vertex), damping=[damping[vertex - 1], 0.0, 0.0])
         for joint, coefficient in zip(joints, rows[:, vertex - 1].tolist(), strict=True):
             if not joint.startswith("world_") and joint != clamped_hinge:
@@ -190,12 +211,18 @@ def add_row(
 
 
 class RodVertices:
-    """Where the vertices of a compiled net of rods are, each on three slides along the world's axes."""
+    """Where the vertices of a compiled net of rods are, each on three slides along the world's axes.
+
+    Attributes:
+        dof: The engine's dofs of the vertices, ``(3, n_rods, n_vertices)``.
+    """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         """Finds the slides of rods that have as many edges each."""
         bodies = model.flex_vertbodyid.reshape(model.nflex, -1)
-        self._slide = (model.jnt_qposadr[model.body_jntadr[bodies]] + np.arange(3)[:, None, None]).astype(np.intp)
+        slide = model.body_jntadr[bodies] + np.arange(3)[:, None, None]
+        # numpy would convert other integers at every step.
+        self._slide, self.dof = model.jnt_qposadr[slide].astype(np.intp), model.jnt_dofadr[slide].astype(np.intp)
         self._place = model.body_pos[bodies].transpose(2, 0, 1).copy()
 
     def at(self, qpos: Array) -> Array:
@@ -208,6 +235,9 @@ class MaterialDamping:
 
     They live in the compiled model, which no other worm may use. The posture alone decides, so a run continues and a
     batch computes to the same bits.
+
+    Attributes:
+        bent: How the rods are bent in that posture, ``(..., n_rods, ...)``.
     """
 
     def __init__(self, model: mujoco.MjModel, strands: Strands) -> None:
@@ -233,7 +263,8 @@ class MaterialDamping:
 
     def renew(self, qpos: Array) -> None:
         """Sets the rows for a posture, ``(nq,)``."""
-        self._row[:] = damper_rows(self._vertices.at(qpos)).transpose(1, 2, 0)
+        self.bent = bends(self._vertices.at(qpos))
+        self._row[:] = damper_rows(self.bent).transpose(1, 2, 0)
 
     def loss_W(self, qvel: Array) -> float:
         """Power that the rows take at velocities, ``(nv,)``, W."""

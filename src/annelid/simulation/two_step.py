@@ -15,7 +15,10 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from annelid.body.damping import MaterialDamping
 from annelid.body.formulations import BDF2_SHARE
+from annelid.body.twist import TwistCoupling
+from annelid.body.worm import Strands
 from annelid.morphology import Array
 from annelid.protocols import State
 
@@ -27,9 +30,12 @@ class TwoStep:
     its actuators, ``(na,)``.
     """
 
-    def __init__(self, model: mujoco.MjModel, qpos: Array, qvel: Array, act: Array) -> None:
-        """Takes a worm that has rested before now."""
-        self._model = model
+    def __init__(
+        self, model: mujoco.MjModel, qpos: Array, qvel: Array, act: Array, strands: Strands, damping: MaterialDamping
+    ) -> None:
+        """Takes a worm that has rested before now, and its dampers, which are renewed before the engine's step."""
+        self._model, self._damping = model, damping
+        self._twist = TwistCoupling(model, strands)
         self._qpos, self._qvel, self._act = qpos, qvel, act
         self._change = np.zeros(model.nv)
         limited = model.actuator_actlimited.astype(bool)[model.actuator_actnum > 0]
@@ -48,10 +54,12 @@ class TwoStep:
         mujoco.mj_differentiatePos(self._model, self._change, 1.0, self._qpos_before, qpos)
         mujoco.mj_integratePos(self._model, self._qpos, self._change, 1.0 / 3.0)
         self._qvel += (qvel - self._qvel_before) / 3.0
+        self._start = self._qvel.copy()
         self._qpos_before, self._qvel_before = qpos, qvel
 
     def end(self) -> None:
-        """Lets the actuators' states, which the engine steps explicitly, change for the whole step."""
+        """Completes the engine's step: twist, and the actuators' states, which are to change for the whole step."""
+        self._twist.follow(self._qpos, self._qvel, self._start, self._damping.bent)
         if self._act.size:
             whole = self._act_before + (self._act - self._act_before) / BDF2_SHARE
             self._act[:] = whole.clip(*self._act_range)

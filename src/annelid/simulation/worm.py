@@ -363,9 +363,9 @@ class Worm(ABC):
 
     def _two_step(self) -> TwoStep | None:
         """Makes what the steps of second order need, of a worm whose engine is there."""
-        if self._body.formulation.engine_share == 1.0:
+        if self._body.formulation.engine_share == 1.0 or self.damping is None:
             return None
-        return TwoStep(self.model, self.qpos, self.engine["qvel"], self.act)
+        return TwoStep(self.model, self.qpos, self.engine["qvel"], self.act, self._body.strands, self.damping)
 
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""

@@ -126,10 +126,11 @@ class Rods(FormulationKind):
         if step > most:
             problem = f"rods are measured up to {most:g} s, where their edges stretch by 3 %"
             yield Finding(field, step, problem, f"set at most {most:g}")
-        shares = {"Euler": ("one to two steps", 2.0), "BDF2": ("up to half a step", 0.5)}
-        added, share = shares[self.integrator]
-        if 0.0 < time_s < share * step:
-            problem = f"the step damps rods as {added} more of damping time do, and the material has {time_s:g} s"
+        if 0.0 < time_s < 2.0 * step:
+            problem = {
+                "Euler": f"the step damps rods as one to two steps more of damping time do, and they have {time_s:g} s",
+                "BDF2": f"rods have failed in steps above half their material's damping time, {time_s:g} s",
+            }[self.integrator]
             yield Finding(field, step, problem, f"set at most {time_s / 5:.1g}")
 
     def add(

@@ -33,7 +33,7 @@ N_PERTURBED = 2
 CHAIN_S, SEGMENTS_S = 0.05, 2.0
 """Durations of the runs that are timed but not judged, s: fifty steps of the chain, a hundred of rods."""
 
-_STEPS_MS = {"full": (1, 2, 5, 10, 20, 40, 60), "quick": (5, 20)}
+_STEPS_MS = {"full": (1, 2, 5, 10, 20, 30, 40, 60), "quick": (5, 20)}
 _ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
 _ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
 _CREEPING = {"body.formulation.friction_impedance_ratio": 1.0}
@@ -44,6 +44,7 @@ _SETTINGS = {
     "pyramidal cones": {"arena.friction_cone": "pyramidal"},
     "edges in 1 ms": {"body.formulation.edge_time_constant_s": 0.001},
     "constant curvature": {"body.formulation.curvature": "constant"},
+    "Euler": {"body.formulation.integrator": "Euler"},
 }
 _CHAIN: dict[str, Any] = {"body.formulation": TIGHT_CHAIN}
 # 31 segments of three elements a side are beyond the limit of the engine (docs/upstream/sparse_ordering.md).
@@ -167,7 +168,7 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
             steps = _ELEMENT_STEPS_MS[effort]
             return [judged(elements, step, line) for step in steps for elements in _ELEMENTS[effort]]
         case "settings":
-            others = [judged(2, step, line, "impedance ratio 1", **_CREEPING) for step in (40, 60)]
+            others = [judged(2, step, line, "impedance ratio 1", **_CREEPING) for step in (10, 30, 40, 60, 80)]
             others += [judged(2, 20, line, what, **settings) for what, settings in _SETTINGS.items()]
             return [*others, judged(3, 2, line, **_CHAIN)] if effort == "full" else others[-1:]
         case "segments":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from annelid_studies.worms import CHAIN
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""
 
-_MARKERS = "os^DvPX*"
+_MARKERS = "osD^v<>PX*"
 _LEAST_PERCENT = 0.02
 _LABELS = {"riddle2023": "paper's chain", "riddle2023-rods": "rods"}
 _FADED = "0.35"
@@ -104,7 +105,7 @@ def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -
     elements = sorted({entry["elements_per_side"] for entry in judged})
     steps = sorted({entry["physics_step_ms"] for entry in judged})
     colors = dict(zip(elements, segment_colors(len(elements)), strict=True))
-    markers = dict(zip(steps, _MARKERS, strict=False))
+    markers = dict(zip(steps, cycle(_MARKERS), strict=False))
     *panels, legend = part.subplots(2, 3, sharex=True, squeeze=True).ravel()
     for axes, (quantity, front) in zip(panels, report["fronts"][reference].items(), strict=True):
         means = {}

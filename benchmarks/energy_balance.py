@@ -127,6 +127,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for preset in given.presets:
                 for step_ms in given.steps_ms:
                     changes = {"clock.physics_timestep_s": step_ms / 1000, "duration_s": given.seconds}
+                    # The books of one step of the engine.
+                    changes["body.formulation.integrator"] = "Euler"
                     books = balance(load_config(preset, changes), progress)
                     cells = [f"{books[name]:.3f} J" for name in list(books)[:-2]]
                     share = f"{books['integrator']:.3f} J ({100 * books['integrator'] / books['work']:.1f} %)"

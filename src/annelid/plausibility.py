@@ -129,8 +129,9 @@ def _steps(config: RunConfig, body: WormBody) -> Iterator[Finding]:
     assert arena is not None
     yield from body.formulation.findings(config)
     # At one step the engine's floor is twice as soft as asked, which has been measured; at less nothing has.
-    if arena.contact_time_constant_s < 0.5 * step * body.formulation.engine_share:
-        yield softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step)
+    engine_s = step * body.formulation.engine_share(arena)
+    if arena.contact_time_constant_s < 0.5 * engine_s:
+        yield softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step, engine_s)
     if not arena.slope_rad:
         return
     # On ground that rises ahead the skin slides towards the rear.

@@ -53,7 +53,7 @@ def test_steps_from_the_keyframe_go_on_near_the_run(
     plant = WormPlant(run.config)
     plant.set_state(read_checkpoint(run.path).plant)
     mujoco.mj_step(model, data, 5)
-    plant.move(plant.data.ctrl.copy(), 5)
+    plant.move(run.data["activation"].values[-1], 5)
     mujoco.mj_forward(model, data)
     mujoco.mj_forward(plant.model, plant.data)
     np.testing.assert_allclose(rings(model, data), rings(plant.model, plant.data), atol=within_m)

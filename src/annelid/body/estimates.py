@@ -122,11 +122,12 @@ def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Iter
         yield Finding(f"body.rings.{field}", force_N, problem, instead)
 
 
-def softened(field: str, value: float, what: str, step: float) -> Finding:
-    """Reports a time constant that the engine cannot resolve."""
+def softened(field: str, value: float, what: str, step: float, engine_s: float | None = None) -> Finding:
+    """Reports a time constant that the engine cannot resolve in steps, or in its own where these are shorter, s."""
+    least = 2.0 * (engine_s or step)
     return Finding(
         field,
         value,
-        f"the engine cannot resolve this in steps of {step:g} s and makes the {what} as soft as with {2 * step:g} s",
-        f"set {2 * step:g}, or clock.physics_timestep_s = {value / 2:.1g}",
+        f"the engine cannot resolve this in steps of {step:g} s and makes the {what} as soft as with {least:.3g} s",
+        f"set {least:.2g}, or clock.physics_timestep_s = {value * step / least:.1g}",
     )

@@ -16,7 +16,6 @@ RESOLUTION = (
     "body.mesh.elements_per_side",
     "body.formulation.curvature",
     "body.formulation.friction_impedance_ratio",
-    "body.formulation.integrator",
     "clock.physics_timestep_s",
     "record.signals_interval_s",
     "record.frames_interval_s",

@@ -35,6 +35,9 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
             set_friction(plant.model, after.arena.friction)
         else:
             plant = _taking_over(build_plant(after), plant, "body")
+            if differ("clock") and isinstance(plant, WormPlant) and plant.two_step is not None:
+                # Its state of one step ago is that of a step of another length.
+                plant.two_step.rest()
     if any(
         getattr(before, part) != getattr(after, part) for part in ("controller", "turning", "sensor", "clock", "trial")
     ):

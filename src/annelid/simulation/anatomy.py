@@ -130,9 +130,10 @@ class Anatomy:
         self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
         self.pins_can_part = self._pin_gap is not None
         self.elasticity = Elasticity(model, body)
-        self.energy_meter = EnergyMeter(model, body.rings, body.formulation.engine_share)
+        share = body.formulation.engine_share(arena)
+        self.energy_meter = EnergyMeter(model, body.rings, share)
         # The engine has edge lengths of where its step starts, which under BDF2 is no posture of the worm.
-        self._vertices = RodVertices(model) if self.has_edges and body.formulation.engine_share < 1.0 else None
+        self._vertices = RodVertices(model) if self.has_edges and share < 1.0 else None
         edges = ("flexedge_length" if self._vertices is None else "qpos",) if self.has_edges else ()
         self.outputs: tuple[str, ...] = ("sensordata", *edges, *pin_outputs)
 

@@ -4,10 +4,13 @@ With a step h, positions q and velocities v, and what the forces make of them, a
 
     (3 v' - 4 v + v_before) / 2 h = a(q', v')        (3 q' - 4 q + q_before) / 2 h = v'
 
-This is an implicit step of the engine, of length 2 h / 3, from the state ``(4 q - q_before) / 3``, ``(4 v - v_before) /
-3``. Like the engine's own it damps without limit what is too fast for the step, but of a slow oscillation it takes in
-proportion to the third power of the step, where the engine takes in proportion to the step (Hairer and Wanner 1996,
-"Solving Ordinary Differential Equations II", chapter V.1).
+For what the engine takes at the end of its step, this is its step of length 2 h / 3 from the state ``(4 q - q_before) /
+3``, ``(4 v - v_before) / 3``. Like the engine's own it damps without limit what is too fast for the step, but of a slow
+oscillation it takes in proportion to the third power of the step, where the engine takes in proportion to the step
+(Hairer and Wanner 1996, "Solving Ordinary Differential Equations II", chapter V.1).
+
+What the engine steps explicitly gains energy instead, in proportion to the step: in a worm the damping of its material
+outweighs that, and scenes whose bodies move are stepped otherwise. A command that switches acts half a step late.
 """
 
 from __future__ import annotations

@@ -131,8 +131,9 @@ def _has_damper_rows(body: WormBody) -> bool:
 class Worm(ABC):
     """What a 3D worm senses, records and is alarmed by, whoever steps it.
 
-    Lengths and positions are those at the end of the step; forces and edge strains are those that acted during
-    the last physics step, since the engine computes them before it moves the body.
+    Lengths and positions are those at the end of the step; forces are those that acted during the last physics step,
+    since the engine computes them before it moves the body. So are edge strains in steps of first order, and the gaps
+    of pins; in those of second order both are of where the engine's step starts, or strains of the end.
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.
@@ -363,7 +364,7 @@ class Worm(ABC):
 
     def _two_step(self) -> TwoStep | None:
         """Makes what the steps of second order need, of a worm whose engine is there."""
-        if self._body.formulation.engine_share == 1.0 or self.damping is None:
+        if self.beyond_s == 0.0 or self.damping is None:
             return None
         return TwoStep(self.model, self.qpos, self.engine["qvel"], self.act, self._body.strands, self.damping)
 

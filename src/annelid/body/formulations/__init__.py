@@ -62,8 +62,7 @@ class FormulationKind(Kind):
     is_papers: ClassVar[bool] = False
     damps_material: ClassVar[bool] = False
 
-    @property
-    def engine_share(self) -> float:
+    def engine_share(self, arena: ArenaKind) -> float:
         """Length of the engine's step over the physics step of a plant: 1, or `BDF2_SHARE` (`simulation.two_step`)."""
         return 1.0
 

@@ -270,14 +270,7 @@ def test_a_walking_worm_stays_within_its_pipe() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "arena",
-    [
-        *("pipe", "pipe.bend", "pipe.taper", "pipe.hourglass", "rough"),
-        pytest.param("pipe.helix", marks=pytest.mark.xfail(reason="1.2 mm: docs/arenas.md")),
-        pytest.param("steps", marks=pytest.mark.xfail(reason="2.5 mm: docs/arenas.md")),
-    ],
-)
+@pytest.mark.parametrize("arena", ["pipe", "pipe.bend", "pipe.taper", "pipe.hourglass", "pipe.helix", "rough", "steps"])
 def test_a_worm_that_walks_for_half_a_minute_stays_within_its_arena(arena: str) -> None:
     leak, _ = leak_m(arena, 30.0)
     assert leak < 0.001

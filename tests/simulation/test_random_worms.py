@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.arena.kinds.floor import Floor
+from annelid.arena.kinds.floor import Ground
 from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.kinds.relief import Rough
 from annelid.body.formulations.chain import Chain
@@ -183,7 +183,7 @@ def _depth_m(place: np.ndarray, config: RunConfig) -> np.ndarray:
     if isinstance(arena, Pipe):
         away = np.linalg.norm(place[..., 1:] - [0.0, arena.bore_m], axis=-1)
         return (away - arena.bore_m - arena.entry_clearance_m)[place[..., 0] > 0.0]
-    assert isinstance(arena, Floor)
+    assert isinstance(arena, Ground)
     lowest = -arena.floor_gap_m - (4.0 * arena.roughness_m if isinstance(arena, Rough) else 0.0)
     return lowest - place[..., 2]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -86,7 +87,8 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._pictures = Pictures(render_mode, camera, width, height)
         anatomies = compile_worms(checked_configs([task.config for task in self.tasks], None, None))
         shares = np.array_split(np.arange(num_envs), threads_for(num_envs, threads))
-        self._teams = [_Team(list(map(int, share)), self.tasks, anatomies) for share in shares]
+        turn = threading.Lock()
+        self._teams = [_Team(list(map(int, share)), self.tasks, anatomies, turn) for share in shares]
         self._episodes: list[Episode] = [episode for team in self._teams for episode in team.episodes]
         self._pool = ThreadPoolExecutor(len(self._teams)) if len(self._teams) > 1 else None
         first = self._episodes[0]
@@ -202,11 +204,14 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
 class _Team:
     """Worms that one thread steps; the engine does so without Python's lock."""
 
-    def __init__(self, numbers: Sequence[int], tasks: Sequence[Task], anatomies: Sequence[Anatomy]) -> None:
-        """Builds the bodies of the worms with these numbers."""
+    def __init__(
+        self, numbers: Sequence[int], tasks: Sequence[Task], anatomies: Sequence[Anatomy], turn: threading.Lock
+    ) -> None:
+        """Builds the bodies of the worms with these numbers; the turn is that of `BodyBatch`."""
         own = [tasks[number] for number in numbers]
         self._first = numbers[0]
-        self._bodies = BodyBatch([task.config for task in own], [anatomies[number] for number in numbers])
+        self._turn = turn
+        self._bodies = BodyBatch([task.config for task in own], [anatomies[number] for number in numbers], turn)
         self.episodes = [Episode(task, worm) for task, worm in zip(own, self._bodies.worms, strict=True)]
 
     def move(self, ramps: Mapping[int, Array]) -> None:
@@ -215,6 +220,10 @@ class _Team:
         Given are the activations of every physics step by number of the worm, ``(n_steps, n_muscles)`` each; worms of
         other teams are among them.
         """
+        with self._turn:
+            self._move(ramps)
+
+    def _move(self, ramps: Mapping[int, Array]) -> None:
         own = {row: ramps[self._first + row] for row in range(len(self.episodes)) if self._first + row in ramps}
         for k in range(len(next(iter(own.values()), ()))):
             rows = [row for row in own if not self.episodes[row].stopped]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
@@ -117,10 +118,11 @@ def simulate_batch(
     anatomies = compile_worms(own)
     runs: list[RecordedRun] = []
     teams: list[Team] = []
+    turn = threading.Lock()
     try:
         for numbers in np.array_split(np.arange(len(own)), threads_for(len(own), threads)):
             share = slice(int(numbers[0]), int(numbers[-1]) + 1)
-            teams.append(Team(own[share], anatomies[share], folders[share], runs))
+            teams.append(Team(own[share], anatomies[share], folders[share], runs, turn))
     except BaseException as error:
         for run in runs:
             run.end_with(error)
@@ -199,7 +201,7 @@ class Team(Loop):
     """Worms that one thread steps, from the start of the run to its end.
 
     The engine steps without Python's lock, so that the networks and files of one team are served while the bodies of
-    another move.
+    another move. Teams take turns at that (`BodyBatch`).
     """
 
     flush_interval_s = 2.0
@@ -211,9 +213,11 @@ class Team(Loop):
         anatomies: Sequence[Anatomy],
         folders: Sequence[Path],
         all_runs: list[RecordedRun],
+        turn: threading.Lock,
     ) -> None:
         """Lays out the worms' run files and adds each run to ``all_runs`` once its file is there."""
-        self._bodies = BodyBatch(configs, anatomies)
+        self._turn = turn
+        self._bodies = BodyBatch(configs, anatomies, turn)
         worms = self._worms = self._bodies.worms
         pairs = zip(configs, worms, strict=True)
         simulations = [start(config, worm, build_controller(config, worm), None) for config, worm in pairs]
@@ -222,6 +226,11 @@ class Team(Loop):
         for config, simulation, folder in zip(configs, simulations, folders, strict=True):
             all_runs.append(RecordedRun(config, simulation, folder / FILE_NAME))
         super().__init__(all_runs[first:])
+
+    def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
+        """Runs all worms to their end, in turn with other teams."""
+        with self._turn:
+            super().run(interruption, report)
 
     def advance(self, step: int) -> None:
         """Takes control steps up to the next one after which a body moves or something is recorded."""

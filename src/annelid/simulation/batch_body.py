@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
 
 import mujoco
@@ -35,13 +37,22 @@ class BodyBatch:
         scratch: Data of one worm, in which what is not part of a step is computed.
     """
 
-    def __init__(self, configs: Sequence[RunConfig], anatomies: Sequence[Anatomy]) -> None:
+    def __init__(
+        self, configs: Sequence[RunConfig], anatomies: Sequence[Anatomy], turn: threading.Lock | None = None
+    ) -> None:
         """Makes the bodies of worms, alike in what `annelid.simulation.batch.ALIKE` names, from their compiled bodies.
+
+        Args:
+            configs: Their configurations.
+            anatomies: Their compiled bodies.
+            turn: Held by the one thread of several that does not step the engine: numpy gives Python's lock away in
+                every operation on long arrays, and threads that pass it to and fro need twice the time.
 
         Raises:
             ConfigError: Two models' arrays differ in size.
         """
         model, n = anatomies[0].model, len(anatomies)
+        self._turn = turn
         self.batch = Batch(model, n, nthread=1)
         if owns_model(configs[0]) or any(anatomy.model is not model for anatomy in anatomies):
             try:
@@ -80,7 +91,8 @@ class BodyBatch:
         if not drives:
             return reasons
         try:
-            self.batch.step(list(drives), 1)
+            with self._others_turn():
+                self.batch.step(list(drives), 1)
         except SimulationError as failure:
             for row in map(int, failure.ids):
                 reasons[row] = engine_stopped(float(self.bound["time"][row]), self.batch.error(row))
@@ -88,6 +100,18 @@ class BodyBatch:
             self.bound["time"][row] += self.worms[row].beyond_s
             self.worms[row].add_step(drives[row])
         return reasons
+
+    @contextmanager
+    def _others_turn(self) -> Iterator[None]:
+        """Gives the turn away, if this thread has it."""
+        if self._turn is None or not self._turn.locked():
+            yield
+            return
+        self._turn.release()
+        try:
+            yield
+        finally:
+            self._turn.acquire()
 
     def _prepare(self, worm: Worm, row: int) -> None:
         """Begins one body's step, gives its dampers their coefficients, and lays the planes under its skin."""

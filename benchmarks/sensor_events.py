@@ -8,6 +8,7 @@ which the releasing and the next segment are equally long.
 
     python benchmarks/sensor_events.py
     python benchmarks/sensor_events.py --windows --csv docs/results/tolerance_windows.csv
+    python benchmarks/sensor_events.py --windows --integrator Euler --step-ms 1
 """
 
 from __future__ import annotations
@@ -58,6 +59,8 @@ WINDOWS = [
     *((1.2, friction, 0.145) for friction in (1.0, 0.3)),
     *((2.0, friction, 0.145) for friction in (1.0, 0.05)),
     *((modulus, 0.3, damping) for damping in (0.05, 0.36) for modulus in (0.3, 0.8, 2.0)),
+    *((modulus, 1.0, 0.05) for modulus in (0.3, 0.8, 2.0)),
+    *((modulus, friction, damping) for modulus in (0.3, 0.8) for friction in (1.0, 0.3) for damping in (0.08, 0.1)),
 ]
 """Young's modulus, GPa, friction, and damping time, s."""
 DURATION_S, SHOWN_S = 6.0, 3.7
@@ -98,12 +101,13 @@ def window_mm(run: Run) -> tuple[float, float]:
     return max(lifts), min(passings)
 
 
-def print_windows(path: Path | None) -> None:
+def print_windows(path: Path | None, integrator: str, step_s: float) -> None:
     rows = []
     for modulus, friction, damping in WINDOWS:
         settings = {
             "body.mesh.elements_per_side": 2,
-            "clock.physics_timestep_s": 0.01,
+            "clock.physics_timestep_s": step_s,
+            "body.formulation.integrator": integrator,
             "record.signals_interval_s": 0.01,
             "controller": TIMED,
             "duration_s": 6.6,
@@ -130,9 +134,11 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--windows", action="store_true", help="measure windows of the tolerance")
     parser.add_argument("--csv", type=Path, help="file for these")
+    parser.add_argument("--integrator", default="BDF2", choices=["BDF2", "Euler"], help="of these runs")
+    parser.add_argument("--step-ms", type=float, default=10.0, help="of these runs, ms")
     given = parser.parse_args()
     if given.windows:
-        print_windows(given.csv)
+        print_windows(given.csv, given.integrator, given.step_ms / 1e3)
         return
     for name, changes in CASES.items():
         settings = {"clock.physics_timestep_s": 0.005, "duration_s": DURATION_S, "record.signals_interval_s": 0.005}

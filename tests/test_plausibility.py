@@ -8,6 +8,7 @@ from math import asin, hypot
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -132,22 +133,9 @@ def test_what_is_doubtful_is_a_warning_with_a_number(preset: str, changes: Chang
 
 
 STRANDS = "body.strands."
-MEASURED_WINDOWS = [
-    (0.3, 1.0, 0.145, 3.4, 29.1),
-    (0.3, 0.05, 0.145, 12.5, 30.7),
-    (0.45, 0.3, 0.145, 15.1, 33.2),
-    (0.8, 1.0, 0.145, 15.7, 35.6),
-    (0.8, 0.05, 0.145, 21.6, 33.2),
-    (1.2, 0.3, 0.145, 25.9, 35.7),
-    (2.0, 1.0, 0.145, 30.7, 37.3),
-    (0.3, 0.3, 0.36, 17.1, 39.5),
-    (0.8, 0.3, 0.36, 36.1, 44.2),
-    (2.0, 0.3, 0.36, 65.6, 49.3),
-    (0.3, 0.3, 0.05, 11.1, 24.5),
-    (0.8, 0.3, 0.05, 23.5, 24.1),
-    (0.8, 1.0, 0.08, 11.7, 29.4),
-    (2.0, 1.0, 0.05, 31.7, 28.9),
-]
+MEASURED_WINDOWS = np.genfromtxt(
+    Path(__file__).parents[1] / "docs" / "results" / "tolerance_windows.csv", delimiter=",", skip_header=1
+)[:, :5].tolist()
 """Modulus, GPa, friction and damping time, s; lift by the neighbours and length in passing, mm (docs/robust.md)."""
 
 
@@ -180,7 +168,7 @@ def test_the_window_of_tolerances_follows_what_was_measured(
     modulus_GPa: float, friction: float, damping_s: float, lift_mm: float, passing_mm: float
 ) -> None:
     low_m, high_m = window_of(of_rods(modulus_GPa, friction, damping_s))
-    assert 1e3 * low_m == pytest.approx(lift_mm, abs=6.5)
+    assert 1e3 * low_m == pytest.approx(lift_mm, abs=5.0)
     assert 1e3 * high_m == pytest.approx(passing_mm, abs=4.0)
 
 

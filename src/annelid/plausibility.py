@@ -151,7 +151,7 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     Below, contracting neighbours lift a segment at rest out of its tolerance. Above, a segment that lets go is back
     within it before the next has left it: all sensors say "at rest", and nothing contracts again. The middle of both
     is the tolerance to set. Fitted to the paper's robot of rods under a timed wave, with moduli of 0.3 to 2 GPa,
-    friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 7 mm (docs/robust.md). The stiffness enters as
+    friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 5 mm (docs/robust.md). The stiffness enters as
     ``sqrt(EI / (k s^3))``, with the springs' rate k and the side s of a rhombus: stiffer strands spread a contraction.
 
     Returns:
@@ -176,8 +176,8 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
     slippery = log(1.0 / min(max(arena.friction, 0.05), 1.0))
     most = shape.longest_m - shape.along_m
     # Strands of less damping swing, which lifts neighbours as much.
-    lift = max(0.02, spread * (0.24 + 0.84 * max(damping_s, 0.145)) + 0.015 * slippery - 0.15)
-    return most * lift, most * (0.16 + 0.087 * spread + 0.48 * damping_s)
+    lift = max(0.02, spread * (0.1242 + 0.9613 * max(damping_s, 0.145)) + 0.0401 * slippery - 0.0913)
+    return most * lift, most * (0.1581 + 0.0586 * spread + 0.5945 * damping_s)
 
 
 def _tolerance(config: RunConfig, body: WormBody) -> Iterator[Finding]:

@@ -25,7 +25,6 @@ from annelid.errors import ConfigError, RunFileError, suggest
 from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, Workers, case_key, code_fingerprint
 from annelid.markdown import Table, plain_table
 from annelid.output import write_text
-from annelid.plausibility import tolerance_window_m
 from annelid.simulation import locks
 from annelid.textfiles import read_json
 from annelid_studies.tables import grouped
@@ -58,6 +57,7 @@ class Point:
     n_segments: int  # Number of segments
     young_modulus_Pa: float  # Of the strands, Pa
     seed: int  # Of the noise, and of how the network starts
+    tolerance_m: float  # Of the stretch sensors: the middle of the window, as estimated when the sample was drawn, m
 
     @property
     def design_period_s(self) -> float:
@@ -90,9 +90,7 @@ class Point:
         if controller == "timed":
             return case.but({"controller": TIMED})
         if controller == "sns-tolerance":
-            window = tolerance_window_m(case.config)
-            assert window is not None
-            return case.but({"sensor.tolerance_m": round(sum(window) / 2, 4)})
+            return case.but({"sensor.tolerance_m": self.tolerance_m})
         return case
 
 

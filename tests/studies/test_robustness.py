@@ -45,8 +45,11 @@ def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
             n_segments=3 + int(22 * segments),
             young_modulus_Pa=round(log_spread(stiffness, 0.3e9, 2.0e9), -5),
             seed=i,
+            tolerance_m=committed.tolerance_m,
         )
-        for i, (noise, friction, step, segments, stiffness) in enumerate(unit.tolist())
+        for i, ((noise, friction, step, segments, stiffness), committed) in enumerate(
+            zip(unit.tolist(), points(), strict=True)
+        )
     ]
 
 
@@ -79,10 +82,8 @@ def test_a_point_becomes_a_run_under_every_controller() -> None:
     configs = [point.case(kind).config for kind in CONTROLLERS]
     assert [config.controller.kind for config in configs] == ["sns", "sns", "sns-robust", "timed"]
     low_m, high_m = tolerance_window_m(configs[0]) or (0.0, 0.0)
-    assert [config.sensor.tolerance_m for config in configs[:2]] == [
-        0.015,
-        pytest.approx((low_m + high_m) / 2, abs=1e-4),
-    ]
+    assert [config.sensor.tolerance_m for config in configs[:2]] == [0.015, point.tolerance_m]
+    assert low_m < point.tolerance_m < high_m
     for config in configs:
         assert config.body.n_segments == 5
         assert config.sensor.noise_m == point.noise_m

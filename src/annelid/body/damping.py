@@ -23,10 +23,12 @@ then is 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from annelid.body.worm import Strands
 from annelid.morphology import Array, cross
@@ -208,6 +210,24 @@ def add_row(
     """Adds an equality constraint of one or two things of the spec, with no data unless options give some."""
     names = dict(zip(("name1", "name2"), between, strict=False))
     spec.add_equality(**{"name": name, "type": kind, "objtype": of, "data": [0.0] * 12, **names, **options})
+
+
+def twist_joints(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """Returns the twist hinges of a compiled net of rods, ``(n_rods, n_edges)``."""
+    n_edges = int(model.flex_edgenum[0])
+    names = [[twist_name(f"strand_{rod}", edge, n_edges) for edge in range(n_edges)] for rod in range(model.nflex)]
+    return np.array([[model.joint(name).id for name in of_rod] for of_rod in names], dtype=np.intp)
+
+
+def rod_stiffness(model: mujoco.MjModel, strands: Strands) -> tuple[Array, Array]:
+    """Returns ``E I / (l + l')`` and ``G J / (l + l')`` at inner vertices, N m, ``(n_rods, n_edges - 1)``."""
+    lengths = model.flexedge_length0.reshape(model.nflex, -1)
+    per_length = pi * strands.radius_m**4 / (lengths[:, :-1] + lengths[:, 1:])
+    material, (bending, twist) = strands.of_segment(0), rod_shares(model)
+    return (
+        material.one_number("young_modulus_Pa") * per_length / 4 * bending,
+        material.one_number("shear_modulus_Pa") * per_length / 2 * twist,
+    )
 
 
 class RodVertices:

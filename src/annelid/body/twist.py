@@ -22,12 +22,10 @@ where k is the curvature at rest. The engine damps twist; rows damp lateral curv
 
 from __future__ import annotations
 
-from math import pi
-
 import mujoco
 import numpy as np
 
-from annelid.body.damping import Bends, RodVertices, bends, damped_edge, rod_shares, twist_name
+from annelid.body.damping import Bends, RodVertices, bends, damped_edge, rod_stiffness, twist_joints
 from annelid.body.worm import Strands
 from annelid.morphology import Array
 
@@ -37,22 +35,16 @@ class TwistCoupling:
 
     def __init__(self, model: mujoco.MjModel, strands: Strands) -> None:
         """Takes a compiled net of rods with as many edges each, whose material is damped."""
-        n_strands, n_edges = model.nflex, int(model.flex_edgenum[0])
-        self._step_s = float(model.opt.timestep)
-        names = [[twist_name(f"strand_{s}", e, n_edges) for e in range(n_edges)] for s in range(n_strands)]
-        joints = np.array([[model.joint(name).id for name in of_strand] for of_strand in names])
+        joints, self._step_s = twist_joints(model), float(model.opt.timestep)
+        n_strands, n_edges = joints.shape
         self._hinge_qpos, self._hinge = model.jnt_qposadr[joints].ravel(), model.jnt_dofadr[joints].ravel()
-        lengths = model.flexedge_length0.reshape(n_strands, n_edges)
-        material, (bending, twist) = strands.of_segment(0), rod_shares(model)
-        per_length = pi * strands.radius_m**4 / (lengths[:, :-1] + lengths[:, 1:])
-        torsion = material.one_number("shear_modulus_Pa") * per_length * twist
-        lateral = material.one_number("young_modulus_Pa") * per_length / 4 * bending
+        lateral, torsion = rod_stiffness(model, strands)
         vertices = RodVertices(model)
         _, sine, cosine, _ = bends(vertices.at(model.qpos0))
         curvature, damping_s = 2.0 * sine / (1.0 + cosine), strands.material_damping_s
         assert damping_s
         self._dof = vertices.dof
-        self._viscous, self._all_torsion = damping_s * torsion, (damping_s + self._step_s) * torsion
+        self._viscous, self._all_torsion = damping_s * (2.0 * torsion), (damping_s + self._step_s) * (2.0 * torsion)
         self._lateral = self._step_s * lateral * curvature
         # What holds the hinges during a step, at rest: inertia, torsion, lateral bending and the lateral dampers.
         held = model.dof_M0[self._hinge].reshape(n_strands, n_edges) / self._step_s

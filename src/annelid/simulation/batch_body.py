@@ -46,7 +46,7 @@ class BodyBatch:
             configs: Their configurations.
             anatomies: Their compiled bodies.
             turn: Held by the one thread of several that does not step the engine: numpy gives Python's lock away in
-                every operation on long arrays, and threads that pass it to and fro need twice the time.
+                every operation on long arrays, and threads that pass it to and fro are slower.
 
         Raises:
             ConfigError: Two models' arrays differ in size.

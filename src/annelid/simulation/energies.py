@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.actuators import ActuatorKind
-from annelid.body.damping import RodVertices, rod_shares, twist_name
+from annelid.body.damping import RodVertices, rod_stiffness, twist_joints
 from annelid.body.worm import WormBody
 from annelid.morphology import Array, cross
 
@@ -151,13 +151,8 @@ class _Rods:
         n_edges = int(model.flex_edgenum[0])
         self._shape = (model.nflex, n_edges)
         self._vertices = RodVertices(model)
-        names = [[twist_name(f"strand_{s}", e, n_edges) for e in range(n_edges)] for s in range(model.nflex)]
-        self._hinge = np.array([[model.joint(name).qposadr[0] for name in of_strand] for of_strand in names])
-        lengths = model.flexedge_length0.reshape(self._shape)
-        per_length = pi * body.strands.radius_m**4 / (lengths[:, :-1] + lengths[:, 1:])
-        material, (bending, twist) = body.strands.of_segment(0), rod_shares(model)
-        self._bending = material.one_number("young_modulus_Pa") * per_length / 4 * bending
-        self._torsion = material.one_number("shear_modulus_Pa") * per_length / 2 * twist
+        self._hinge = model.jnt_qposadr[twist_joints(model)]
+        self._bending, self._torsion = rod_stiffness(model, body.strands)
         self._frames_at_rest = self._frames(plastic_at_rest(model))
         tangent, direction, _ = self._frames_at_rest
         self._seen_at_rest = _seen(*_neighbours(tangent, direction), np.zeros(self._shape))

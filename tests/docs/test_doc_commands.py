@@ -136,7 +136,7 @@ BENCHMARKS = sorted((one for one in NAMED if starts_with(one.words, ("python", "
 """Benchmarks that pages name, with their arguments."""
 
 BENCHMARKS_NEED = {
-    "warp_probe": find_spec("mujoco_warp"),
+    "gpu_batch": find_spec("mujoco_warp"),
     "instructions": shutil.which("valgrind"),
     "firmware": shutil.which("cc") and shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
 }

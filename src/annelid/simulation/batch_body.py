@@ -78,9 +78,10 @@ class BodyBatch:
         for row, own in going.items():
             self.bound["ctrl"][row] = self.worms[row].control(own, n_steps)
         for _ in range(n_steps):
+            drives = {row: self.worms[row].drive(own) for row, own in going.items()}
             for row in going:
                 self._prepare(self.worms[row], row)
-            stopped = self._step({row: self.worms[row].drive(own) for row, own in going.items()})
+            stopped = self._step(drives)
             reasons |= stopped
             going = {row: own for row, own in going.items() if row not in stopped}
         return reasons
@@ -147,7 +148,8 @@ class BatchWorm(Worm):
         super().__init__(config, anatomy)
         self._bodies, self._row = bodies, row
         self.engine = {name: values[row] for name, values in bodies.bound.items()}
-        self.qpos, self.plastic, self.act = (self.engine[name] for name in ("qpos", "plastic", "act"))
+        names = ("qpos", "plastic", "act", "ctrl")
+        self.qpos, self.plastic, self.act, self.ctrl = (self.engine[name] for name in names)
         self.two_step = self._two_step()
         self.warned = bodies.batch.warning[row, :, _TIMES_GIVEN]
 

@@ -148,6 +148,7 @@ class Worm(ABC):
     qpos: Array  # the engine's generalised positions, (nq,)
     plastic: Array  # what the engine keeps of the rods' frames, (nplastic,)
     act: Array  # the engine's actuator states, (n_states,)
+    ctrl: Array  # the engine's controls, (n_muscles,)
     engine: Engine  # the engine's arrays that a step is read from
     warned: NDArray[np.int32]  # how often the engine has given each of its warnings
     posture: Posture  # where the body is
@@ -228,6 +229,10 @@ class Worm(ABC):
 
     def drive(self, activation: Array) -> Array:
         """Returns what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
+        lagged = self.anatomy.rings.lagged(activation, self.act, self._config.clock.physics_timestep_s)
+        if lagged is not None:
+            # At its end. The engine's own lag leaves a state alone that is the control.
+            self.act[:] = self.ctrl[:] = lagged
         return self.act.copy() if self.model.na else activation
 
     def add_step(self, drive: Array) -> None:
@@ -436,7 +441,8 @@ class WormPlant(Worm):
         """Builds and compiles the body, unless it is compiled already; raises as `compile_worm`."""
         super().__init__(config, anatomy or compile_worm(config))
         data = self.data = mujoco.MjData(self.model)
-        self.qpos, self.plastic, self.act, self.warned = data.qpos, data.plastic, data.act, data.warning.number
+        self.qpos, self.plastic, self.act, self.ctrl = data.qpos, data.plastic, data.act, data.ctrl
+        self.warned = data.warning.number
         names = (*self.anatomy.outputs, *self.anatomy.energy_meter.outputs)
         self.engine = {name: getattr(data, name) for name in names}
         self.two_step = self._two_step()
@@ -456,12 +462,12 @@ class WormPlant(Worm):
             self.push(self._pushed_N if pushed else np.zeros_like(self._pushed_N))
         try:
             for _ in range(n_steps):
+                drive = self.drive(activation)
                 self.begin_step()
                 if self.ground is not None:
                     self.ground.lay(data)
                 if self.damping is not None:
                     self.damping.renew(self.qpos)
-                drive = self.drive(activation)
                 mujoco.mj_step(self.model, data)
                 data.time += self.beyond_s
                 self.add_step(drive)

@@ -134,3 +134,13 @@ class ActuatorKind(Kind):
             Shape ``(n_muscles,)``.
         """
         return activation
+
+    def lagged(self, activation: Array, state: Array, time_s: float) -> Array | None:
+        """Returns the states of actuators that follow an activation with a lag, after a time; None for all others.
+
+        Args:
+            activation: In [0, 1], ``(n_muscles,)``, during that time.
+            state: The states before it, ``(n_states,)``.
+            time_s: The time, s.
+        """
+        return None

@@ -44,9 +44,9 @@ from annelid.body import build_spec, compile_spec
 from annelid.body.damping import (
     MaterialDamping,
     RodVertices,
-    add_damper_rows,
     damped_edge,
     damper_name,
+    tendons_to_rows,
     twist_joints,
 )
 from annelid.body.twist import TwistCoupling
@@ -204,7 +204,7 @@ class GpuWorms:
         if plant.model.na:
             raise SystemExit(f"{config.name}: its actuators have states, which this benchmark does not follow")
         spec = build_spec(config, for_plant=True)
-        add_damper_rows(spec)
+        tendons_to_rows(spec)
         model = compile_spec(spec)
         body: Any = config.body
         self._damping = MaterialDamping(model, body.strands)

@@ -19,7 +19,7 @@ import mujoco
 
 from annelid import load_config
 from annelid.body import build_spec, compile_spec
-from annelid.body.damping import MaterialDamping, add_damper_rows
+from annelid.body.damping import MaterialDamping, tendons_to_rows
 from annelid.body.worm import WormBody
 from annelid.output import write_csv
 
@@ -60,7 +60,7 @@ def ring_after(preset: str, changes: dict[str, Any], timestep_s: float) -> float
     muscle = spec.actuator(RING)
     muscle.gaintype, muscle.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
     muscle.gainprm = [-FORCE_N, *[0.0] * 9]
-    add_damper_rows(spec)
+    tendons_to_rows(spec)
     model = compile_spec(spec)
     data = mujoco.MjData(model)
     data.actuator(RING).ctrl[0] = 1.0

@@ -42,7 +42,7 @@ import mujoco
 import numpy as np
 
 from annelid.body import compile_spec
-from annelid.body.damping import MaterialDamping, add_damper_rows, add_row
+from annelid.body.damping import MaterialDamping, add_row, tendons_to_rows
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
@@ -203,7 +203,7 @@ def annelid(scene: Scene, *, exact: bool = False) -> tuple[Step, float]:
         add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, rods)
         if scene.clamped:
             spec.joint(f"strand_{s}_twist_0").armature = CLAMP_KG
-    add_damper_rows(spec)
+    tendons_to_rows(spec)
     model = compile_spec(spec)
     data = mujoco.MjData(model)
     damping = MaterialDamping(model, strands)

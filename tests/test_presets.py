@@ -125,7 +125,8 @@ def test_the_sprung_rods_ties_and_damping_are_near_the_chain_s() -> None:
     assert isinstance(body, WormBody)
     assert isinstance(body.formulation, Rods)
     assert body.formulation.pin_damping_Ns_per_m == pytest.approx(DAMPING_TIME_S * tie_stiffness_N_per_m(sprung))
-    element_m = float(np.linalg.norm(np.diff(mesh_of(body.mesh).vertices_m[0], axis=0), axis=1).mean())
+    chains_mesh = body.mesh.model_copy(update={"elements_per_side": 3})
+    element_m = float(np.linalg.norm(np.diff(mesh_of(chains_mesh).vertices_m[0], axis=0), axis=1).mean())
     joint = body.strands.joint_damping(
         body.strands.one_number("young_modulus_Pa") * pi * body.strands.radius_m**4 / 4 / element_m
     )

@@ -74,6 +74,9 @@ def lost(plant: WormPlant, placed: Placed, velocity: Array) -> Lost:
     mujoco.mj_forward(model, data)
     rows = data.efc_type[: data.nefc] == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     rows &= model.eq_type[np.where(rows, data.efc_id[: data.nefc], 0)] == int(mujoco.mjtEq.mjEQ_TENDON)
+    # The ties of separate pins act along the world's axes.
+    tied = np.array([model.equality(i).name.startswith("tie_") for i in range(model.neq)])
+    rows &= ~tied[np.where(rows, data.efc_id[: data.nefc], 0)]
     rates = data.efc_vel[: data.nefc][rows]
     # A row's force but for its inertance, which takes no power.
     force = data.efc_D[: data.nefc][rows] * data.efc_aref[: data.nefc][rows]

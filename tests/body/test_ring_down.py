@@ -22,7 +22,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
-from annelid.body.damping import HELD, MaterialDamping, add_damper_rows
+from annelid.body.damping import HELD, MaterialDamping, tendons_to_rows
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
@@ -159,7 +159,7 @@ def rod(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.Mj
         add_vertex(spec, body, vertex, mass)
     add_rod(spec, "strand_0", vertices, bodies, strands, Rods())
     spec.joint("strand_0_twist_0").armature = CLAMP_KG
-    add_damper_rows(spec)
+    tendons_to_rows(spec)
     return spec
 
 

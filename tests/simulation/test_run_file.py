@@ -114,7 +114,6 @@ NEWER_THAN_0_1 = {
         "pins",
         "pin_stiffness_N_per_m",
         "pin_damping_Ns_per_m",
-        "pin_inertance_kg",
     ],
     "arena": ["kind", "backward_friction", "friction_cone", "slope_deg", "rail_gap_m", "posts"],
     "guard": ["depth_m", "stretch", "ring_closure"],

@@ -1,4 +1,4 @@
-"""Out-of-plane bending damping of rods: the half that the engine lacks, across the plane in which a vertex is bent.
+"""Springs and dampers of rods that the engine lacks: across the plane in which a vertex is bent, and at their pins.
 
 The engine damps the rate of a vertex' curvature ``2 tan(h)``, where h is half the angle between its two edges, but not
 the rate at which the plane of the bend turns in the material. With the edges' directions t0 and t1, lengths l0 and l1,
@@ -12,12 +12,12 @@ The elastic energy takes the mean over both frames; the damping takes one of the
 edge for the vertices at its two ends, since rows with two hinges take an eighth of a step longer. Times the material's
 time and its bending stiffness, it makes bending alike in all directions (Kelvin-Voigt).
 
-The coefficients follow the posture, step by step. As dampers of tendons they would cost twice the time of a step. A
-plant has constraint rows instead, which the engine solves at the end of the step too. The engine scales a row's damping
-by A, the ratio of the row's inverse inertia without the forces of the step to that with them: a row's force is
-``-A (I a + c v)``, with the wanted damping c and a small inertance I. A depends on step, posture and the world's axes,
-and would be 1 to 80. So every row also includes one dof that is fixed and so light that it alone decides about A, which
-then is 1.
+The coefficients follow the posture, step by step. As dampers of tendons they would cost twice the time of a step, and
+so would the springs and dashpots that tie separate pins to their strands. A plant has constraint rows instead, which
+the engine solves at the end of the step too. It scales a row by A, the ratio of the row's inverse inertia without the
+forces of the step to that with them: a row's force is ``-A (I a + c v + k r)``, with the wanted damping c and stiffness
+k, and a small inertance I. A depends on step, posture and the world's axes, and would be 1 to 80. So every row also
+includes one dof that is fixed and so light that it alone decides about A, which then is 1.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.body.formulations import Tie
 from annelid.body.worm import Strands
 from annelid.morphology import Array, cross
 
@@ -40,11 +41,11 @@ HELD_LEVER = 1e3
 HELD_INVERSE_KG = 1e-16
 """The engine fixes a dof by a force in proportion to the inertia that it believes it to have."""
 INERTANCE = 1e-3
-"""Of a row, as a share of its damping times the step: nothing that could be seen."""
+"""Of a row, as a share of its damping times the step, and of its stiffness times the square: nothing to be seen."""
 IMPEDANCE = 0.01
 STRAIGHT = 1e-9
 """Sine of the bend below which a vertex is straight; there the engine itself damps every direction."""
-_DAMPER, _STIFFNESS = "_damper_", "_stiffness"
+_DAMPER, _STIFFNESS, _TIE = "_damper_", "_stiffness", "tie_"
 _PER_ROW = 10
 _PER_RECORD = 10
 
@@ -189,19 +190,53 @@ def add_dampers(
                 tendon.wrap_joint(joint, coefficient)
 
 
-def add_damper_rows(spec: mujoco.MjSpec) -> None:
-    """Replaces the dampers of the rods' tendons by constraint rows, whose damping `MaterialDamping` completes."""
-    tendons = [tendon for tendon in spec.tendons if _DAMPER in tendon.name]
+def add_tie(spec: mujoco.MjSpec, pin: str, point: str, tie: Tie) -> None:
+    """Ties two vertices on slides, at one place, by a spring and a dashpot along each of the world's axes."""
+    add_held_coordinate(spec)
+    for axis in "xyz":
+        stiffness, damping = [tie.stiffness_N_per_m, 0.0, 0.0], [tie.damping_Ns_per_m, 0.0, 0.0]
+        tendon = spec.add_tendon(name=f"{_TIE}{point}_{axis}", stiffness=stiffness, damping=damping)
+        tendon.wrap_joint(f"{pin}_{axis}", -1.0)
+        tendon.wrap_joint(f"{point}_{axis}", 1.0)
+
+
+def tied_bodies(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """Returns the bodies of a pin and of a strand's vertex for every tie of a compiled model, ``(n_ties, 2)``."""
+    return model.jnt_bodyid[_ties(model)[1][:, ::3]].T.astype(np.intp)
+
+
+def _ties(model: mujoco.MjModel) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The tendons of ties, ``(3 n_ties,)``, and the slides of pin and vertex that each holds together, ``(2, ..)``."""
+    found = [i for i in range(model.ntendon) if model.tendon(i).name.startswith(_TIE)]
+    tendons = np.array(found, dtype=np.intp)
+    return tendons, model.wrap_objid[model.tendon_adr[tendons] + np.array([[0], [1]])].astype(np.intp)
+
+
+def tendons_to_rows(spec: mujoco.MjSpec) -> None:
+    """Replaces the dampers of rods and the ties of pins by constraint rows, to be completed for the compiled model.
+
+    `MaterialDamping` and `Ties` do that.
+    """
+    tendons = [tendon for tendon in spec.tendons if _DAMPER in tendon.name or tendon.name.startswith(_TIE)]
     if not tendons:
         return
     add_row(spec, mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT, HELD, HELD)
-    # The engine wants a stiffness. Damping over inertance, times the impedance as the engine has it.
-    solref = [-1e-12, -IMPEDANCE / (INERTANCE * spec.option.timestep)]
+    step_s = spec.option.timestep
     for tendon in tendons:
-        tendon.damping = [0.0, 0.0, 0.0]
+        stiffness, damping = float(tendon.stiffness[0]), float(tendon.damping[0])
+        tendon.stiffness = tendon.damping = [0.0, 0.0, 0.0]
         tendon.wrap_joint(HELD, HELD_LEVER)
+        # Of stiffness and damping over inertance, times the impedance as the engine has it; it wants a stiffness.
+        whole, scale = damping + step_s * stiffness, IMPEDANCE / (INERTANCE * step_s)
+        solref = [-max(stiffness / whole * scale, 1e-12), -damping / whole * scale]
         limits = {"solref": solref, "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]}
         add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, tendon.name, tendon.name, **limits)
+
+
+def _weigh_rows(model: mujoco.MjModel, tendons: NDArray[np.intp], damping: Array | float) -> None:
+    """Gives the rows of tendons in a compiled model their damping; of ties it is that of the spring over a step too."""
+    model.tendon_invweight0[tendons] = IMPEDANCE / (1.0 - IMPEDANCE) / (INERTANCE * damping * model.opt.timestep)
+    model.dof_invweight0[model.joint(HELD).dofadr] = HELD_INVERSE_KG
 
 
 def add_row(
@@ -250,8 +285,32 @@ class RodVertices:
         return self._place + qpos.take(self._slide, axis=-1)
 
 
+class Ties:
+    """The ties between pins and strands of a worm compiled with `tendons_to_rows`; none where pins are shared."""
+
+    def __init__(self, model: mujoco.MjModel, tie: Tie | None) -> None:
+        """Finds the rows and completes them."""
+        self._tie = tie or Tie(0.0, 0.0)
+        tendons, slides = _ties(model)
+        self._qpos, self._dof = model.jnt_qposadr[slides].astype(np.intp), model.jnt_dofadr[slides].astype(np.intp)
+        if tie:
+            whole = tie.damping_Ns_per_m + model.opt.timestep * tie.stiffness_N_per_m
+            _weigh_rows(model, tendons, whole)
+
+    def energy_J(self, qpos: Array) -> float:
+        """What the springs store in a posture, ``(nq,)``, J."""
+        apart = qpos[self._qpos[1]] - qpos[self._qpos[0]]
+        return 0.5 * self._tie.stiffness_N_per_m * float(apart @ apart)
+
+    def power_W(self, qpos: Array, qvel: Array) -> tuple[float, float]:
+        """What springs and dashpots take at positions, ``(nq,)``, and velocities, ``(nv,)``, W."""
+        apart, rate = qpos[self._qpos[1]] - qpos[self._qpos[0]], qvel[self._dof[1]] - qvel[self._dof[0]]
+        stiffness, damping = self._tie
+        return stiffness * float(apart @ rate), damping * float(rate @ rate)
+
+
 class MaterialDamping:
-    """Renews the rows of one worm, compiled with `add_damper_rows`, for its posture before every step.
+    """Renews the rows of one worm, compiled with `tendons_to_rows`, for its posture before every step.
 
     They live in the compiled model, which no other worm may use. The posture alone decides, so a run continues and a
     batch computes to the same bits.
@@ -267,10 +326,7 @@ class MaterialDamping:
         lengths = model.flexedge_length0.reshape(n_strands, n_edges)
         self._damping = _coefficients(lengths, strands.of_segment(0)) * rod_shares(model)[0]
         tendons = np.array([[model.tendon(damper_name(name, v)).id for v in range(1, n_edges)] for name in names])
-        model.tendon_invweight0[tendons] = (
-            IMPEDANCE / (1.0 - IMPEDANCE) / (INERTANCE * self._damping * model.opt.timestep)
-        )
-        model.dof_invweight0[model.joint(HELD).dofadr] = HELD_INVERSE_KG
+        _weigh_rows(model, tendons, self._damping)
         # The dampers' coefficients lie one after another, each damper's with that of the held dof at its end.
         first, last = int(model.tendon_adr[tendons[0, 0]]), int(model.tendon_adr[tendons[-1, -1]]) + _PER_ROW + 1
         shape = (*tendons.shape, _PER_ROW + 1)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site
+from annelid.body.damping import tied_bodies
 from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
@@ -73,8 +74,13 @@ class DrawnWorm:
         ball_m = np.minimum(ball_m, LARGEST_BALL * radius_m)
         model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * config.body.strands.radius_m)
         self._in_scene = in_scene(model)
-        bodies = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
-        self._links = np.flatnonzero(bodies & (model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value))
+        connects = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
+        connects &= model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value
+        tied = tied_bodies(model)
+        joined = np.stack([model.eq_obj1id[connects], model.eq_obj2id[connects]], axis=-1)
+        self._links = np.concatenate([joined, tied])
+        places = model.eq_data[connects, :6].reshape(-1, 2, 3)
+        self._link_places = np.concatenate([places, np.zeros((len(tied), 2, 3))])
         self.posture = mujoco.MjData(self.model)
         self.upright = upright(config)
         self._rings = [self.model.tendon(name).id for name in ring_names(config.body.n_segments, config.body.rings)]
@@ -96,13 +102,8 @@ class DrawnWorm:
         model, posture = self.model, self.posture
         radius_m = LINK * float(model.geom_size[self._balls, 0].min(initial=math.inf))
         capsule, rgba = mujoco.mjtGeom.mjGEOM_CAPSULE.value, np.array(self._behind.ball, dtype=np.float32)
-        for link in self._links.tolist():
-            ends = [
-                posture.xpos[body] + posture.xmat[body].reshape(3, 3) @ place
-                for body, place in zip(
-                    (model.eq_obj1id[link], model.eq_obj2id[link]), model.eq_data[link, :6].reshape(2, 3), strict=True
-                )
-            ]
+        turn = posture.xmat.reshape(-1, 3, 3)[self._links]
+        for ends in posture.xpos[self._links] + (turn @ self._link_places[..., None])[..., 0]:
             if scene.ngeom < scene.maxgeom:
                 bar = scene.geoms[scene.ngeom]
                 mujoco.mjv_initGeom(bar, capsule, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
@@ -162,7 +163,8 @@ class DrawnRobot(DrawnWorm):
             tendon.rgba = SPRING_RGBA if np.allclose(tendon.rgba, PLAIN_RGBA) else tendon.rgba
         self.model = model = spec.compile()
         self.posture = mujoco.MjData(model)
-        self._links = self._balls = np.zeros(0, dtype=np.int64)
+        self._balls = np.zeros(0, dtype=np.int64)
+        self._links, self._link_places = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2, 3))
         self._in_scene = model.body_weldid == 0
         pulled = [(model.actuator(name).trntype[0], model.actuator(name).trnid[0]) for name in robot.actuators]
         by_tendon = all(kind == mujoco.mjtTrn.mjTRN_TENDON.value for kind, _ in pulled)

@@ -18,7 +18,7 @@ from annelid.arena.geoms import touching
 from annelid.arena.surface import Surface, surface_of
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
-from annelid.body.damping import RodVertices
+from annelid.body.damping import RodVertices, Ties
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, heading_turn, norm
@@ -129,9 +129,10 @@ class Anatomy:
         self._find_skin(surface_of(arena))
         self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
         self.pins_can_part = self._pin_gap is not None
-        self.elasticity = Elasticity(model, body)
+        ties = Ties(model, body.formulation.tie)
+        self.elasticity = Elasticity(model, body, ties)
         share = body.formulation.engine_share(arena)
-        self.energy_meter = EnergyMeter(model, body.rings, share)
+        self.energy_meter = EnergyMeter(model, body.rings, share, ties)
         # The engine has edge lengths of where its step starts, which under BDF2 is no posture of the worm.
         self._vertices = RodVertices(model) if self.has_edges and share < 1.0 else None
         edges = ("flexedge_length" if self._vertices is None else "qpos",) if self.has_edges else ()

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from annelid.arena.course import LEFT
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
-from annelid.body.damping import MaterialDamping, add_damper_rows
+from annelid.body.damping import MaterialDamping, tendons_to_rows
 from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
 from annelid.config import ArenaKind, RunConfig
@@ -114,7 +114,7 @@ def compile_worm(config: RunConfig) -> Anatomy:
     body, arena = body_and_arena(config)
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     add_contact_sensors(spec, arena)
-    add_damper_rows(spec)
+    tendons_to_rows(spec)
     return Anatomy(compile_spec(spec), body, arena)
 
 
@@ -132,8 +132,8 @@ class Worm(ABC):
     """What a 3D worm senses, records and is alarmed by, whoever steps it.
 
     Lengths and positions are those at the end of the step; forces are those that acted during the last physics step,
-    since the engine computes them before it moves the body. So are edge strains in steps of first order, and the gaps
-    of pins; in those of second order both are of where the engine's step starts, or strains of the end.
+    since the engine computes them before it moves the body. So are the gaps of a chain's pins, and edge strains in
+    steps of first order; in those of second order they are those at the end.
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -49,6 +49,13 @@ PinReader = Callable[[Mapping[str, Array]], Array]
 """Reads the largest gap at a pin, m, from the engine's arrays."""
 
 
+class Tie(NamedTuple):
+    """A spring and a dashpot between a pin and a vertex of each of its strands."""
+
+    stiffness_N_per_m: float
+    damping_Ns_per_m: float
+
+
 class FormulationKind(Kind):
     """Base of the formulations' sections.
 
@@ -79,6 +86,11 @@ class FormulationKind(Kind):
     def has_rigid_crossings(self) -> bool:
         """Whether the two strands of a crossing share a point."""
         return False
+
+    @property
+    def tie(self) -> Tie | None:
+        """What ties pins to their strands, where those are springs of a given stiffness."""
+        return None
 
     @abstractmethod
     def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:

@@ -23,8 +23,8 @@ from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import HOLD_S, Effort, chain, fast, one_after_the_other, rods
 
-STIFFNESSES_N_PER_M = (12.0, 21.5, 50.0, 100.0, 300.0, 1000.0)
-"""Ties of the rods; 21.5 N/m are the preset's."""
+STIFFNESSES_N_PER_M = (12.0, 26.0, 50.0, 100.0, 300.0, 1000.0)
+"""Ties of the rods; 26 N/m are the preset's."""
 DAMPING_TIME_S = 0.04
 """Damping over stiffness of the ties, as the paper's pins have it, s."""
 TIME_CONSTANTS_S = (0.0126, 0.01, 0.008)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from annelid.body.estimates import Finding
-from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader
+from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader, Tie
 from annelid.config.sections import NonNegative, Positive
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm
@@ -60,9 +60,6 @@ class Rods(FormulationKind):
         default=22.0, description="of the tie between a separate pin and each of its strands"
     )
     pin_damping_Ns_per_m: Positive = Field(default=0.88, description="of the same tie")
-    pin_inertance_kg: Positive = Field(
-        default=0.0094, description="of the same tie: its force per relative acceleration, numerical"
-    )
 
     @property
     def step_cost_ms(self) -> float:
@@ -76,6 +73,11 @@ class Rods(FormulationKind):
         what the engine steps explicitly, such as a pendulum's weight, would swing ever farther.
         """
         return BDF2_SHARE if self.integrator == "BDF2" and not arena.object_names else 1.0
+
+    @property
+    def tie(self) -> Tie | None:
+        """What ties separate pins to their strands."""
+        return None if self.pins == "shared" else Tie(self.pin_stiffness_N_per_m, self.pin_damping_Ns_per_m)
 
     @property
     def has_rigid_crossings(self) -> bool:
@@ -153,12 +155,13 @@ class Rods(FormulationKind):
 
         places = zip(geometry.crossing_strands.tolist(), geometry.crossing_vertex[geometry.crossing_plane], strict=True)
         bodies = np.array([[model.body(vertex_name(strand, vertex)).id for strand in pair] for pair, vertex in places])
+        slides = model.jnt_qposadr[model.body_jntadr[bodies]][..., None] + np.arange(3)
 
         def gap(engine: Mapping[str, Array]) -> Array:
-            ends = engine["xpos"].take(bodies, axis=-2)
+            ends = engine["qpos"].take(slides, axis=-1)
             return norm(ends[..., 1, :] - ends[..., 0, :]).max(axis=-1)
 
-        return gap, ("xpos",)
+        return gap, ("qpos",)
 
     def refuse_fidelity(self, level: str) -> None:
         """Refuses any level for separate pins, which are fitted to their mesh and step."""

@@ -5,9 +5,8 @@ no constraint and cannot part. Each strand is a 1D flex through its vertices' bo
 bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
-Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by a spring
-and a dashpot in N/m and N s/m, constraint rows whose static stiffness and damping follow from their reference and
-regularisation (MuJoCo's documentation, "Constraint model"). A material's damping time is completed by
+Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by springs and
+dashpots (`annelid.body.damping`). A material's damping time is completed by
 `annelid.body.damping`, since the engine damps a curved vertex in the plane of its bend alone. Lateral damping by a
 number per joint is older: its rows are fixed in the world, so it brakes a rotating worm and fits a straight one only.
 """
@@ -23,7 +22,15 @@ import numpy as np
 
 from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.damping import add_dampers, add_held_coordinate, add_holder, add_row, shares_name, twist_name
+from annelid.body.damping import (
+    add_dampers,
+    add_held_coordinate,
+    add_holder,
+    add_row,
+    add_tie,
+    shares_name,
+    twist_name,
+)
 from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
@@ -120,7 +127,8 @@ def _add_vertices(
         for strand in strands:
             point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
             add_touch(point, body.strands.radius_m, contact[vertex])
-            _tie(spec, pin, point, formulation)
+            assert formulation.tie is not None
+            add_tie(spec, name, point.name, formulation.tie)
 
     between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
     for strand in range(geometry.n_strands):
@@ -149,30 +157,6 @@ def _built_apart(spec: mujoco.MjSpec, prefix: str) -> Iterator[mujoco.MjSpec]:
 def vertex_name(strand: int, vertex: int | str) -> str:
     """Name of the body of a strand's own vertex."""
     return f"vertex_{strand}_{vertex}"
-
-
-def _tie(spec: mujoco.MjSpec, pin: mujoco.MjsBody, point: mujoco.MjsBody, formulation: Rods) -> None:
-    """Ties a strand's vertex to its pin by a spring and a dashpot at one place."""
-    stiffness, damping = formulation.pin_stiffness_N_per_m, formulation.pin_damping_Ns_per_m
-    inverse_kg = 1.0 / pin.mass + 1.0 / point.mass
-    row = spring_row(inverse_kg, stiffness, damping, formulation.pin_inertance_kg)
-    connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
-    add_row(spec, connect, bodies, f"tie_{point.name}", pin.name, point.name, **row)
-
-
-def spring_row(inverse_mass: float, stiffness: float, damping: float, inertance: float) -> dict[str, list[float]]:
-    """Returns the engine's ``solref`` and ``solimp`` of a constraint row that acts as spring, dashpot and inerter.
-
-    A row's force is ``(-b v - k r - a) / R`` for a violation r, its rate v and its acceleration a, where
-    ``R = inverse_mass (1 - d) / d`` at impedance d, and the engine divides the coefficients given by d and d^2. The
-    row's inverse inertia at rest is as the engine computes it, 1/kg, or of a hinge 1/(kg m^2).
-    """
-    impedance = inertance * inverse_mass / (1.0 + inertance * inverse_mass)
-    compliance = inverse_mass * (1.0 - impedance) / impedance
-    return {
-        "solref": [-stiffness * compliance * impedance, -damping * compliance * impedance],
-        "solimp": [impedance, impedance, 0.001, 0.5, 2.0],
-    }
 
 
 def add_vertex(spec: mujoco.MjSpec, name: str, position: Array, mass: float) -> mujoco.MjsBody:
@@ -301,9 +285,11 @@ def _add_lateral_damper(
         for letter, share in zip("xyz", binormal / sine, strict=True):
             if abs(share) > 1e-6:
                 tendon.wrap_joint(f"{body}_{letter}", float(weight * share))
-    # An inertance as small as the vertices' own, and next to no stiffness: the engine wants both numbers.
-    row = spring_row(inverse_inertia, 1e-12, damping, 1.0 / inverse_inertia)
-    add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, name, name, **row)
+    # A row's force is (-b v - k r - a) / R at rate v, violation r and acceleration a, with R the inverse inertia times
+    # (1 - d) / d at impedance d, and the engine divides the coefficients given by d and d^2. At d = 1/2 the row has an
+    # inertance as small as the vertices' own; it wants a stiffness, of which this is next to none.
+    limits = {"solref": [-1e-12, -0.5 * damping * inverse_inertia], "solimp": [0.5, 0.5, 0.001, 0.5, 2.0]}
+    add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, name, name, **limits)
 
 
 def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float | Array) -> Array:

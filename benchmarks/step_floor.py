@@ -2,12 +2,14 @@
 
     python benchmarks/step_floor.py [seconds]
     python benchmarks/step_floor.py creep
+    python benchmarks/step_floor.py jump
 
 Steps the closed loop of `riddle2023-rods` without recording, at 20, 40 and 60 ms. The solver starts from the last
 acceleration, as the engine has it, from none, from the last two extrapolated, and from the one that would stop the
 worm. Prints times real time, milliseconds a step and iterations of the solver. Run it where nothing else computes.
 
 The second prints how fast the resting worm creeps on a slope of 12 degrees, by step and impedance ratio of friction.
+The third repeats the muscles' commands of a run at steps of 5 ms, as they were and smoothed over up to 40 ms.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 
 from annelid import load_config, simulate
 from annelid.morphology import Array
+from annelid.protocols import Sensation
 from annelid.simulation import Simulation, WormPlant, build_controller, start
 
 Start = Callable[[Array, Array, Array], Array]
@@ -74,7 +77,32 @@ def creep() -> None:
             print(f"{1e3 * step_s:g} ms, ratio {ratio:g}: {1e3 * way:.3f} mm/s")
 
 
+def jump() -> None:
+    """Prints the travel of two cycles under the same commands, with muscles that act at once and others that do not."""
+    config = load_config("riddle2023-rods", {"clock.physics_timestep_s": 0.005, "duration_s": 8.0})
+    config = config.model_copy(update={"record": config.record.model_copy(update={"signals_interval_s": 0.005})})
+    with TemporaryDirectory() as folder:
+        data = simulate(config, folder, progress=False, overwrite=True).data
+        times_s, commands = data["activation"]["time"].values, data["activation"].values
+    for over_s in (0.0, 0.01, 0.02, 0.04):
+        width = max(round(over_s / 0.005), 1)
+        rows = [np.convolve(np.pad(one, width, "edge"), np.ones(width) / width, "same") for one in commands.T]
+        smooth = np.array(rows)[:, width:-width]
+
+        def command(sensed: Sensation, smooth: Array = smooth) -> Array:
+            return np.array([np.interp(sensed.time_s, times_s, row) for row in smooth])
+
+        with TemporaryDirectory() as folder:
+            run = simulate(config, folder, controller=command, progress=False, overwrite=True)
+            way = run.data["center_of_mass"].values[:, 0]
+        ahead = -np.diff(np.interp([2.627, 5.254, 7.881], times_s, way))
+        print(f"smoothed over {1e3 * over_s:g} ms: {1e3 * ahead[0]:.0f} and {1e3 * ahead[1]:.0f} mm a cycle")
+
+
 if __name__ == "__main__":
+    if sys.argv[1:] == ["jump"]:
+        jump()
+        sys.exit()
     if sys.argv[1:] == ["creep"]:
         creep()
         sys.exit()

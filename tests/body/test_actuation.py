@@ -6,6 +6,7 @@ from math import expm1
 from types import SimpleNamespace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from annelid.body import mesh_of
 from annelid.body.actuation import stretch_sensors
+from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
 from annelid.body.worm import Mesh, Springs
 from annelid.config import load_config
@@ -273,3 +275,36 @@ def test_muscles_refuse_the_fields_of_servos_and_may_become_servos() -> None:
         load_config("riddle2023-rods", {"body.rings.speed_limit_m_per_s": 0.1})
     changed = load_config("riddle2023", {"body.rings.kind": "servo"}).model_dump()["body"]["rings"]
     assert changed == ServoRings().model_dump()
+
+
+LAGGING = Rings(activation_dynamics=True)
+SHARES = st.floats(0.0, 1.0)
+
+
+def lagged(activation: float, state: float, time_s: float) -> float:
+    found = LAGGING.lagged(np.array([activation]), np.array([state]), time_s)
+    assert found is not None
+    return float(found[0])
+
+
+@given(activation=SHARES, state=SHARES, time_s=st.floats(1e-4, 0.2))
+def test_a_lag_is_the_solution_of_the_engine_s_equation(activation: float, state: float, time_s: float) -> None:
+    """The rate at its end is the engine's, and it goes on from there."""
+    step_s = 1e-6
+    now, later = lagged(activation, state, time_s), lagged(activation, state, time_s + step_s)
+    rate = mujoco.mju_muscleDynamics(activation, now, [0.01, 0.04, 0.0])
+    assert (later - now) / step_s == pytest.approx(rate, rel=1e-3, abs=1e-3)
+    assert lagged(activation, now, 0.03) == pytest.approx(lagged(activation, state, time_s + 0.03), abs=1e-9)
+    assert min(activation, state) - 1e-12 <= now <= max(activation, state) + 1e-12
+
+
+@pytest.mark.parametrize("timestep_s", [0.01, 0.04])
+def test_a_lagging_muscle_acts_as_at_the_end_of_a_step_of_any_length(timestep_s: float) -> None:
+    """At 40 ms the engine's own lag, whose times are 10 and 40 ms, would swing beyond its ends."""
+    changes = {"clock.physics_timestep_s": timestep_s, "record.signals_interval_s": timestep_s}
+    plant = WormPlant(load_config("riddle2023-rods", {"body.rings.activation_dynamics": True, **changes}))
+    for elapsed, command in ((0.04, 1.0), (0.08, 0.3)):
+        for _ in range(round(0.04 / timestep_s)):
+            plant.move(np.array([command, 0.0, 0.0]), 1)
+        expected = lagged(1.0, 0.0, 0.04) if elapsed == 0.04 else lagged(0.3, lagged(1.0, 0.0, 0.04), 0.04)
+        np.testing.assert_allclose(plant.act, [expected, 0.0, 0.0], atol=1e-9)

@@ -286,16 +286,14 @@ class RodVertices:
 
 
 class Ties:
-    """The ties between pins and strands of a worm compiled with `tendons_to_rows`; none where pins are shared."""
+    """The ties between pins and strands of a worm compiled with `tendons_to_rows`."""
 
-    def __init__(self, model: mujoco.MjModel, tie: Tie | None) -> None:
+    def __init__(self, model: mujoco.MjModel, tie: Tie) -> None:
         """Finds the rows and completes them."""
-        self._tie = tie or Tie(0.0, 0.0)
+        self._tie = tie
         tendons, slides = _ties(model)
         self._qpos, self._dof = model.jnt_qposadr[slides].astype(np.intp), model.jnt_dofadr[slides].astype(np.intp)
-        if tie:
-            whole = tie.damping_Ns_per_m + model.opt.timestep * tie.stiffness_N_per_m
-            _weigh_rows(model, tendons, whole)
+        _weigh_rows(model, tendons, tie.damping_Ns_per_m + model.opt.timestep * tie.stiffness_N_per_m)
 
     def energy_J(self, qpos: Array) -> float:
         """What the springs store in a posture, ``(nq,)``, J."""

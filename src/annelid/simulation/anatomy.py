@@ -129,7 +129,8 @@ class Anatomy:
         self._find_skin(surface_of(arena))
         self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
         self.pins_can_part = self._pin_gap is not None
-        ties = Ties(model, body.formulation.tie)
+        tie = body.formulation.tie
+        ties = None if tie is None else Ties(model, tie)
         self.elasticity = Elasticity(model, body, ties)
         share = body.formulation.engine_share(arena)
         self.energy_meter = EnergyMeter(model, body.rings, share, ties)

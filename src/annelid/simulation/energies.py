@@ -82,7 +82,7 @@ class EnergyMeter:
         self, model: mujoco.MjModel, rings: ActuatorKind, engine_share: float = 1.0, ties: Ties | None = None
     ) -> None:
         """Takes a compiled worm, the length of the engine's step over that of a whole step, and its pins' ties."""
-        self._ties = ties or Ties(model, None)
+        self._ties = ties
         self._engine_s = float(model.opt.timestep)
         self._timestep_s = self._engine_s / engine_share
         # Other integrators take the actuators' forces as they are at the start of a step.
@@ -107,9 +107,10 @@ class EnergyMeter:
             tension = tension + per_length * (self._engine_s * rate) + per_rate * (rate - earlier)
         work = -h * tension * rate
         damped, constrained = (-h * (engine[force] @ velocity) for force in ("qfrc_damper", "qfrc_constraint"))
-        # The engine counts the ties among its constraints.
-        springs, dashpots = (h * power for power in self._ties.power_W(engine["qpos"], velocity))
-        damped, constrained = damped + dashpots, constrained - dashpots - springs
+        if self._ties is not None:
+            # The engine counts them among its constraints.
+            springs, dashpots = (h * power for power in self._ties.power_W(engine["qpos"], velocity))
+            damped, constrained = damped + dashpots, constrained - dashpots - springs
         taken = np.zeros_like(work) if self.motor_power is None else h * self.motor_power(tension, -rate)
         return tension, EnergyTotals(work, np.maximum(work, 0.0), damped, constrained, taken)
 
@@ -117,7 +118,7 @@ class EnergyMeter:
 class Elasticity:
     """The elastic energy of one compiled body as a function of its coordinates."""
 
-    def __init__(self, model: mujoco.MjModel, body: WormBody, ties: Ties) -> None:
+    def __init__(self, model: mujoco.MjModel, body: WormBody, ties: Ties | None) -> None:
         self._ties = ties
         springs = [i for i in range(model.ntendon) if model.tendon(i).name.startswith("spring_")]
         self._spring_rate = model.tendon_stiffness[springs].copy()
@@ -148,7 +149,8 @@ class Elasticity:
         vector = rest[0] * now[1:] - now[0] * rest[1:] - cross(rest[1:], now[1:])
         ball = 2.0 * np.arctan2(np.sqrt(_dot(vector, vector)), cosine)
         joints = 0.5 * float(self._rates[0] @ (hinge * hinge) + self._rates[1] @ (ball * ball))
-        energy = 0.5 * float(self._spring_rate @ (stretch * stretch)) + joints + self._ties.energy_J(qpos)
+        energy = 0.5 * float(self._spring_rate @ (stretch * stretch)) + joints
+        energy += 0.0 if self._ties is None else self._ties.energy_J(qpos)
         return energy if self._rods is None else energy + self._rods.energy_J(qpos, plastic)
 
 

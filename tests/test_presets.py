@@ -131,7 +131,6 @@ def test_the_sprung_rods_ties_and_damping_are_near_the_chain_s() -> None:
         body.strands.one_number("young_modulus_Pa") * pi * body.strands.radius_m**4 / 4 / element_m
     )
     assert 0.06 < joint < 0.12
-    assert body.formulation.lateral_damping_Nms_per_rad == 0.0
 
 
 ROBOTS = {

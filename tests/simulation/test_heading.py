@@ -151,19 +151,6 @@ def test_what_lies_along_x_refuses_a_heading(arena: str, where: str) -> None:
     assert load_config("riddle2025", {"body.heading_deg": 30.0}, arena="slope").arena
 
 
-def test_dampers_that_are_fixed_in_the_world_refuse_a_heading() -> None:
-    world = {
-        "body.strands.damping_time_s": None,
-        "body.formulation.integrator": "Euler",
-        "body.formulation.lateral_damping_Nms_per_rad": 0.01,
-    }
-    changes = world | {"body.heading_deg": 30.0}
-    with pytest.raises(
-        ConfigError, match=r"body\.heading_deg = 30: must be 0 with .*give body\.strands\.damping_time_s"
-    ):
-        load_config("riddle2023-rods", changes)
-
-
 def test_a_worm_with_setae_holds_on_a_slope_that_rises_where_it_leads() -> None:
     slope = {"arena.slope_deg": 30.0, "arena.friction": 0.3, "arena.backward_friction": 1.0}
     doubts = {

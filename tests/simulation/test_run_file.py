@@ -110,7 +110,6 @@ NEWER_THAN_0_1 = {
     "body.springs": ["sensors"],
     "body.rings": ["kind"],
     "body.formulation": [
-        "lateral_damping_Nms_per_rad",
         "pins",
         "pin_stiffness_N_per_m",
         "pin_damping_Ns_per_m",

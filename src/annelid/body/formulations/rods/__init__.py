@@ -36,11 +36,6 @@ class Rods(FormulationKind):
     friction_impedance_ratio: Positive = Field(
         default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
     )
-    lateral_damping_Nms_per_rad: NonNegative = Field(
-        default=0.0,
-        description="viscous resistance to bending across the plane of a strand's own curvature, for which the "
-        "engine's curved rods have none",
-    )
     curvature: Literal["linear", "constant"] = Field(
         default="linear",
         description="of a strand between two crossings: linear, as forces at the crossings bend it, or constant about "
@@ -98,8 +93,8 @@ class Rods(FormulationKind):
         return 1e-8 * n_elements**2 * n_helices, 2e-6 * n_elements * n_helices
 
     def check_body(self, body: WormBody) -> None:
-        """Checks that stiffness differs with the material's damping only, and what stands beside lateral dampers."""
-        lateral, strands = self.lateral_damping_Nms_per_rad, body.strands
+        """Checks that stiffness differs with the material's damping only, and that steps of second order have it."""
+        strands = body.strands
         if strands.stiffness_differs and strands.material_damping_s is None:
             raise ValueError(
                 "body.strands.damping_time_s = none: must be given for rods whose stiffness differs, since the engine "
@@ -109,16 +104,6 @@ class Rods(FormulationKind):
             raise ValueError(
                 "body.formulation.integrator = 'BDF2': must be 'Euler' where body.strands gives no damping of the "
                 "material (damping_time_s, or loss_factor with loss_frequency_Hz), without which vibrations would grow"
-            )
-        if lateral > 0 and strands.material_damping_s is not None:
-            raise ValueError(
-                f"body.formulation.lateral_damping_Nms_per_rad = {lateral:g} must be 0 where body.strands gives the "
-                "damping of the material, which acts in every direction"
-            )
-        if lateral > 0 and body.heading_deg:
-            raise ValueError(
-                f"body.heading_deg = {body.heading_deg:g}: must be 0 with body.formulation.lateral_damping_Nms_per_rad "
-                f"= {lateral:g}, whose dampers are fixed in the world; give body.strands.damping_time_s instead"
             )
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
@@ -164,14 +149,14 @@ class Rods(FormulationKind):
         return gap, ("qpos",)
 
     def refuse_fidelity(self, level: str) -> None:
-        """Refuses any level for separate pins, which are fitted to their mesh and step."""
+        """Refuses any level for separate pins, which are fitted with settings of their own."""
         if self.pins == "separate":
             raise ConfigError(
                 f"fidelity = {level!r} is for rods that share their pins; those of body.formulation.pins = 'separate' "
-                "are fitted to their mesh and step: take the preset riddle2023-rods, or set "
-                "body.mesh.elements_per_side and clock.physics_timestep_s and fit the pins again"
+                "are fitted with settings of the contacts that a level would change: take the preset riddle2023-rods, "
+                "or set body.mesh.elements_per_side and clock.physics_timestep_s"
             )
 
     def hastened(self, haste: float) -> Self:
         """Returns the section with its viscous coefficient divided."""
-        return self.model_copy(update={"lateral_damping_Nms_per_rad": self.lateral_damping_Nms_per_rad / haste})
+        return self.model_copy(update={"pin_damping_Ns_per_m": self.pin_damping_Ns_per_m / haste})

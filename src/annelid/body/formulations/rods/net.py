@@ -5,10 +5,9 @@ no constraint and cannot part. Each strand is a 1D flex through its vertices' bo
 bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
-Two options go beyond the engine's rods. Separate pins are point masses tied to a vertex of each strand by springs and
-dashpots (`annelid.body.damping`). A material's damping time is completed by
-`annelid.body.damping`, since the engine damps a curved vertex in the plane of its bend alone. Lateral damping by a
-number per joint is older: its rows are fixed in the world, so it brakes a rotating worm and fits a straight one only.
+Two options go beyond the engine's rods (`annelid.body.damping`). Separate pins are point masses tied to a vertex of
+each strand by springs and dashpots. A material's damping time is completed, since the engine damps a curved vertex in
+the plane of its bend alone.
 """
 
 from __future__ import annotations
@@ -26,7 +25,6 @@ from annelid.body.damping import (
     add_dampers,
     add_held_coordinate,
     add_holder,
-    add_row,
     add_tie,
     shares_name,
     twist_name,
@@ -44,8 +42,6 @@ ORIGIN = np.zeros(3)
 STRAND_RGBA = ((0.12, 0.35, 0.75, 1.0), (0.25, 0.5, 0.85, 1.0))
 EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
 HIDDEN_GROUP = 4
-STRAIGHT_RAD = 1e-4
-"""Vertices less bent than this at rest count as straight; there the engine damps bending in every direction."""
 TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
 
@@ -259,37 +255,6 @@ def add_rod(
         add_held_coordinate(spec)
         if dampers:
             add_dampers(spec, name, vertices_m, bodies, strands, shares[0], clamped=clamped)
-    elif formulation.lateral_damping_Nms_per_rad > 0:
-        for vertex in range(1, n_edges):
-            _add_lateral_damper(spec, name, vertices_m, bodies, vertex, formulation.lateral_damping_Nms_per_rad)
-
-
-def _add_lateral_damper(
-    spec: mujoco.MjSpec, rod: str, vertices_m: Array, bodies: list[str], vertex: int, damping: float
-) -> None:
-    """Damps the angle at a curved vertex across its plane at rest: a fixed tendon over its neighbours' slides."""
-    before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
-    lengths = np.linalg.norm(before), np.linalg.norm(after)
-    binormal = np.cross(before / lengths[0], after / lengths[1])
-    sine = np.linalg.norm(binormal)
-    if sine < STRAIGHT_RAD:
-        return
-    name = f"{rod}_lateral_{vertex}"
-    tendon = spec.add_tendon(name=name)
-    inverse_inertia = 0.0
-    weights = (1.0 / lengths[0], -1.0 / lengths[0] - 1.0 / lengths[1], 1.0 / lengths[1])
-    for body, weight in zip(bodies[vertex - 1 : vertex + 2], weights, strict=True):
-        if body == "world":
-            continue
-        inverse_inertia += weight**2 / spec.body(body).mass
-        for letter, share in zip("xyz", binormal / sine, strict=True):
-            if abs(share) > 1e-6:
-                tendon.wrap_joint(f"{body}_{letter}", float(weight * share))
-    # A row's force is (-b v - k r - a) / R at rate v, violation r and acceleration a, with R the inverse inertia times
-    # (1 - d) / d at impedance d, and the engine divides the coefficients given by d and d^2. At d = 1/2 the row has an
-    # inertance as small as the vertices' own; it wants a stiffness, of which this is next to none.
-    limits = {"solref": [-1e-12, -0.5 * damping * inverse_inertia], "solimp": [0.5, 0.5, 0.001, 0.5, 2.0]}
-    add_row(spec, mujoco.mjtEq.mjEQ_TENDON, mujoco.mjtObj.mjOBJ_TENDON, name, name, **limits)
 
 
 def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float | Array) -> Array:

@@ -44,6 +44,7 @@ from annelid.body import build_spec, compile_spec
 from annelid.body.damping import (
     MaterialDamping,
     RodVertices,
+    Ties,
     damped_edge,
     damper_name,
     tendons_to_rows,
@@ -208,6 +209,8 @@ class GpuWorms:
         model = compile_spec(spec)
         body: Any = config.body
         self._damping = MaterialDamping(model, body.strands)
+        if body.formulation.tie is not None:
+            Ties(model, body.formulation.tie)
         self._shape = n_worms, model.nflex, int(model.flex_edgenum[0])
         self.n_worms, self.nv = n_worms, model.nv
         self._second_order = plant.two_step is not None

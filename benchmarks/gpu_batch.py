@@ -347,9 +347,8 @@ def walk(worms: GpuWorms, config: RunConfig, duration_s: float) -> tuple[Array, 
     activations, lengths, spent = [], [sensed], {"network": 0.0, "body": 0.0}
     for move in range(n_moves):
         began = perf_counter()
-        n_steps = 1 if move == 0 and every == 1 else every
         seen = replace(sensation, time_s=move * config.clock.physics_timestep_s, stretch_m=sensed)
-        states, activation = controller.step_copies(states, seen, n_steps, each)
+        states, activation = controller.step_copies(states, seen, every, each)
         between = perf_counter()
         sensed = worms.step(activation)
         # The first steps compile, allocate and record.

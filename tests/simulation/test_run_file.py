@@ -173,6 +173,19 @@ def test_a_run_in_which_landing_acted_says_so(landing: float) -> None:
     assert [doubt.startswith("controller.landing was 0.1") for doubt in doubts[1:]] == [True] * (landing > 0)
 
 
+@pytest.mark.parametrize(("pins", "lateral"), [("shared", 0.0), ("separate", 0.0), ("shared", 0.1)])
+def test_a_run_of_0_2_0_is_read_and_says_what_is_gone(pins: str, lateral: float) -> None:
+    config = load_config("riddle2023-rods", {"body.formulation.pins": pins})
+    tree = config.model_dump(mode="json")
+    tree["body"]["formulation"] |= {"pin_inertance_kg": 0.0094, "lateral_damping_Nms_per_rad": lateral}
+    attrs = {"schema_version": 3, "config": json.dumps(tree)}
+    read = migrated(xarray.Dataset({"warnings": ((), "")}, attrs=attrs))
+    assert RunConfig.model_validate_json(read.attrs["config"]) == config
+    doubts = str(read["warnings"].values)
+    assert ("pin_inertance_kg was 0.0094" in doubts) == (pins == "separate")
+    assert ("lateral_damping_Nms_per_rad was 0.1" in doubts) == (lateral > 0)
+
+
 @pytest.mark.parametrize("config", ["{", "[]", '"riddle2023"', '{"name": 3}', "[" * 100_000])
 def test_what_is_wrong_with_an_old_configuration_is_left_to_its_reader(config: str) -> None:
     assert migrated(xarray.Dataset(attrs={"config": config})).attrs["config"] == config

@@ -132,8 +132,8 @@ class Worm(ABC):
     """What a 3D worm senses, records and is alarmed by, whoever steps it.
 
     Lengths and positions are those at the end of the step; forces are those that acted during the last physics step,
-    since the engine computes them before it moves the body. So are the gaps of a chain's pins, and edge strains in
-    steps of first order; in those of second order they are those at the end.
+    since the engine computes them before it moves the body. Edge strains are those at the end of a step of second order
+    and at the start of one of first order; gaps of pins those at the end, and of a chain those at the start.
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.
@@ -228,8 +228,12 @@ class Worm(ABC):
             self.two_step.begin()
 
     def drive(self, activation: Array) -> Array:
-        """Returns what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``."""
+        """Returns what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``.
+
+        Moves on the states of actuators that follow an activation with a lag, before `begin_step` takes note of them.
+        """
         lagged = self.anatomy.rings.lagged(activation, self.act, self._config.clock.physics_timestep_s)
+        self._command = None if lagged is None else self.ctrl.copy()
         if lagged is not None:
             # At its end. The engine's own lag leaves a state alone that is the control.
             self.act[:] = self.ctrl[:] = lagged
@@ -239,6 +243,8 @@ class Worm(ABC):
         """Adds the physics step that was taken to the energy totals, with what `drive` returned before it."""
         if self.two_step is not None:
             self.two_step.end()
+        if self._command is not None:
+            self.ctrl[:] = self._command
         self._tension_N, entries = self.anatomy.energy_meter.step(self.engine, drive)
         if self.damping is not None:
             # The engine counts the rows among its constraints.
@@ -473,7 +479,7 @@ class WormPlant(Worm):
                 self.add_step(drive)
         except mujoco.FatalError as error:
             raise SimulationStopped(engine_stopped(self.data.time, error)) from None
-        # Pin gaps are read before positions are brought up to the end of the step.
+        # Gaps of a chain's pins are read before positions are brought up to the end of the step.
         forces, ground = self.anatomy.forces(self.engine)
         return Movement(self._locate(), forces, ground)
 

@@ -103,6 +103,8 @@ class Rings(ActuatorKind):
             fpmax=self.passive_peak,
             fvmax=self.lengthening_peak,
         )
+        # Of a written model, whose explicit steps may overshoot.
+        actuator.actlimited, actuator.actrange = self.activation_dynamics, [0.0, 1.0]
         if not self.activation_dynamics:
             actuator.dyntype = mujoco.mjtDyn.mjDYN_NONE
 

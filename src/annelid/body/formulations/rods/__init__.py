@@ -149,12 +149,12 @@ class Rods(FormulationKind):
         return gap, ("qpos",)
 
     def refuse_fidelity(self, level: str) -> None:
-        """Refuses any level for separate pins, which are fitted with settings of their own."""
+        """Refuses any level for separate pins: the errors of the levels were measured without."""
         if self.pins == "separate":
             raise ConfigError(
-                f"fidelity = {level!r} is for rods that share their pins; those of body.formulation.pins = 'separate' "
-                "are fitted with settings of the contacts that a level would change: take the preset riddle2023-rods, "
-                "or set body.mesh.elements_per_side and clock.physics_timestep_s"
+                f"fidelity = {level!r} is measured for rods that share their pins, not for body.formulation.pins = "
+                "'separate': take the preset riddle2023-rods, or set body.mesh.elements_per_side and "
+                "clock.physics_timestep_s"
             )
 
     def hastened(self, haste: float) -> Self:

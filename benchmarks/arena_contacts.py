@@ -22,6 +22,7 @@ from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
+from annelid.body.damping import tendons_to_rows
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.output import write_csv
@@ -55,8 +56,9 @@ class StillGround(WormPlant):
     def __init__(self, config: RunConfig, add_ground: Ground) -> None:
         assert config.arena is not None
         assert isinstance(config.body, WormBody)
-        far = Floor(**config.arena.model_dump(include=set(ArenaKind.model_fields)), floor_gap_m=50.0)
-        spec = build_spec(config.model_copy(update={"arena": far}))
+        far = Floor(**config.arena.model_dump(include=set(ArenaKind.model_fields) - {"kind"}), floor_gap_m=50.0)
+        spec = build_spec(config.model_copy(update={"arena": far}), for_plant=True)
+        tendons_to_rows(spec)
         add_ground(spec, config.arena, spec.stat.extent)
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         spec.delete(spec.geom("floor"))

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -90,15 +91,14 @@ def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, comm
 
 
 @pytest.mark.slow
-def test_both_studies_of_slip_share_their_runs(annelid: Command) -> None:
+def test_both_studies_of_slip_keep_their_runs_in_one_folder(annelid: Command) -> None:
     done = annelid("experiment", "slip", "--quick", "-o", "s")
     assert done.exit_code == 0, done.err
     assert done.out.splitlines()[-2:] == [str(Path("s/slip.csv")), str(Path("s/slip.png"))]
     runs = {path.name for path in Path("s/runs").iterdir()}
-    assert len(runs) == 6
     done = annelid("experiment", "slip-detector", "--quick", "-o", "s")
     assert done.exit_code == 0, done.err
-    assert {path.name for path in Path("s/runs").iterdir()} == runs
-    scores = np.genfromtxt("s/slip_detector.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
-    assert np.all(scores["precision"] > 2 * scores["base_rate"]), "far better than a blind guess"
-    assert np.all(scores["recall"] > 0.5)
+    assert {path.name for path in Path("s/runs").iterdir()} > runs, "at frictions that were not drawn"
+    for row in csv.DictReader(Path("s/slip_detector.csv").read_text(encoding="utf-8").splitlines()):
+        assert float(row["precision"]) > 2 * float(row["base_rate"]), "far better than a blind guess"
+        assert float(row["recall"]) > 0.5

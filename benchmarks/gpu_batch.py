@@ -316,6 +316,10 @@ class GpuWorms:
         """Generalised positions, ``(n_worms, nq)``."""
         return self._data.qpos.numpy()
 
+    def iterations(self) -> int:
+        """Iterations of the solver in the last step, of the worm with the most."""
+        return int(self._data.solver_niter.numpy().max())
+
     def overflow(self) -> str:
         """Says whether the device ran out of room for contacts or rows."""
         return f"{int(self._data.nacon.numpy()[0]) / self.n_worms:.0f} contacts, {self._data.nefc.numpy().max()} rows"
@@ -408,7 +412,8 @@ def compare(config: RunConfig, n_steps: int) -> None:
             apart = np.abs(worms.qpos()[0] - plant.qpos).max()
             print(
                 f"step {step}: sensors {1e3 * np.abs(theirs - ours).max():.3g} mm apart (moved "
-                f"{1e3 * np.abs(ours - plant.anatomy.rest_stretch_m).max():.3g} mm), coordinates {apart:.2g}",
+                f"{1e3 * np.abs(ours - plant.anatomy.rest_stretch_m).max():.3g} mm), coordinates {apart:.2g}, "
+                f"iterations {worms.iterations()} and {plant.data.solver_niter[0]}",
                 flush=True,
             )
 

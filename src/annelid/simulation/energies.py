@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.actuators import ActuatorKind
-from annelid.body.damping import RodVertices, Ties, rod_stiffness, twist_joints
+from annelid.body.damping import MaterialDamping, RodVertices, Ties, rod_stiffness, twist_joints
 from annelid.body.worm import WormBody
 from annelid.morphology import Array, cross
 
@@ -90,12 +90,12 @@ class EnergyMeter:
         self.slopes = rings.slopes(model) if implicit else None
         self.motor_power = rings.motor_power(model)
 
-    def step(self, engine: Engine, drive: Array) -> tuple[Array, EnergyTotals]:
+    def step(self, engine: Engine, drive: Array, dampers: MaterialDamping | None = None) -> tuple[Array, EnergyTotals]:
         """Returns the tension of every ring actuator over one step, N, ``(n_muscles,)``, and what the step did.
 
         An actuator's work is its tension times the shortening. Given are the engine's arrays of one worm after the
-        step, and what the actuators' gain was multiplied by during it, ``(n_muscles,)``: the control, or the engine's
-        actuator states before the step where there are any.
+        step, what the actuators' gain was multiplied by during it, ``(n_muscles,)``: the control, or the engine's
+        actuator states before the step where there are any; and the rows that damp this worm's material, if any.
         """
         velocity, h = engine["qvel"], self._timestep_s
         # Rates of the actuators' lengths, m/s, with the lever arms of the step.
@@ -107,8 +107,11 @@ class EnergyMeter:
             tension = tension + per_length * (self._engine_s * rate) + per_rate * (rate - earlier)
         work = -h * tension * rate
         damped, constrained = (-h * (engine[force] @ velocity) for force in ("qfrc_damper", "qfrc_constraint"))
+        # The engine counts the rows of dampers and ties among its constraints.
+        if dampers is not None:
+            loss = h * dampers.loss_W(velocity)
+            damped, constrained = damped + loss, constrained - loss
         if self._ties is not None:
-            # The engine counts them among its constraints.
             springs, dashpots = (h * power for power in self._ties.power_W(engine["qpos"], velocity))
             damped, constrained = damped + dashpots, constrained - dashpots - springs
         taken = np.zeros_like(work) if self.motor_power is None else h * self.motor_power(tension, -rate)

@@ -245,12 +245,7 @@ class Worm(ABC):
             self.two_step.end()
         if self._command is not None:
             self.ctrl[:] = self._command
-        self._tension_N, entries = self.anatomy.energy_meter.step(self.engine, drive)
-        if self.damping is not None:
-            # The engine counts the rows among its constraints.
-            loss = self._config.clock.physics_timestep_s * self.damping.loss_W(self.engine["qvel"])
-            damped, constrained = entries.damping_loss + loss, entries.constraint_loss - loss
-            entries = entries._replace(damping_loss=damped, constraint_loss=constrained)
+        self._tension_N, entries = self.anatomy.energy_meter.step(self.engine, drive, self.damping)
         self.energies = self.energies.plus(entries)
 
     def reset(self, seed: int) -> Sensation:

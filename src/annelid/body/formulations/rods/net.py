@@ -108,14 +108,14 @@ def _add_vertices(
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
     contact = skin_options(arena, geometry, body.relative_frictions, x)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
-    shared = formulation.pins == "shared"
+    tie = formulation.tie
     for crossing in range(geometry.n_crossings):
         name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
         place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
         pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
-        pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if shared else 0.0))
+        pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if tie is None else 0.0))
         mark_crossing(pin, name, body.pins.radius_m, 0.0, ORIGIN)
-        if shared:
+        if tie is None:
             add_touch(pin, body.strands.radius_m, contact[vertex])
             for strand in strands:
                 names[strand][vertex] = name
@@ -123,8 +123,7 @@ def _add_vertices(
         for strand in strands:
             point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
             add_touch(point, body.strands.radius_m, contact[vertex])
-            assert formulation.tie is not None
-            add_tie(spec, name, point.name, formulation.tie)
+            add_tie(spec, name, point.name, tie)
 
     between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
     for strand in range(geometry.n_strands):

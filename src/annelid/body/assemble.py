@@ -18,7 +18,6 @@ from annelid.body.actuation import (
     add_springs,
     stretch_sensors,
 )
-from annelid.body.damping import stiffen
 from annelid.body.elimination import order_elimination
 from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig
@@ -50,10 +49,10 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
 
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
-        for_plant: For a plant of annelid, which prepares every step: dampers whose coefficients follow the posture
-            (`annelid.body.damping`), and where the engine has no one plane for the ground planes that are laid under
-            the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: no dampers,
-            all that is seen, and panels that support the worm in plain MuJoCo.
+        for_plant: For a plant of annelid, which prepares every step: rows whose coefficients follow the posture
+            (`annelid.body.rows`), and where the engine has no one plane for the ground planes that are laid under
+            the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: the
+            engine's rods, all that is seen, and panels that support the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.
@@ -105,7 +104,6 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
         remedy = next((f"{remedy} ({reason})" for words, remedy in _REMEDIES.items() if words in reason), reason)
         raise ConfigError(f"the engine refuses this body: {remedy}") from None
-    stiffen(model)
     order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:
@@ -138,10 +136,6 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
             "the same in both directions: leave it out or run the worm with annelid"
         )
-    lacks = ""
-    if isinstance(config.body, WormBody):
-        formulation, lacks = config.body.formulation.for_mjcf(config.body)
-        config = config.model_copy(update={"body": config.body.model_copy(update={"formulation": formulation})})
     spec = build_spec(config)
     assert isinstance(config.body, WormBody)
     if config.body.strands.stiffness_differs and spec.flexes:
@@ -163,6 +157,7 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
     for keyframe in (*rest, *keyframes):
         spec.add_key(**{name: value for name, value in keyframe.items() if np.size(value)})
     compile_spec(spec)
+    lacks = config.body.formulation.lacks_in_mjcf(config.body)
     if lacks:
         warnings.warn(lacks, stacklevel=2)
     return spec.to_xml()

@@ -14,7 +14,6 @@ from annelid.errors import ConfigError, suggest
 
 RESOLUTION = (
     "body.mesh.elements_per_side",
-    "body.formulation.curvature",
     "body.formulation.friction_impedance_ratio",
     "clock.physics_timestep_s",
     "record.signals_interval_s",

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site
-from annelid.body.damping import tied_bodies
 from annelid.body.formulations.rods.net import STRAND_RGBA
+from annelid.body.rows import tied_bodies
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles

@@ -17,7 +17,7 @@ from annelid.environments.task import Deed, Task, reward_terms
 from annelid.errors import ConfigError
 from annelid.morphology import Array, heading_turn
 from annelid.protocols import SIDES, Sensation
-from annelid.simulation.worm import Worm, body_and_arena
+from annelid.simulation.worm import WormPlant, body_and_arena
 
 Observation = NDArray[np.float32]
 ACTION_SLACK = 1e-6
@@ -121,7 +121,7 @@ class Layout:
         }
 
 
-def layout_of(worm: Worm) -> Layout:
+def layout_of(worm: WormPlant) -> Layout:
     """Returns how a worm's observations are laid out."""
     n, m, sensors = worm.n_segments, worm.n_muscles, worm.anatomy.rest_stretch_m.shape
     ring = "change of a ring muscle's length since the start, of that length"
@@ -161,7 +161,7 @@ class Episode:
         stopped: Why the simulation of the worm broke down; empty while it goes on.
     """
 
-    def __init__(self, task: Task, worm: Worm) -> None:
+    def __init__(self, task: Task, worm: WormPlant) -> None:
         """Puts the worm at its start."""
         body, arena = body_and_arena(task.config)
         self.task = task

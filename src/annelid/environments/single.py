@@ -17,7 +17,7 @@ from annelid.environments.episode import Episode, Layout, Observation
 from annelid.environments.task import COARSE, task_of
 from annelid.errors import ConfigError, SimulationStopped, require_at_least, suggest
 from annelid.protocols import Sensation
-from annelid.simulation.worm import Worm, WormPlant
+from annelid.simulation.worm import WormPlant
 
 PRESET = "riddle2025-muscles"
 INTERVAL_S = 0.12
@@ -83,7 +83,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": round(1 / interval_s) or 1}
         self._pictures = Pictures(render_mode, camera, width, height)
-        self.worm: Worm = WormPlant(self.task.config)
+        self.worm: WormPlant = WormPlant(self.task.config)
         self._episode = Episode(self.task, self.worm)
         self.layout: Layout = self._episode.layout
         self.observation_space = self.layout.space()
@@ -149,7 +149,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._pictures.close()
 
 
-def action_space(worm: Worm) -> Box[np.float32]:
+def action_space(worm: WormPlant) -> Box[np.float32]:
     """Returns the space of actions: an activation for every ring muscle."""
     return Box(0.0, 1.0, (worm.n_muscles,), np.float32)
 

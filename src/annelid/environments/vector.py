@@ -1,8 +1,7 @@
-"""Many worms as one Gymnasium vector environment, stepped by engine batches on a few threads."""
+"""Many worms as one Gymnasium vector environment, stepped on a few threads."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -17,12 +16,12 @@ from annelid.environments import single
 from annelid.environments.episode import Episode, Layout, Observation
 from annelid.environments.single import Pictures, WormEnv, action_space, refuse_options
 from annelid.environments.task import COARSE, Task, task_of
-from annelid.errors import ConfigError, require_at_least, suggest
+from annelid.errors import ConfigError, SimulationStopped, require_at_least, suggest
 from annelid.morphology import Array
 from annelid.protocols import Sensation
 from annelid.simulation.anatomy import Anatomy
-from annelid.simulation.batch import checked_configs, threads_for
-from annelid.simulation.batch_body import BodyBatch, compile_worms
+from annelid.simulation.batch import checked_configs, compile_worms, threads_for
+from annelid.simulation.worm import WormPlant
 
 Flags = NDArray[np.bool_]
 
@@ -87,8 +86,7 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
         self._pictures = Pictures(render_mode, camera, width, height)
         anatomies = compile_worms(checked_configs([task.config for task in self.tasks], None, None))
         shares = np.array_split(np.arange(num_envs), threads_for(num_envs, threads))
-        turn = threading.Lock()
-        self._teams = [_Team(list(map(int, share)), self.tasks, anatomies, turn) for share in shares]
+        self._teams = [_Team(list(map(int, share)), self.tasks, anatomies) for share in shares]
         self._episodes: list[Episode] = [episode for team in self._teams for episode in team.episodes]
         self._pool = ThreadPoolExecutor(len(self._teams)) if len(self._teams) > 1 else None
         first = self._episodes[0]
@@ -204,15 +202,10 @@ class WormVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]):
 class _Team:
     """Worms that one thread steps; the engine does so without Python's lock."""
 
-    def __init__(
-        self, numbers: Sequence[int], tasks: Sequence[Task], anatomies: Sequence[Anatomy], turn: threading.Lock
-    ) -> None:
-        """Builds the bodies of the worms with these numbers; the turn is that of `BodyBatch`."""
-        own = [tasks[number] for number in numbers]
+    def __init__(self, numbers: Sequence[int], tasks: Sequence[Task], anatomies: Sequence[Anatomy]) -> None:
+        """Builds the bodies of the worms with these numbers."""
         self._first = numbers[0]
-        self._turn = turn
-        self._bodies = BodyBatch([task.config for task in own], [anatomies[number] for number in numbers], turn)
-        self.episodes = [Episode(task, worm) for task, worm in zip(own, self._bodies.worms, strict=True)]
+        self.episodes = [Episode(tasks[one], WormPlant(tasks[one].config, anatomies[one])) for one in numbers]
 
     def move(self, ramps: Mapping[int, Array]) -> None:
         """Takes the physics steps of one step of the environment.
@@ -220,18 +213,11 @@ class _Team:
         Given are the activations of every physics step by number of the worm, ``(n_steps, n_muscles)`` each; worms of
         other teams are among them.
         """
-        with self._turn:
-            self._move(ramps)
-
-    def _move(self, ramps: Mapping[int, Array]) -> None:
-        own = {row: ramps[self._first + row] for row in range(len(self.episodes)) if self._first + row in ramps}
-        for k in range(len(next(iter(own.values()), ()))):
-            rows = [row for row in own if not self.episodes[row].stopped]
-            if not rows:
-                return
-            reasons = self._bodies.move(rows, np.stack([own[row][k] for row in rows]), 1)
-            for row, reason in reasons.items():
-                self.episodes[row].stop(reason)
-            going = [row for row in rows if row not in reasons]
-            for row, moved in zip(going, self._bodies.moved(going), strict=True):
-                self.episodes[row].observe(self._bodies.worms[row].strode(1, moved))
+        for row, episode in enumerate(self.episodes, start=self._first):
+            for activation in ramps.get(row, ()):
+                if episode.stopped:
+                    break
+                try:
+                    episode.observe(episode.worm.step(activation))
+                except SimulationStopped as stopped:
+                    episode.stop(str(stopped))

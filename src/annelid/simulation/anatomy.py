@@ -18,11 +18,12 @@ from annelid.arena.geoms import touching
 from annelid.arena.surface import Surface, surface_of
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
-from annelid.body.damping import RodVertices, Ties
+from annelid.body.formulations.rods.strains import RodVertices
+from annelid.body.rows import Ties
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, heading_turn, norm
-from annelid.simulation.energies import Elasticity, EnergyMeter, plastic_at_rest, turned_frames
+from annelid.simulation.energies import Elasticity, EnergyMeter
 from annelid.simulation.objects import Met, Objects, add_scene_sensors, in_scene
 from annelid.simulation.skin import Skin
 
@@ -99,7 +100,7 @@ class Anatomy:
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         has_edges: Whether strands are rods, whose edges may be strained.
         pins_can_part: Whether the two strands of a crossing may part.
-        elasticity: The energy that strands, joints and springs store.
+        elasticity: The energy that joints, springs and ties store.
         energy_meter: What a physics step does, in work.
         outputs: Names of the engine's arrays that `forces` needs.
     """
@@ -131,13 +132,10 @@ class Anatomy:
         self.pins_can_part = self._pin_gap is not None
         tie = body.formulation.tie
         ties = None if tie is None else Ties(model, tie)
-        self.elasticity = Elasticity(model, body, ties)
-        share = body.formulation.engine_share(arena)
-        self.energy_meter = EnergyMeter(model, body.rings, share, ties)
-        # The engine has edge lengths of where its step starts, which under BDF2 is no posture of the worm.
-        self._vertices = RodVertices(model) if self.has_edges and share < 1.0 else None
-        edges = ("flexedge_length" if self._vertices is None else "qpos",) if self.has_edges else ()
-        self.outputs: tuple[str, ...] = ("sensordata", *edges, *pin_outputs)
+        self.elasticity = Elasticity(model, ties)
+        self.energy_meter = EnergyMeter(model, body.rings, ties)
+        self._vertices = RodVertices(model) if self.has_edges else None
+        self.outputs: tuple[str, ...] = ("sensordata", *(("qpos",) if self.has_edges else ()), *pin_outputs)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
         """Crossings along a ring tendon."""
@@ -174,14 +172,12 @@ class Anatomy:
             self.objects.places(data),
         )
 
-    def _edge_lengths_m(self, engine: Mapping[str, Array]) -> Array:
-        """Lengths of all edges, m, ``(n_edges,)``."""
-        if self._vertices is None:
-            return engine["flexedge_length"]
-        edge = np.diff(self._vertices.at(engine["qpos"]), axis=-1)
+    def _edge_strain(self, vertices: RodVertices, qpos: Array) -> Array:
+        """The largest strain of an edge, ``()``."""
+        edge = np.diff(vertices.at(qpos), axis=-1)
         squares = edge * edge
         lengths = np.sqrt(squares[..., 0, :, :] + squares[..., 1, :, :] + squares[..., 2, :, :])
-        return lengths.reshape(*lengths.shape[:-2], -1)
+        return np.abs(lengths.reshape(*lengths.shape[:-2], -1) * self._edges_per_m - 1.0).max(axis=-1)
 
     def posture(self, crossing: Array, center_of_mass: Array, skin: Array, objects: Array) -> Posture:
         """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
@@ -205,8 +201,8 @@ class Anatomy:
         by_geom = by_geom.reshape(*by_geom.shape[:-1], -1, 3)
         contact = self._segment_rows @ by_geom
         strain = gap = np.zeros(contact.shape[:-2])
-        if self.has_edges:
-            strain = np.abs(self._edge_lengths_m(engine) * self._edges_per_m - 1.0).max(axis=-1)
+        if self._vertices is not None:
+            strain = self._edge_strain(self._vertices, engine["qpos"])
         if self._pin_gap is not None:
             gap = self._pin_gap(engine)
         return Forces(contact, strain, gap, self.objects.met(engine)), by_geom.copy()
@@ -221,38 +217,34 @@ class Placed(NamedTuple):
     """A posture in the engine's coordinates."""
 
     qpos: Array  # generalised positions, (nq,)
-    plastic: Array  # what the engine keeps of the rods' frames, (nplastic,)
+    turn: Array  # rotation matrix by which it is turned as a whole from the model at rest, (3, 3)
 
 
-def at_rest(model: mujoco.MjModel) -> Placed:
-    """Returns a worm at rest that leads towards -x."""
-    return Placed(model.qpos0.copy(), plastic_at_rest(model))
-
-
-def laid_down(anatomy: Anatomy, body: WormBody) -> Placed | None:
-    """Returns how a worm lies on its ground at the start, None where that is the model's own rest.
+def laid_down(anatomy: Anatomy, body: WormBody) -> Placed:
+    """Returns how a worm lies on its ground at the start; in the model it leads towards -x.
 
     It is turned to its heading. If its radius differs along it, its axis is level in the model; then it leans until the
     lowest points of its first and its last ring are equally high, and its own lowest point has the height z = 0.
     """
     geometry, radii, rings = anatomy.geometry, body.mesh.radii_m, anatomy.geometry.ring_planes[[0, -1]]
     if len(set(radii)) == 1:
-        heading = body.heading_deg
-        return turned(anatomy.model, at_rest(anatomy.model), heading_turn(heading)) if heading else None
+        if not body.heading_deg:
+            return Placed(anatomy.model.qpos0.copy(), np.eye(3))
+        return turned(anatomy.model, heading_turn(body.heading_deg))
     lean = atan2(radii[0] - radii[-1], float(np.diff(geometry.plane_x_m[rings])[0]))
     turn = np.array([[cos(lean), 0.0, sin(lean)], [0.0, 1.0, 0.0], [-sin(lean), 0.0, cos(lean)]])
     lowest_m = float((geometry.vertices_m @ turn[2]).min())
-    return turned(anatomy.model, at_rest(anatomy.model), heading_turn(body.heading_deg) @ turn, -lowest_m)
+    return turned(anatomy.model, heading_turn(body.heading_deg) @ turn, -lowest_m)
 
 
-def turned(model: mujoco.MjModel, placed: Placed, turn: Array, lifted_m: float = 0.0) -> Placed:
-    """Turns a worm by a rotation matrix, ``(3, 3)``, about the model's origin, which is below its front end at rest.
+def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0) -> Placed:
+    """Turns a worm at rest by a rotation matrix, ``(3, 3)``, about the model's origin, which is below its front end.
 
     The model lies along x, and its state at the start is that of the turned worm. So all that belongs to the body
     (which segment and side a part of the skin is on, the grain of setae, rest lengths) is the same for all headings,
     and worms of several headings may share one compiled model.
     """
-    qpos = placed.qpos.copy()
+    qpos = model.qpos0.copy()
     # Points on three slides along the world's axes.
     slides = model.jnt_type[model.body_jntadr] == int(mujoco.mjtJoint.mjJNT_SLIDE)
     scene = in_scene(model)
@@ -269,4 +261,4 @@ def turned(model: mujoco.MjModel, placed: Placed, turn: Array, lifted_m: float =
         qpos[free : free + 3] = turn @ qpos[free : free + 3]
         qpos[free + 2] += lifted_m
         mujoco.mju_mulQuat(qpos[free + 3 : free + 7], quaternion, qpos[free + 3 : free + 7].copy())
-    return Placed(qpos, turned_frames(model, placed.plastic, turn))
+    return Placed(qpos, turn)

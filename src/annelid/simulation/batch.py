@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
+from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -18,12 +18,12 @@ from annelid.config import RunConfig, as_config, field_value, fields_of
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array, Sensation, State, Stateful, StridingController
 from annelid.simulation.anatomy import Anatomy, Movement
-from annelid.simulation.batch_body import BodyBatch, compile_worms
 from annelid.simulation.lock import locks
 from annelid.simulation.loop import PROGRESS_INTERVAL_S, Loop, RecordedRun
 from annelid.simulation.progress import Interruption, ProgressCallback, reporting
 from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
 from annelid.simulation.stepping import Simulation, build_controller, start
+from annelid.simulation.worm import WormPlant, body_and_arena, compile_worm, owns_model
 
 if TYPE_CHECKING:
     from annelid.control import CopySettings
@@ -118,11 +118,10 @@ def simulate_batch(
     anatomies = compile_worms(own)
     runs: list[RecordedRun] = []
     teams: list[Team] = []
-    turn = threading.Lock()
     try:
         for numbers in np.array_split(np.arange(len(own)), threads_for(len(own), threads)):
             share = slice(int(numbers[0]), int(numbers[-1]) + 1)
-            teams.append(Team(own[share], anatomies[share], folders[share], runs, turn))
+            teams.append(Team(own[share], anatomies[share], folders[share], runs))
     except BaseException as error:
         for run in runs:
             run.end_with(error)
@@ -197,11 +196,27 @@ def threads_for(n_worms: int, threads: int | None) -> int:
     return min(n_worms, threads or os.cpu_count() or 1)
 
 
+def compile_worms(configs: Sequence[RunConfig]) -> list[Anatomy]:
+    """Compiles one model for each physical configuration; returns the anatomy of every worm, as `compile_worm`."""
+    models: dict[str, Anatomy] = {}
+    anatomies: list[Anatomy] = []
+    for config in configs:
+        physical = config.model_dump_json(include={"body", "arena", "clock"}, exclude={"body": {"heading_deg"}})
+        known = models.get(physical)
+        if known is None:
+            known = models[physical] = compile_worm(config)
+        elif owns_model(config):
+            body, arena = body_and_arena(config)
+            known = Anatomy(copy(known.model), body, arena)
+        anatomies.append(known)
+    return anatomies
+
+
 class Team(Loop):
     """Worms that one thread steps, from the start of the run to its end.
 
     The engine steps without Python's lock, so that the networks and files of one team are served while the bodies of
-    another move. Teams take turns at that (`BodyBatch`).
+    another move.
     """
 
     flush_interval_s = 2.0
@@ -213,12 +228,9 @@ class Team(Loop):
         anatomies: Sequence[Anatomy],
         folders: Sequence[Path],
         all_runs: list[RecordedRun],
-        turn: threading.Lock,
     ) -> None:
         """Lays out the worms' run files and adds each run to ``all_runs`` once its file is there."""
-        self._turn = turn
-        self._bodies = BodyBatch(configs, anatomies, turn)
-        worms = self._worms = self._bodies.worms
+        worms = self._worms = [WormPlant(*each) for each in zip(configs, anatomies, strict=True)]
         pairs = zip(configs, worms, strict=True)
         simulations = [start(config, worm, build_controller(config, worm), None) for config, worm in pairs]
         self._controllers = grouped(simulations)
@@ -226,11 +238,6 @@ class Team(Loop):
         for config, simulation, folder in zip(configs, simulations, folders, strict=True):
             all_runs.append(RecordedRun(config, simulation, folder / FILE_NAME))
         super().__init__(all_runs[first:])
-
-    def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
-        """Runs all worms to their end, in turn with other teams."""
-        with self._turn:
-            super().run(interruption, report)
 
     def advance(self, step: int) -> None:
         """Takes control steps up to the next one after which a body moves or something is recorded."""
@@ -268,13 +275,13 @@ class Team(Loop):
 
     def _move(self, n_steps: int, activation: Mapping[int, Array]) -> dict[int, Movement]:
         """Takes physics steps, if any; returns what each of the bodies that could be moved has come to."""
-        rows = list(self.going)
-        if not n_steps or not rows:
-            return {}
-        for row, reason in self._bodies.move(rows, np.stack([activation[row] for row in rows]), n_steps).items():
-            self.drop(row, SimulationStopped(reason))
-        rows = list(self.going)
-        return dict(zip(rows, self._bodies.moved(rows), strict=True))
+        moved: dict[int, Movement] = {}
+        for row in list(self.going) if n_steps else ():
+            try:
+                moved[row] = self._worms[row].move(activation[row], n_steps)
+            except SimulationStopped as stopped:
+                self.drop(row, stopped)
+        return moved
 
 
 @runtime_checkable

@@ -12,9 +12,9 @@ from annelid.morphology import Array, MeshGeometry
 class MovingGround:
     """Lays the planes of `annelid.arena.geoms.add_moving_planes` before every step.
 
-    What approaches the ground finds its plane nearer by as much as it would come in the step: the engine acts on where
-    the skin is before a step, and would stop it a step too late. Planes and friction follow from the engine's positions
-    and velocities alone, so a run continues and a batch computes to the same bits.
+    What approaches the ground finds its plane nearer by as much as it has yet to come in the step: the engine acts on
+    where the skin is, and would stop it a step too late. Planes and friction follow from the engine's positions and
+    velocities alone, so a run continues and a batch computes to the same bits.
 
     Attributes:
         depth_m: Depth of the deepest part of the skin in the ground where planes were laid last, m; negative above it.
@@ -41,10 +41,11 @@ class MovingGround:
         self._mean = np.equal.outer(np.arange(n_planes), geometry.crossing_plane) / geometry.n_per_plane
         self._plane = np.abs(data.geom_xpos[self._skin, :1] - geometry.plane_x_m).argmin(axis=1)
 
-    def lay(self, data: mujoco.MjData) -> None:
+    def lay(self, data: mujoco.MjData, ahead_s: float) -> None:
         """Lays every plane where the ground is nearest to its part of the skin, and sets friction.
 
-        Of the data, positions and velocities are read, and its kinematics are brought up to date.
+        The end of the step is a time ahead, s. Of the data, positions and velocities are read, and its kinematics are
+        brought up to date.
         """
         model = self._model
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
@@ -55,7 +56,7 @@ class MovingGround:
             velocity = drift + np.cross(spin, places - data.subtree_com[self._roots])
             distance, normal = self._surface.nearest(places, first_order=True)
             self.depth_m = -float(np.minimum.reduce(distance))
-            ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * model.opt.timestep
+            ahead = np.maximum(-(velocity * normal).sum(axis=-1), 0.0) * ahead_s
             data.mocap_pos[self._planes] = places - (distance - ahead)[:, np.newaxis] * normal
             data.mocap_quat[self._planes] = facing(normal)
             if self._arena.has_setae:

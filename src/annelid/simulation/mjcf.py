@@ -13,7 +13,7 @@ from annelid.clock import StepRatio
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped, shortened
 from annelid.protocols import Array, Recordable, SavedAndRecorded, Sensation, Signal, State, Values
-from annelid.simulation.worm import ENGINE_WARNINGS, STATE_PARTS, engine_stopped
+from annelid.simulation.worm import ENGINE_WARNINGS, STATE_PARTS
 
 _AFFINE, _MUSCLE = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtGain.mjGAIN_MUSCLE)
 _TENDON, _SITE = int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SITE)
@@ -116,7 +116,7 @@ class MjcfPlant(SavedAndRecorded):
             for _ in range(due):
                 mujoco.mj_step(model, data)
         except mujoco.FatalError as error:
-            raise SimulationStopped(engine_stopped(data.time, error)) from None
+            raise SimulationStopped(f"the engine stopped at {data.time:.3f} s: {error}") from None
         if due:
             # Forces are those of the last step, lengths and places those after it.
             now["muscle_force"][:] = -data.actuator_force[self._actuators] * self._gear

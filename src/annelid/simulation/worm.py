@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import logging
-from abc import ABC, abstractmethod
 from operator import attrgetter
 from typing import Any, cast
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.arena.course import LEFT
 from annelid.arena.surface import Plane, surface_of
 from annelid.body import build_spec, compile_spec
-from annelid.body.damping import MaterialDamping, tendons_to_rows
+from annelid.body.formulations.rods.strains import RodStrains, net_stiffness
+from annelid.body.rows import tendons_to_rows
 from annelid.body.worm import WormBody
 from annelid.clock import StepRatio
 from annelid.config import ArenaKind, RunConfig
@@ -23,7 +22,7 @@ from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
 from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, laid_down
-from annelid.simulation.energies import EnergyTotals, Engine
+from annelid.simulation.energies import EnergyTotals, Powers, done_in
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.objects import NOTHING
 from annelid.simulation.skin import Touch
@@ -31,8 +30,7 @@ from annelid.simulation.two_step import TwoStep
 from annelid.simulation.watch import Energies, Watch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""All that the next step depends on: positions, velocities, activations, warm start, and the rods' frames
-(which the engine keeps as "plastic" state)."""
+"""All that the engine's next step depends on: positions, velocities, activations, warm start."""
 _log = logging.getLogger(__name__)
 # Otherwise the engine prints its warnings and writes them to a file in the user's folder; `alarm` reports them.
 mujoco.set_mju_user_warning(lambda message: _log.info("%s", message))
@@ -91,11 +89,6 @@ _FRAME_SIGNALS = {
 }
 
 
-def engine_stopped(time_s: float, error: object) -> str:
-    """Returns the sentence for an engine that gave up at a simulated time, s."""
-    return f"the engine stopped at {time_s:.3f} s: {error}"
-
-
 def body_and_arena(config: RunConfig) -> tuple[WormBody, ArenaKind]:
     """Returns body and arena of a configuration that is of a 3D worm."""
     assert isinstance(config.body, WormBody)
@@ -121,44 +114,36 @@ def compile_worm(config: RunConfig) -> Anatomy:
 def owns_model(config: RunConfig) -> bool:
     """Whether a worm sets numbers in its compiled model as it moves, which no other worm may use then."""
     body, arena = body_and_arena(config)
-    return arena.has_setae or _has_damper_rows(body)
+    return arena.has_setae or body.formulation.has_rods
 
 
-def _has_damper_rows(body: WormBody) -> bool:
-    return body.formulation.damps_material and bool(body.strands.material_damping_s)
-
-
-class Worm(ABC):
-    """What a 3D worm senses, records and is alarmed by, whoever steps it.
+class WormPlant:
+    """The 3D worm in its arena: what it senses, records and is alarmed by, with an engine of its own.
 
     Lengths and positions are those at the end of the step; forces are those that acted during the last physics step,
-    since the engine computes them before it moves the body. Edge strains are those at the end of a step of second order
-    and at the start of one of first order; gaps of pins those at the end, and of a chain those at the start.
+    since the engine computes them before it moves the body. Edge strains are those at the end of a step; gaps of pins
+    those at the end, and of a chain those at the start.
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.
         model: The compiled body in the engine.
+        data: The engine's data.
         geometry: The mesh.
         n_segments: Number of actuated segments.
         n_muscles: Number of ring muscles.
         total_mass_kg: Mass of strands and pins.
-        start: Where it starts; None for the model's own rest, which leads towards -x.
+        start: Where it starts.
+        posture: Where the body is.
+        strains: Bending and twist of its rods; None for a chain.
+        two_step: What steps its rods; None for a chain.
+        touch: What the skin senses of the ground, and how far it has slid.
+        energies: What the muscles have done so far, and where it went.
     """
 
-    qpos: Array  # the engine's generalised positions, (nq,)
-    plastic: Array  # what the engine keeps of the rods' frames, (nplastic,)
-    act: Array  # the engine's actuator states, (n_states,)
-    ctrl: Array  # the engine's controls, (n_muscles,)
-    engine: Engine  # the engine's arrays that a step is read from
-    warned: NDArray[np.int32]  # how often the engine has given each of its warnings
-    posture: Posture  # where the body is
-    two_step: TwoStep | None  # how a step of second order starts; None for those of first order
-    touch: Touch  # what the skin senses of the ground, and how far it has slid
-    energies: EnergyTotals  # what the muscles have done so far, and where it went
-
-    def __init__(self, config: RunConfig, anatomy: Anatomy) -> None:
-        """Makes a worm that has sensed nothing yet."""
-        self.anatomy, self.model, self.geometry = anatomy, anatomy.model, anatomy.geometry
+    def __init__(self, config: RunConfig, anatomy: Anatomy | None = None) -> None:
+        """Builds and compiles the body, unless it is compiled already; raises as `compile_worm`."""
+        self.anatomy = anatomy = anatomy or compile_worm(config)
+        self.model, self.geometry = anatomy.model, anatomy.geometry
         self.n_segments, self.n_muscles = anatomy.n_segments, anatomy.n_muscles
         self.total_mass_kg = anatomy.total_mass_kg
         self._config = config
@@ -169,96 +154,123 @@ class Worm(ABC):
         self._height_words = (
             "distance of a crossing from the pipe's wall" if arena.is_closed else "height of a crossing"
         )
-        moving = arena.has_moving_planes
-        self.ground = MovingGround(anatomy.model, anatomy.geometry, arena) if moving else None
-        self.damping = MaterialDamping(anatomy.model, body.strands) if _has_damper_rows(body) else None
         # What needs no moving planes is level.
         self._floor = cast(Plane, arena.ground())
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
-        # By how much a physics step is longer than the engine's.
-        self.beyond_s = config.clock.physics_timestep_s - float(anatomy.model.opt.timestep)
+        self._step_s = config.clock.physics_timestep_s
         self._activation: Array = np.zeros(anatomy.n_muscles)
+        data = self.data = mujoco.MjData(self.model)
+        self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
+        names = (*anatomy.outputs, *anatomy.energy_meter.outputs)
+        self.engine = {name: getattr(data, name) for name in names}
         self.start = laid_down(anatomy, body)
+        self.strains: RodStrains | None = None
+        self.two_step: TwoStep | None = None
+        if body.formulation.has_rods:
+            stiffness = net_stiffness(self.geometry, body.strands)
+            self.strains = RodStrains(self.model, stiffness, body.strands.damping_time_s or 0.0)
+            first_order = body.formulation.engine_share(arena) == 1.0
+            self.two_step = TwoStep(self.model, data, self.strains, first_order=first_order)
+        moving = arena.has_moving_planes
+        self.ground = MovingGround(self.model, self.geometry, arena) if moving else None
+        # What the predicted end of a step has yet to move is nothing.
+        self._ahead_s = 0.0 if self.two_step is not None else self._step_s
+        if config.trial is not None:
+            ring = self.geometry.rings[self.n_segments // 2]
+            self._pushed_N = np.zeros((len(anatomy.crossing_body), 3))
+            self._pushed_N[ring] = config.trial.push_N / len(ring) * (heading_turn(body.heading_deg) @ LEFT)
+        self.reset(0)
 
     @property
     def _time_s(self) -> float:
         return self._control_step * self._config.clock.control_timestep_s
 
-    @abstractmethod
-    def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
-
-    @abstractmethod
     def kinetic_energy_J(self) -> float:
         """Kinetic energy of the whole body and of what moves in a scene, J.
 
         A chain's includes its numerical joint inertia.
         """
-
-    @abstractmethod
-    def _reset_engine(self, state: Array | None = None) -> None:
-        """Resets the engine, and gives it a state that `_engine_state` returned if there is one."""
-
-    @abstractmethod
-    def _engine_state(self) -> Array:
-        """Returns a copy of all that the engine's next step depends on, as `STATE_PARTS` names it."""
-
-    @abstractmethod
-    def _locate(self) -> Posture:
-        """Reads the posture from the engine's coordinates."""
+        mujoco.mj_energyVel(self.model, self.data)
+        return float(self.data.energy[1])
 
     def elastic_energy_J(self) -> float:
         """Energy that strands, joints and springs store, J."""
-        return self.anatomy.elasticity.energy_J(self.qpos, self.plastic, self.posture.spring_length)
+        energy = self.anatomy.elasticity.energy_J(self.qpos, self.posture.spring_length)
+        return energy if self.strains is None else energy + self.strains.energy_J(self.qpos)
 
     def potential_energy_J(self) -> float:
         """Energy of the weight, also of what moves in a scene, J; zero with the centres of mass at the origin."""
         own = -self.total_mass_kg * float(self.model.opt.gravity @ self.posture.center_of_mass)
         return own + self.anatomy.objects.potential_energy_J(self.posture.objects)
 
-    def control(self, activation: Array, n_steps: int) -> Array:
-        """Returns the engine's control during the next physics steps under an activation, ``(n_muscles,)``."""
+    def move(self, activation: Array, n_steps: int) -> Movement:
+        """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
+        trial, rings = self._config.trial, self.anatomy.rings
         self._activation = activation
-        time_s = n_steps * self._config.clock.physics_timestep_s
-        return self.anatomy.rings.drive(self.model, activation, self.act, self.posture.ring_length, time_s)
+        if trial is not None and trial.push_N:
+            pushed = trial.push_from_s <= self._time_s < trial.push_from_s + trial.push_s
+            self.push(self._pushed_N if pushed else np.zeros_like(self._pushed_N))
+        try:
+            for _ in range(n_steps):
+                # What the actuators have come to at the end of a step acts in it.
+                lengths = self.posture.ring_length
+                self.act[:] = rings.states_after(self.model, activation, self.act, lengths, self._step_s)
+                self.ctrl[:] = rings.control(activation, self.act)
+                self._take_step(self.act.copy() if self.model.na else activation)
+        except mujoco.FatalError as error:
+            raise SimulationStopped(f"the engine stopped at {self.data.time:.3f} s: {error}") from None
+        # Gaps of a chain's pins are read before positions are brought up to the end of the step.
+        forces, ground = self.anatomy.forces(self.engine)
+        return Movement(self.posture, forces, ground)
 
-    def begin_step(self) -> None:
-        """Moves the state to where the engine's step starts."""
-        if self.two_step is not None:
-            self.two_step.begin()
+    def _take_step(self, drive: Array) -> None:
+        """Takes one physics step, with what the actuators' gain is multiplied by, and adds it to the energy totals."""
+        rods = (0.0, 0.0)
+        if self.two_step is None or self.strains is None:
+            self._prepare()
+            mujoco.mj_step(self.model, self.data)
+        else:
+            self.two_step.step(self._prepare)
+            # The engine's step is shorter than the whole.
+            self.data.time += self._step_s - self.model.opt.timestep
+            force, rate = self.two_step.rows()
+            rods = self.strains.loss_W(rate), -float(force @ rate)
+        powers = self.anatomy.energy_meter.read(self.engine, drive, rods)
+        before, self.posture = self.posture, self._locate()
+        shortening = before.ring_length - self.posture.ring_length
+        self.energies = self.energies.plus(done_in(self._step_s, shortening, self._powers, powers))
+        self._powers = powers
 
-    def drive(self, activation: Array) -> Array:
-        """Returns what the gain of the actuators is multiplied by during the next physics step, ``(n_muscles,)``.
+    def _prepare(self) -> None:
+        """Lays the ground under the skin where the engine has it now."""
+        if self.ground is not None:
+            self.ground.lay(self.data, self._ahead_s)
 
-        Moves on the states of actuators that follow an activation with a lag, before `begin_step` takes note of them.
+    def push(self, force_N: Array) -> None:
+        """Lets outside forces, N, ``(n_crossings, 3)``, act on the crossings from the next step on; zeros end it.
+
+        They are in the model's axes, and the energy totals know nothing of their work.
         """
-        lagged = self.anatomy.rings.lagged(activation, self.act, self._config.clock.physics_timestep_s)
-        self._command = None if lagged is None else self.ctrl.copy()
-        if lagged is not None:
-            # At its end. The engine's own lag leaves a state alone that is the control.
-            self.act[:] = self.ctrl[:] = lagged
-        return self.act.copy() if self.model.na else activation
+        self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
 
-    def add_step(self, drive: Array) -> None:
-        """Adds the physics step that was taken to the energy totals, with what `drive` returned before it."""
-        if self.two_step is not None:
-            self.two_step.end()
-        if self._command is not None:
-            self.ctrl[:] = self._command
-        self._tension_N, entries = self.anatomy.energy_meter.step(self.engine, drive, self.damping)
-        self.energies = self.energies.plus(entries)
+    @property
+    def _tension_N(self) -> Array:
+        return self._powers.tension
 
     def reset(self, seed: int) -> Sensation:
         """Returns to the rest posture at time zero; nothing in the body is random, so ``seed`` changes nothing."""
         n = self.n_segments
-        self._reset_engine()
-        if self.two_step is not None:
+        mujoco.mj_resetData(self.model, self.data)
+        self.act[:] = self.anatomy.first_act
+        self.qpos[:] = self.start.qpos
+        if self.two_step is not None and self.strains is not None:
+            self.strains.place(self.qpos, self.start.turn)
             self.two_step.rest()
         self._control_step = 0
         nothing = NOTHING._replace(force=np.zeros((len(self.anatomy.objects.names), 3)))
         self._forces = Forces(np.zeros((n, 3)), np.zeros(()), np.zeros(()), nothing)
         self.energies = EnergyTotals.zero(self.n_muscles)
-        self._tension_N = np.zeros(self.n_muscles)
+        self._powers = Powers.none(self.n_muscles)
         self.touch = Touch.none(n)
         self.posture = self._locate()
         self._watch = Watch(self._body, self.geometry, self._config.guard)
@@ -368,12 +380,6 @@ class Worm(ABC):
         held = self.elastic_energy_J() - self._elastic_at_start_J + self.kinetic_energy_J()
         return Energies(work + max(0.0, sunk), work + sunk - held - lost)
 
-    def _two_step(self) -> TwoStep | None:
-        """Makes what the steps of second order need, of a worm whose engine is there."""
-        if self.beyond_s == 0.0 or self.damping is None:
-            return None
-        return TwoStep(self.model, self.qpos, self.engine["qvel"], self.act, self._body.strands, self.damping)
-
     def recordable(self) -> Recordable:
         """Names the signals of the body, and gives its mass and length as attributes."""
         anatomy = self.anatomy
@@ -404,10 +410,13 @@ class Worm(ABC):
     def get_state(self) -> State:
         """Returns the engine's whole state and what was sensed last."""
         forces = self._forces
+        engine = np.empty(mujoco.mj_stateSize(self.model, STATE_PARTS))
+        mujoco.mj_getState(self.model, self.data, engine, STATE_PARTS)
         return {
-            "engine": self._engine_state(),
+            "engine": engine,
             "control_step": np.array([self._control_step]),
-            "muscle_force": self._tension_N.copy(),
+            "muscle_force": self._powers.tension.copy(),
+            "powers": np.array([self._powers.damping, self._powers.constraint, *self._powers.motor]),
             "contact_force": forces.contact.copy(),
             "extremes": np.array([forces.edge_strain, forces.pin_gap]),
             **{name: np.array(total) for name, total in self.energies._asdict().items()},
@@ -419,12 +428,14 @@ class Worm(ABC):
 
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned; the run then continues bit for bit on the same machine."""
-        self._reset_engine(np.asarray(state["engine"], dtype=float))
+        mujoco.mj_setState(self.model, self.data, np.asarray(state["engine"], dtype=float), STATE_PARTS)
         if self.two_step is not None:
             self.two_step.set_state(state)
         self._control_step = int(state["control_step"][0])
         strain, gap = np.asarray(state["extremes"], dtype=float)
-        self._tension_N = np.array(state["muscle_force"], dtype=float)
+        damping, constraint, *motor = np.asarray(state["powers"], dtype=float).tolist()
+        tension = np.array(state["muscle_force"], dtype=float)
+        self._powers = Powers(tension, damping, constraint, np.array(motor))
         met = NOTHING
         if self._is_scene:
             met = NOTHING._replace(force=np.array(state["object_force"], dtype=float))
@@ -433,75 +444,6 @@ class Worm(ABC):
         self.touch = Touch.of_state(state)
         self._watch.set_state(state)
         self.posture = self._locate()
-
-
-class WormPlant(Worm):
-    """The 3D worm in its arena, with an engine of its own."""
-
-    def __init__(self, config: RunConfig, anatomy: Anatomy | None = None) -> None:
-        """Builds and compiles the body, unless it is compiled already; raises as `compile_worm`."""
-        super().__init__(config, anatomy or compile_worm(config))
-        data = self.data = mujoco.MjData(self.model)
-        self.qpos, self.plastic, self.act, self.ctrl = data.qpos, data.plastic, data.act, data.ctrl
-        self.warned = data.warning.number
-        names = (*self.anatomy.outputs, *self.anatomy.energy_meter.outputs)
-        self.engine = {name: getattr(data, name) for name in names}
-        self.two_step = self._two_step()
-        if config.trial is not None:
-            ring = self.geometry.rings[self.n_segments // 2]
-            self._pushed_N = np.zeros((len(self.anatomy.crossing_body), 3))
-            self._pushed_N[ring] = config.trial.push_N / len(ring) * (heading_turn(self._body.heading_deg) @ LEFT)
-        self.reset(0)
-
-    def move(self, activation: Array, n_steps: int) -> Movement:
-        """Takes physics steps with this worm's own engine, as `Worm.move`."""
-        data = self.data
-        data.ctrl[:] = self.control(activation, n_steps)
-        trial = self._config.trial
-        if trial is not None and trial.push_N:
-            pushed = trial.push_from_s <= self._time_s < trial.push_from_s + trial.push_s
-            self.push(self._pushed_N if pushed else np.zeros_like(self._pushed_N))
-        try:
-            for _ in range(n_steps):
-                drive = self.drive(activation)
-                self.begin_step()
-                if self.ground is not None:
-                    self.ground.lay(data)
-                if self.damping is not None:
-                    self.damping.renew(self.qpos)
-                mujoco.mj_step(self.model, data)
-                data.time += self.beyond_s
-                self.add_step(drive)
-        except mujoco.FatalError as error:
-            raise SimulationStopped(engine_stopped(self.data.time, error)) from None
-        # Gaps of a chain's pins are read before positions are brought up to the end of the step.
-        forces, ground = self.anatomy.forces(self.engine)
-        return Movement(self._locate(), forces, ground)
-
-    def push(self, force_N: Array) -> None:
-        """Lets outside forces, N, ``(n_crossings, 3)``, act on the crossings from the next step on; zeros end it.
-
-        They are in the model's axes, and the energy totals know nothing of their work.
-        """
-        self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
-
-    def kinetic_energy_J(self) -> float:
-        """Kinetic energy of the whole body, J (the chain's includes its numerical joint inertia)."""
-        mujoco.mj_energyVel(self.model, self.data)
-        return float(self.data.energy[1])
-
-    def _reset_engine(self, state: Array | None = None) -> None:
-        mujoco.mj_resetData(self.model, self.data)
-        self.act[:] = self.anatomy.first_act
-        if self.start is not None:
-            self.qpos[:], self.plastic[:] = self.start
-        if state is not None:
-            mujoco.mj_setState(self.model, self.data, state, STATE_PARTS)
-
-    def _engine_state(self) -> Array:
-        state = np.empty(mujoco.mj_stateSize(self.model, STATE_PARTS))
-        mujoco.mj_getState(self.model, self.data, state, STATE_PARTS)
-        return state
 
     def _locate(self) -> Posture:
         return self.anatomy.posture(*self.anatomy.locate(self.data))

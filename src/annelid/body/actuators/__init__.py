@@ -120,27 +120,20 @@ class ActuatorKind(Kind):
         """Returns the actuator states of a written model's keyframe at rest; empty where there are none to set."""
         return np.zeros(0)
 
-    def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
-        """Returns the engine's control under an activation: the activation itself unless the kind says otherwise.
+    def states_after(
+        self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float
+    ) -> Array:
+        """Returns the engine's actuator states after a time under an activation; as they are unless the kind says so.
 
         Args:
             model: The compiled body.
             activation: In [0, 1], ``(n_muscles,)``.
-            state: The engine's actuator states, ``(n_states,)``.
+            state: The states before that time, ``(n_states,)``.
             length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
-            time_s: Time for which it is applied, s.
-
-        Returns:
-            Shape ``(n_muscles,)``.
-        """
-        return activation
-
-    def lagged(self, activation: Array, state: Array, time_s: float) -> Array | None:
-        """Returns the states of actuators that follow an activation with a lag, after a time; None for all others.
-
-        Args:
-            activation: In [0, 1], ``(n_muscles,)``, during that time.
-            state: The states before it, ``(n_states,)``.
             time_s: The time, s.
         """
-        return None
+        return state
+
+    def control(self, activation: Array, state: Array) -> Array:
+        """Returns the engine's control, ``(n_muscles,)``, that leaves the states alone during a step."""
+        return activation

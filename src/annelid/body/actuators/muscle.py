@@ -58,14 +58,16 @@ class Rings(ActuatorKind):
         """The section itself."""
         return self
 
-    def lagged(self, activation: Array, state: Array, time_s: float) -> Array | None:
-        """Returns what acts of an activation, as `ActuatorKind.lagged`: the engine's lag, integrated exactly.
+    def states_after(
+        self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float
+    ) -> Array:
+        """Returns what acts of an activation after a time: the engine's lag, integrated exactly.
 
         It is ``(activation - state) / time``, with a time of ``rise (0.5 + 1.5 state)`` or ``fall / (0.5 + 1.5 state)``
         (Millard et al. 2013, as MuJoCo has it). In the engine's own steps of first order it is stable below 10 ms only.
         """
         if not self.activation_dynamics:
-            return None
+            return state
         from scipy.special import lambertw
 
         rise_s, fall_s = ACTIVATION_TIMES_S
@@ -74,6 +76,10 @@ class Rings(ActuatorKind):
         rising = scale / 1.5 * lambertw(-share * np.exp(-share - time_s / (rise_s * scale))).real
         left = (state - activation).clip(0.0) / (0.5 + 1.5 * state) * np.exp(-scale * time_s / fall_s)
         return np.where(lack > 0.0, activation + rising, (activation + 0.5 * left) / (1.0 - 1.5 * left))
+
+    def control(self, activation: Array, state: Array) -> Array:
+        """Returns the activation that acts, with a lag or at once."""
+        return state if self.activation_dynamics else activation
 
     def findings(self, body: WormBody) -> Iterator[Finding]:
         """Checks the muscles' lengths without force against the ring at rest, and their force against the mesh."""

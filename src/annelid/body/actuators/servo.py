@@ -76,7 +76,7 @@ class ServoRings(ActuatorKind):
         return wrap_factors(self.cable_friction or 0.0)
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
-        """Adds a cable whose slack length is the engine's state: its rate is the control, `drive`."""
+        """Adds a cable whose slack length is the engine's state, and its rate the control."""
         import mujoco
 
         stiffness, speed = self.stiffness_N_per_m, self.speed_limit_m_per_s
@@ -130,25 +130,30 @@ class ServoRings(ActuatorKind):
         """Returns the slack lengths of cables that are paid out, m."""
         return np.array([actuator.actrange[1] for actuator in spec.actuators])
 
-    def drive(self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float) -> Array:
-        """Returns the rate at which the slack lengths of the cables, the states, change, m/s: negative while they wind.
+    def states_after(
+        self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float
+    ) -> Array:
+        """Returns the slack lengths of the cables, m, after a time.
 
-        Towards the commanded length, up to half the backlash from it, but never so short that the tension at rest would
-        exceed the force limit: a stalled servo does not wind on, gives way to what pulls harder, and lets go at once
-        when it is commanded to. The rate is applied for a time, so that a cable does not overshoot the length that it
-        is wound to.
+        A cable winds towards the commanded length, up to half the backlash from it, but never so short that its tension
+        would exceed the force limit: a stalled servo does not wind on, gives way to what pulls harder, and lets go at
+        once when it is commanded to.
         """
         (shortest, longest), limits_N = model.actuator_actrange.T, -model.actuator_forcerange[:, 0]
         commanded, play = longest + activation * (shortest - longest), 0.5 * self.backlash_m
         if play:
             commanded = state.clip(commanded - play, commanded + play)
         stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
-        rate = (np.maximum(commanded, stalled) - state) / time_s
         speed = winding = self.speed_limit_m_per_s
         if self.no_load_speed_m_per_s is not None:
             share = (self.stiffness_N_per_m * (length_m - state) / limits_N).clip(0.0, 1.0)
             winding = np.minimum(speed, self.no_load_speed_m_per_s * (1.0 - share))
-        return np.minimum(np.maximum(rate, -winding), speed)
+        aim = np.maximum(commanded, stalled) - state
+        return (state + np.minimum(np.maximum(aim, -winding * time_s), speed * time_s)).clip(shortest, longest)
+
+    def control(self, activation: Array, state: Array) -> Array:
+        """Returns the rates of the slack lengths during a step, none: they are those at its end already."""
+        return np.zeros_like(state)
 
 
 def wrap_factors(friction: float) -> tuple[float, float]:

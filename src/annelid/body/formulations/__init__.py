@@ -61,13 +61,13 @@ class FormulationKind(Kind):
 
     Attributes:
         is_papers: Whether it is the paper's own, which other formulations are compared with.
-        damps_material: Whether its model has the rows of `annelid.body.damping`.
+        has_rods: Whether strands are rods, whose rows a plant renews (`annelid.body.formulations.rods.strains`).
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("body.formulation.kind", "annelid.body.formulations")
     default: ClassVar[str] = "rods"
     is_papers: ClassVar[bool] = False
-    damps_material: ClassVar[bool] = False
+    has_rods: ClassVar[bool] = False
 
     def engine_share(self, arena: ArenaKind) -> float:
         """Length of the engine's step over the physics step of a plant: 1, or `BDF2_SHARE` (`simulation.two_step`)."""
@@ -78,9 +78,9 @@ class FormulationKind(Kind):
     def step_cost_ms(self) -> float:
         """About how long a step of three segments with three elements a side takes, ms."""
 
-    def for_mjcf(self, body: WormBody) -> tuple[Self, str]:
-        """Returns the section of a body that an MJCF file can hold, with a sentence on what the file lacks, or ""."""
-        return self, ""
+    def lacks_in_mjcf(self, body: WormBody) -> str:
+        """Returns a sentence on how a body differs from its model in an MJCF file, or ""."""
+        return ""
 
     @property
     def has_rigid_crossings(self) -> bool:

@@ -16,9 +16,9 @@ import numpy as np
 
 from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.damping import add_row
 from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.formulations.rods.net import AXES, STRAND_RGBA, add_touch
+from annelid.body.rows import add_row
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry

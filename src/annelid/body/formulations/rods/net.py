@@ -5,9 +5,8 @@ no constraint and cannot part. Each strand is a 1D flex through its vertices' bo
 bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
-Two options go beyond the engine's rods (`annelid.body.damping`). Separate pins are point masses tied to a vertex of
-each strand by springs and dashpots. A material's damping time is completed, since the engine damps a curved vertex in
-the plane of its bend alone.
+A plant has rows for bending and twist in place of the engine's (`annelid.body.formulations.rods.strains`). Separate
+pins are point masses tied to a vertex of each strand by springs and dashpots (`annelid.body.rows`).
 """
 
 from __future__ import annotations
@@ -21,15 +20,9 @@ import numpy as np
 
 from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.damping import (
-    add_dampers,
-    add_held_coordinate,
-    add_holder,
-    add_tie,
-    shares_name,
-    twist_name,
-)
-from annelid.body.formulations import densities_kg_per_m, stiffness_shares
+from annelid.body.formulations import densities_kg_per_m
+from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
+from annelid.body.rows import add_holder, add_tie
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
@@ -47,12 +40,9 @@ TWIST_MASS_KG = 1e-9
 
 
 def add_rods(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: ArenaKind, *, dampers: bool
+    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: ArenaKind, *, for_plant: bool
 ) -> None:
-    """Adds the mesh as a net of rods, and the solver settings that it needs, as `FormulationKind.add`.
-
-    ``dampers`` are for a plant that lets the dampers of bending follow the posture; without that they would mislead.
-    """
+    """Adds the mesh as a net of rods, and the solver settings that it needs, as `FormulationKind.add`."""
     # The one combination under which stiff rods are stable: implicit in position, with Newton.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -61,37 +51,15 @@ def add_rods(
     spec.option.impratio = formulation.friction_impedance_ratio
     # The net is one island; looking for others takes 3 % of a step.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
-    density, shares = densities_kg_per_m(geometry, body.strands), stiffness_shares(geometry, body.strands)
-    if formulation.curvature == "linear":
-        shares *= curvature_weights(geometry)
+    density = densities_kg_per_m(geometry, body.strands)
     names = _add_vertices(spec, geometry, body, formulation, arena, density)
     material = body.strands.of_segment(0)
+    stiffness = net_stiffness(geometry, body.strands)
     for strand, (vertices_m, bodies) in enumerate(zip(geometry.vertices_m, names, strict=True)):
-        options = {"rgba": STRAND_RGBA[strand // geometry.n_per_plane], "dampers": dampers}
-        own = {"density_kg_per_m": density, "shares": shares[:, strand]}
-        add_rod(spec, f"strand_{strand}", vertices_m, bodies, material, formulation, **own, **options)
-
-
-def curvature_weights(geometry: MeshGeometry) -> Array:
-    """How stiff the vertices of strands are if curvature is linear from crossing to crossing.
-
-    So forces at crossings bend a strand. By how much a force at one of them moves another is, of a beam, the integral
-    of a product of two bending moments over the rigidity, and of a rod a sum over its vertices. Between crossings the
-    product is a quadratic, and the sum is the integral if compliances are weighted as in Simpson's rules: with n
-    elements a side by n / (n + 1) at a crossing and by n^2 / (n^2 - 1) between. With equal compliances, moments that
-    change their sign from crossing to crossing bend a rod of two elements 1.5 times too far. The same holds for twist.
-
-    Returns:
-        Stiffness at every inner vertex over that of the engine, ``(n_vertices - 2,)``; 1 in free ends, which nothing
-        bends, and with one element a side.
-    """
-    crossing = geometry.crossing_vertex
-    n = int(crossing[1] - crossing[0])
-    weights = np.ones(geometry.vertices_m.shape[1])
-    if n > 1:
-        weights[crossing[0] + 1 : crossing[-1]] = 1.0 - 1.0 / n**2
-        weights[crossing[1:-1]] = 1.0 + 1.0 / n
-    return weights[1:-1]
+        rgba = STRAND_RGBA[strand // geometry.n_per_plane]
+        rows = stiffness[:, strand] if for_plant else None
+        options = {"rgba": rgba, "density_kg_per_m": density, "stiffness_Nm": rows}
+        add_rod(spec, f"strand_{strand}", vertices_m, bodies, material, formulation, **options)
 
 
 def _add_vertices(
@@ -189,55 +157,43 @@ def add_rod(
     formulation: Rods,
     *,
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
-    clamped: bool = False,
-    dampers: bool = True,
     density_kg_per_m: Array | None = None,
-    shares: Array | None = None,
+    stiffness_Nm: Array | None = None,
 ) -> None:
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
     Args:
-        spec: The spec that has the bodies.
+        spec: The spec that has the bodies, each on slides.
         name: Name of the flex; the twist hinges are named after it.
         vertices_m: Rest positions, shape ``(n_vertices, 3)``.
-        bodies: Body of each vertex, at the vertex's place; "world" fixes the vertex.
+        bodies: Body of each vertex, at the vertex's place.
         strands: Material.
         formulation: Settings of the inextensible edges.
         rgba: Colour.
-        clamped: The first two vertices belong to one body (a cantilever): their edge has no twist hinge.
-        dampers: As of `add_rods`.
         density_kg_per_m: Mass per length of every edge, ``(n_edges,)``, instead of the material's.
-        shares: Stiffness at every inner vertex over the material's, in bending and in twist, ``(2, n_edges - 1)``; then
-            the model is to be compiled by `annelid.body.compile_spec`.
+        stiffness_Nm: Of the rows that resist bending and twist, ``(3, n_edges - 1)``, for a plant that renews them
+            (`RodStrains`); None for the engine's own elasticity, one for the whole rod.
     """
     lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
     n_edges = len(lengths)
     if density_kg_per_m is None:
         density_kg_per_m = np.full(n_edges, strands.one_number("linear_density_kg_per_m"))
-    if shares is None:
-        shares = np.ones((2, n_edges - 1))
-    if (shares != 1.0).any():
-        spec.add_numeric(name=shares_name(name), data=shares.ravel())
-    joint = strands.bending_rigidity_Nm2 / float(lengths.mean())
     flex = spec.add_flex(
         name=name,
         dim=1,
         radius=strands.radius_m,
-        young=strands.one_number("young_modulus_Pa"),
-        shear=strands.one_number("shear_modulus_Pa"),
-        damping=strands.joint_damping(joint) / joint,
         rgba=rgba,
         selfcollide=0,
         contype=0,
         conaffinity=0,
     )
+    if stiffness_Nm is None:
+        flex.young, flex.shear = strands.one_number("young_modulus_Pa"), strands.one_number("shear_modulus_Pa")
+        flex.damping = strands.damping_time_s
     flex.vertbody = bodies
-    fixed = np.array([body == "world" for body in bodies])
-    if fixed.any():
-        flex.vert = np.where(fixed[:, None], vertices_m, 0.0).ravel()
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
     with _built_apart(spec, f"{name}_") as part:
-        for edge in range(1 if clamped else 0, n_edges):
+        for edge in range(n_edges):
             hinge = twist_name(name, edge, n_edges).removeprefix(f"{name}_")
             inertia = 0.5 * density_kg_per_m[edge] * lengths[edge] * strands.radius_m**2
             holder = add_holder(part, hinge, TWIST_MASS_KG, inertia)
@@ -250,10 +206,8 @@ def add_rod(
         solref=[formulation.edge_time_constant_s, 1.0],
         solimp=EDGE_IMPEDANCE,
     )
-    if strands.material_damping_s:
-        add_held_coordinate(spec)
-        if dampers:
-            add_dampers(spec, name, vertices_m, bodies, strands, shares[0], clamped=clamped)
+    if stiffness_Nm is not None:
+        add_strains(spec, name, bodies, stiffness_Nm, strands.damping_time_s)
 
 
 def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float | Array) -> Array:

@@ -8,9 +8,11 @@ The engine's step of length 2 h / 3 from the state ``(4 q - q_before) / 3``, ``(
 with forces and constraints that are linear in what is solved for. It takes them along the directions of its starting
 state, which differ from those at the end in proportion to the step: edges turn, rings shorten, rods bend. So here all
 geometry is that of the end as predicted from the velocity, which is right to second order, and each length is brought
-back along it to the starting state. Like the engine's own step, BDF2 damps without limit what is too fast for the step, but of a
-slow oscillation it takes in proportion to the third power of the step, where the engine takes in proportion to the
-step (Hairer and Wanner 1996, "Solving Ordinary Differential Equations II", chapter V.1).
+back along it to the starting state.
+
+Like the engine's own step, BDF2 damps without limit what is too fast for the step, but of a slow oscillation it takes
+in proportion to the third power of the step, where the engine takes in proportion to the step (Hairer and Wanner 1996,
+"Solving Ordinary Differential Equations II", chapter V.1).
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ those capabilities and does without where they are absent.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -59,6 +59,8 @@ class Sensation:
             `SIDES`; ``(0, 4)`` for a body that has no skin.
         front_m: Centre of the foremost ring, m, ``(3,)``; NaN for a body that has none.
         heading: Unit vector from the centre of the last ring to that of the foremost, ``(3,)``; NaN likewise.
+        stretch_rate_m_per_s: How fast the stretch sensors lengthen, shape of ``stretch_m``, by which later sensations
+            carry that on until the body moves next; ``(0, 0)`` where it stays.
     """
 
     time_s: float
@@ -71,6 +73,14 @@ class Sensation:
     touch_N: Array = field(default_factory=lambda: np.zeros((0, len(SIDES))))
     front_m: Array = field(default_factory=lambda: np.full(3, np.nan))
     heading: Array = field(default_factory=lambda: np.full(3, np.nan))
+    stretch_rate_m_per_s: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def later(self, time_s: float) -> Sensation:
+        """Returns what is sensed at a later time, s, if the body does not move in between."""
+        if not self.stretch_rate_m_per_s.size:
+            return replace(self, time_s=time_s)
+        stretch = self.stretch_m + (time_s - self.time_s) * self.stretch_rate_m_per_s
+        return replace(self, time_s=time_s, stretch_m=stretch)
 
 
 class Plant(Protocol):
@@ -128,14 +138,14 @@ class MultiRatePlant(Protocol):
     def steps_to_move(self) -> int:
         """Returns the control steps to the end of the next one in which the body moves, at least 1.
 
-        Until then the sensation stays what it is, but for its time.
+        Until then the sensation stays what it is, but for its time and the stretch that is carried on.
         """
         ...
 
-    def stride(self, activation: Array, n_steps: int) -> Sensation:
-        """Advances by at most `steps_to_move` control steps, as so many calls of ``step``.
+    def stride(self, activation: Array) -> Sensation:
+        """Advances by control steps, at most `steps_to_move`, as so many calls of ``step``.
 
-        ``activation`` is that of the last of them, the only one in which the body may move.
+        ``activation`` is that of every step, ``(n_steps, n_muscles)``; only in the last one the body may move.
         """
         ...
 
@@ -145,10 +155,13 @@ class StridingController(Protocol):
     """The capability of a controller of taking several control steps under one sensation."""
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
-        """Advances by ``n_steps`` control steps, as so many calls of ``step`` bit for bit; returns the last activation.
+        """Advances by ``n_steps`` control steps, as so many calls of ``step``.
 
-        ``sensation`` is that of the first step. Those of the others differ from it in their times only, which are
-        multiples of the control timestep.
+        ``sensation`` is that of the first step. Those of the others are what it says of later times
+        (`Sensation.later`), which are multiples of the control timestep.
+
+        Returns:
+            The activation of every step, ``(n_steps, n_muscles)``.
         """
         ...
 

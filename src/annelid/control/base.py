@@ -267,11 +267,28 @@ class NeuralController(SegmentController):
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `stride`."""
-        return self.stride(sensation, 1)
+        return self.stride(sensation, 1)[0]
 
     @abstractmethod
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
+
+    def _lengthening(self, sensation: Sensation, n_steps: int) -> Array:
+        """How much longer than at rest segments are at every control step, m, ``(n_steps, .., n_segments)``."""
+        longer = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        if n_steps == 1:
+            return longer[np.newaxis]
+        rate = sensation.stretch_rate_m_per_s
+        times = self._timestep_s * np.arange(n_steps).reshape(-1, *[1] * longer.ndim)
+        return longer + times * (rate.mean(axis=-1) if rate.size else 0.0)
+
+    def _advance(self, inputs_nA: Array, n_steps: int) -> Array:
+        """Advances the network under the same currents; returns potentials after each step, ``(n_steps, n_neurons)``."""
+        potentials = np.empty((n_steps, self._state.potential.shape[-1]))
+        for step in range(n_steps):
+            self._stepper.advance(self._state, inputs_nA)
+            potentials[step] = self._state.potential[0]
+        return potentials
 
     def _activation(self, potential: Array) -> Array:
         """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -165,12 +165,14 @@ class NetworkController(NeuralController):
             raise ConfigError(
                 f"control_timestep_s = {own_s:g} of the NetworkController must be clock.control_timestep_s of the run"
             )
-        by_time = any(callable(rule) for rule in self._rules.values())
-        for done in range(n_steps if by_time else 1):
-            at = sensation if done == 0 else replace(sensation, time_s=(taken + done) * own_s)
-            self._stepper.advance(self._state, self._inputs_nA(at), 1 if by_time else n_steps)
+        changes = any(callable(rule) for rule in self._rules.values())
+        changes = changes or ("lengthening_m" in self._senses and sensation.stretch_rate_m_per_s.any())
+        potentials = []
+        for done in range(n_steps if changes else 1):
+            at = sensation if done == 0 else sensation.later((taken + done) * own_s)
+            potentials.append(self._advance(self._inputs_nA(at), 1 if changes else n_steps))
         self._now["n_steps"][...] = taken + n_steps
-        return self._activation(self._state.potential[0])
+        return self._activation(np.concatenate(potentials))
 
     def _inputs_nA(self, sensation: Sensation) -> Array:
         sensed = {quantity: SENSED[quantity].read(sensation) for quantity in self._senses}

@@ -10,7 +10,6 @@ from pydantic import Field, model_validator
 from annelid.config.kinds import ControllerKind
 from annelid.config.sections import NonNegative, Positive
 from annelid.control.sns import PeristalsisController, Sns
-from annelid.control.stretch_sensor import lengthening_m
 from annelid.nervous import Network, peristalsis
 from annelid.protocols import Array, Plant, Sensation
 
@@ -88,14 +87,17 @@ class PressureController(PeristalsisController[PressureSns]):
     """
 
     name = "synthetic nervous system with pressure feedback"
+    _every_step_differs = True
 
     def _network(self, n_segments: int) -> Network:
         strengths = self._config.model_dump(include={"hold", "release", "exchange"})
         tau_ms = 1e3 * self._time_constant_s("pressure_time_constant_s")
         return peristalsis.pressure_network(n_segments, self._parameters, **strengths, pressure_ms=tau_ms)
 
-    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
-        config, longer_m = self._config, lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+    def _set_further(
+        self, inputs_nA: Array, sensation: Sensation, longer_m: Array, time_s: float, n_taken: int
+    ) -> None:
+        config = self._config
         loads = (sensation.touch_N.sum(axis=1) - config.light_N) / (config.full_N - config.light_N)
         extensions = (longer_m - config.extending_m) / (config.extended_m - config.extending_m)
         inputs_nA[::2] = self._full_nA * np.clip(loads, 0.0, 1.0)

@@ -11,7 +11,6 @@ from annelid.config.kinds import Knob
 from annelid.config.sections import Positive, Section, Share
 from annelid.control.base import ControllerCode, HalfCentreKind, NeuralController, TimeConstant, design_of
 from annelid.control.sns import DRIVE_HINT
-from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import robust
 from annelid.nervous.peristalsis import DRIVE_NEURON
@@ -160,15 +159,14 @@ class RobustController(NeuralController):
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
-        drive = self._config.descending
-        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
-        inputs = np.clip(longer_m / self._config.full_stretch_m, 0.0, 1.0)
+        drive, further = self._config.descending, np.zeros(0)
         if drive.lift:
             # A body without a skin has no row of touch.
             back_N = sensation.touch_N[:, BACK] if len(sensation.touch_N) else np.zeros(self._n_segments)
-            inputs = np.concatenate([inputs, [drive.drive], np.clip(back_N / drive.full_pressure_N, 0.0, 1.0)])
-        self._stepper.advance(self._state, self._full_nA * inputs, n_steps)
-        return self._activation(self._state.potential[0])
+            further = np.concatenate([[drive.drive], np.clip(back_N / drive.full_pressure_N, 0.0, 1.0)])
+        stretch = (self._lengthening(sensation, n_steps) / self._config.full_stretch_m).clip(0.0, 1.0)
+        inputs = self._full_nA * np.concatenate([stretch, np.tile(further, (n_steps, 1))], axis=1)
+        return self._activation(np.concatenate([self._advance(own, 1) for own in inputs]))
 
     def _shares(self, potential: Array) -> Array:
         """Activation of every segment, ``(.., n_segments)``: the motor neurons' activity, if there are any."""

@@ -18,7 +18,6 @@ from annelid.config.run import StretchSensor
 from annelid.config.sections import NonNegative, Positive, Share
 from annelid.control.base import ControllerCode, HalfCentreKind, NeuralController, Slope, TimeConstant, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
-from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis
 from annelid.protocols import Array, Plant, Sensation, State, Values
@@ -157,8 +156,13 @@ class PeristalsisController(NeuralController, Generic[Config]):
             )
         return value
 
-    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
-        """Writes the currents of the inputs behind those of the sensors and the kick, after so many steps."""
+    def _set_further(
+        self, inputs_nA: Array, sensation: Sensation, longer_m: Array, time_s: float, n_taken: int
+    ) -> None:
+        """Writes the currents of the inputs behind those of the sensors and the kick.
+
+        Given are what is sensed, the segments' lengthening, m, at a time, s, and the number of steps taken by then.
+        """
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state: segment 1 contracted, the others expanded; nothing here is random."""
@@ -167,9 +171,8 @@ class PeristalsisController(NeuralController, Generic[Config]):
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
-        for n, inputs_nA in self._inputs(self._now, sensation, n_steps, self.own):
-            self._stepper.advance(self._state, inputs_nA, n)
-        return self._activation(self._state.potential[0])
+        pieces = self._inputs(self._now, sensation, n_steps, self.own)
+        return self._activation(np.concatenate([self._advance(inputs_nA, n) for n, inputs_nA in pieces]))
 
     def _inputs(
         self, now: dict[str, NDArray[Any]], sensation: Sensation, n_steps: int, each: CopySettings
@@ -178,33 +181,22 @@ class PeristalsisController(NeuralController, Generic[Config]):
 
         Replaces ``sensor_on`` and ``n_steps`` of the state. All arrays of copies have one more axis in front.
         """
-        n_segments, shape = self._n_segments, (len(self._stepper.arrays.inputs),)
-        for n, time_s in self._pieces(int(now["n_steps"]), sensation.time_s, n_steps):
-            lengths, n_taken = (sensation.stretch_m, sensation.rest_stretch_m), int(now["n_steps"])
-            on = self._sensor.reading(now["sensor_on"], *lengths, time_s, each.tolerance_m, each.hysteresis_m)
-            inputs_nA = np.zeros(on.shape[:-1] + shape)
-            inputs_nA[..., :n_segments] = each.sensor_current_nA * on
-            inputs_nA[..., n_segments] = each.kick_nA if n_taken == 0 else 0.0
-            self._set_further(inputs_nA[..., n_segments + 1 :], sensation, time_s, n_taken)
-            yield n, inputs_nA
-            now["sensor_on"], now["n_steps"] = on, np.array(n_taken + n)
-
-    def _pieces(self, n_taken: int, time_s: float, n_steps: int) -> list[tuple[int, float]]:
-        """Cuts steps under one sensation where the inputs change: after the kick, and when segment 1 is released.
-
-        Returns the number of steps of every piece, and the time at its beginning, s.
-        """
-        held = self._sensor.held_at(time_s)
-        if n_steps == 1 or (n_taken > 0 and not held and not self._every_step_differs):
-            return [(n_steps, time_s)]
-        first = round(time_s / self._timestep_s)
-        times_s = [time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
-        if self._every_step_differs:
-            return [(1, time_s) for time_s in times_s]
-        cuts = {0, n_steps} | ({1} if n_taken == 0 else set())
-        if held:
-            cuts.add(sum(self._sensor.held_at(time) for time in times_s))
-        return [(end - start, times_s[start]) for start, end in pairwise(sorted(cuts))]
+        n_segments, shape, taken = self._n_segments, (len(self._stepper.arrays.inputs),), int(now["n_steps"])
+        first = round(sensation.time_s / self._timestep_s)
+        times_s = [sensation.time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
+        longer = self._lengthening(sensation, n_steps)
+        on = self._sensor.readings(now["sensor_on"], longer, times_s, each.tolerance_m, each.hysteresis_m)
+        changes = np.any(on[1:] != on[:-1], axis=tuple(range(1, on.ndim)))
+        cuts = {0, n_steps, *(np.flatnonzero(changes) + 1).tolist()}
+        cuts |= set(range(n_steps)) if self._every_step_differs else {1} if taken == 0 else set()
+        for start, end in pairwise(sorted(cuts)):
+            inputs_nA = np.zeros(on.shape[1:-1] + shape)
+            inputs_nA[..., :n_segments] = each.sensor_current_nA * on[start]
+            inputs_nA[..., n_segments] = each.kick_nA if taken + start == 0 else 0.0
+            further = inputs_nA[..., n_segments + 1 :]
+            self._set_further(further, sensation, longer[start], times_s[start], taken + start)
+            yield end - start, inputs_nA
+        now["sensor_on"], now["n_steps"] = on[-1], np.array(taken + n_steps)
 
     def _values(self) -> Values:
         return {**super()._values(), "sensor_on": self._now["sensor_on"].astype(np.float64)}
@@ -273,7 +265,7 @@ class SnsController(PeristalsisController[Sns]):
             each: What differs between the copies; None for this controller's own settings.
 
         Returns:
-            The states that many steps on, and their activation, ``(n_copies, n_muscles)``.
+            The states that many steps on, and the activation of every step, ``(n_copies, n_steps, n_muscles)``.
         """
         each = each or self.own
         per_segment = (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
@@ -290,13 +282,15 @@ class SnsController(PeristalsisController[Sns]):
         stepper, batch = self._batches[width]
         batch.potential[:n_copies] = states["potential"][:, 0]
         batch.gate[:n_copies] = states["gate"][:, 0]
-        of_all = np.zeros((width, self._n_segments + 1))
+        of_all, potentials = np.zeros((width, self._n_segments + 1)), []
         for n, inputs_nA in self._inputs(switches, sensation, n_steps, each):
             of_all[:n_copies] = inputs_nA
-            stepper.advance(batch, of_all, n)
+            for _ in range(n):
+                stepper.advance(batch, of_all)
+                potentials.append(batch.potential[:n_copies].copy())
         potential, gate = batch.potential[:n_copies].copy(), batch.gate[:n_copies].copy()
         after: State = {"potential": potential[:, np.newaxis], "gate": gate[:, np.newaxis], **switches}
-        return after, self._activation(potential)
+        return after, self._activation(np.stack(potentials, axis=1))
 
     def pieces_copies(self, states: State) -> NDArray[np.bool_]:
         """Finds in which piece of its piecewise smooth equations each of many copies is.
@@ -385,13 +379,14 @@ class AdaptiveController(PeristalsisController[AdaptiveSns]):
     recorded = (*PeristalsisController.recorded, ("drive", (), "1", "activity of the descending neuron"))
 
     def _network(self, n_segments: int) -> Network:
-        self._every_step_differs = self._config.drive_slope_per_s != 0.0
+        self._every_step_differs = self._config.drive_slope_per_s != 0.0 or self._config.stretch_gain_per_m != 0.0
         tau_ms = 1e3 * self._time_constant_s("drive_time_constant_s")
         return peristalsis.adaptive_peristalsis_network(n_segments, self._parameters, tau_ms)
 
-    def _set_further(self, inputs_nA: Array, sensation: Sensation, time_s: float, n_taken: int) -> None:
+    def _set_further(
+        self, inputs_nA: Array, sensation: Sensation, longer_m: Array, time_s: float, n_taken: int
+    ) -> None:
         manual = self._config.drive + self._config.drive_slope_per_s * n_taken * self._timestep_s
-        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         drive = manual + self._config.stretch_gain_per_m * float(longer_m.mean())
         leak, reach = self._parameters.leak_conductance_uS, self._parameters.range_mV
         inputs_nA[...] = min(max(drive, 0.0), 1.0) * leak * reach

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,39 +54,43 @@ class StretchSensor:
         self.on[:] = False
 
     def read(self, stretch_m: Array, rest_stretch_m: Array, time_s: float) -> NDArray[np.bool_]:
-        """Reads the lengths of all segments, as `reading`, and remembers the result in `on`."""
-        self.on = self.reading(self.on, stretch_m, rest_stretch_m, time_s)
+        """Reads the lengths of all segments, m, ``(n_segments, n_sensors)``, at a time, and remembers which are on."""
+        longer = lengthening_m(stretch_m, rest_stretch_m)[np.newaxis]
+        self.on = self.readings(self.on, longer, [time_s])[0]
         return self.on.copy()
 
-    def reading(
+    def readings(
         self,
         before: NDArray[np.bool_],
-        stretch_m: Array,
-        rest_stretch_m: Array,
-        time_s: float,
+        longer_m: Array,
+        times_s: Sequence[float],
         tolerance_m: float | Array | None = None,
         hysteresis_m: float | Array | None = None,
     ) -> NDArray[np.bool_]:
-        """Returns which sensors are on, of any number of worms at once.
+        """Returns which sensors are on at some instants, of any number of worms at once.
 
         Args:
             before: Which sensors were on at the reading before, ``(.., n_segments)``.
-            stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.
-            rest_stretch_m: Their lengths at rest, m, same shape.
-            time_s: Simulated time of the reading, s.
+            longer_m: By how much each segment's mean length exceeds that at rest, m, ``(n_times, .., n_segments)``.
+            times_s: Simulated times of the readings, s.
             tolerance_m: Instead of the sensor's own, m: a number, or an array that broadcasts against the result,
                 such as ``(n_worms, 1)`` for one per worm.
             hysteresis_m: Likewise.
 
         Returns:
-            True for every segment whose mean length is at most the tolerance (with hysteresis, if it was on) beyond its
-            mean rest length, ``(.., n_segments)``.
+            True for every segment that is at most the tolerance (with hysteresis, if it was on) longer than at rest,
+            ``(n_times, .., n_segments)``.
         """
         tolerance = self.settings.tolerance_m if tolerance_m is None else tolerance_m
         hysteresis = self.settings.hysteresis_m if hysteresis_m is None else hysteresis_m
-        on = lengthening_m(stretch_m, rest_stretch_m) <= tolerance + hysteresis * before
-        if self.held_at(time_s):
-            on[..., 0] = False
+        on: NDArray[np.bool_] = longer_m <= tolerance
+        held = sum(map(self.held_at, times_s))
+        on[:held, ..., 0] = False
+        if np.any(hysteresis):
+            for number, longer in enumerate(longer_m):
+                on[number] = before = longer <= tolerance + hysteresis * before
+                if number < held:
+                    on[number, ..., 0] = False
         return on
 
     def held_at(self, time_s: float) -> bool:

@@ -451,16 +451,15 @@ class TurningController(SavedWrapper):
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `stride`."""
-        return self.stride(sensation, 1)
+        return self.stride(sensation, 1)[0]
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
-        scales = self._between.advance(sensation, n_steps)
+        first = round(sensation.time_s / self._timestep_s)
+        felt = [sensation, *(sensation.later((first + k) * self._timestep_s) for k in range(1, n_steps))]
+        scales = np.stack([self._between.advance(one, 1) for one in felt])
         if isinstance(self._inner, StridingController):
             activation = self._inner.stride(sensation, n_steps)
         else:
-            first = round(sensation.time_s / self._timestep_s)
-            activation = self._inner.step(sensation)
-            for later in range(1, n_steps):
-                activation = self._inner.step(replace(sensation, time_s=(first + later) * self._timestep_s))
-        return (activation.reshape(scales.shape) * scales).reshape(-1)
+            activation = np.stack([self._inner.step(one) for one in felt])
+        return (activation.reshape(scales.shape) * scales).reshape(n_steps, -1)

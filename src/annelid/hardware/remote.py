@@ -88,22 +88,22 @@ class PacedPlant(ABC):
 
     def step(self, activation: Array) -> Sensation:
         """Advances by one control step, in the last of a period by the wall clock."""
-        return self.stride(activation, 1)
+        return self.stride(activation[np.newaxis])
 
     def steps_to_move(self) -> int:
         """Returns the control steps to the end of the period."""
         return self._n_steps - self._taken % self._n_steps
 
-    def stride(self, activation: Array, n_steps: int) -> Sensation:
+    def stride(self, activation: Array) -> Sensation:
         """Advances by at most `steps_to_move` control steps."""
         if self._is_fresh:
             # Since the reset a file was laid out, for which a robot's own watchdog does not wait.
             self._is_fresh = False
             self._begin()
             self._pace.restart()
-        self._taken += n_steps
+        self._taken += len(activation)
         if self._taken % self._n_steps == 0:
-            self._move(activation)
+            self._move(activation[-1])
         return self._sensation()
 
     def recordable(self) -> Recordable:
@@ -213,9 +213,7 @@ class RemoteController:
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps."""
-        for _ in range(n_steps):
-            activation = self.step(sensation)
-        return activation  # pyright: ignore[reportPossiblyUnboundVariable] -- at least one step
+        return np.stack([self.step(sensation) for _ in range(n_steps)])
 
     def stop(self) -> None:
         """Ends the session."""

@@ -121,6 +121,10 @@ class Anatomy:
         self.has_edges = bool(model.nflexedge)
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
         self.crossing_body: NDArray[np.int32] = model.site_bodyid[self._crossing_site]
+        self._crossing_dof: NDArray[np.intp] | None = None
+        if body.formulation.has_rods:
+            slide = model.body_dofadr[self.crossing_body][:, np.newaxis] + np.arange(3)
+            self._crossing_dof = slide.astype(np.intp)
         self.ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
         mass = np.where(in_scene(model), 0.0, model.body_mass)
         self.total_mass_kg = float(mass.sum())
@@ -191,6 +195,15 @@ class Anatomy:
         axis = _unit(center.take(self._before, axis=-2) - center.take(self._behind, axis=-2))
         stretch = spring.take(self._sensors, axis=-1)
         return Posture(crossing, center_of_mass, spring, stretch, ring, front, heading, axis, skin, objects)
+
+    def stretch_rate(self, posture: Posture, qvel: Array) -> Array:
+        """Returns how fast stretch sensors of a posture lengthen at velocities, ``(nv,)``, m/s; zero for a chain."""
+        if self._crossing_dof is None:
+            return np.zeros_like(posture.stretch)
+        springs = self.geometry.springs[self._sensors]
+        place, velocity = posture.crossing.take(springs, axis=0), qvel.take(self._crossing_dof[springs])
+        along, apart = place[..., 1, :] - place[..., 0, :], velocity[..., 1, :] - velocity[..., 0, :]
+        return (along * apart).sum(axis=-1) / posture.stretch
 
     def forces(self, engine: Mapping[str, Array]) -> tuple[Forces, Array]:
         """Reads what acted during the last physics step, and the ground's force on each geom, N, ``(n_geoms, 3)``.

@@ -15,9 +15,9 @@ import numpy as np
 
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, as_config, field_value, fields_of
-from annelid.errors import ConfigError, SimulationStopped
+from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation, State, Stateful, StridingController
-from annelid.simulation.anatomy import Anatomy, Movement
+from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.lock import locks
 from annelid.simulation.loop import PROGRESS_INTERVAL_S, Loop, RecordedRun
 from annelid.simulation.progress import Interruption, ProgressCallback, reporting
@@ -250,13 +250,13 @@ class Team(Loop):
             for number, error in errors.items():
                 self.drop(number, error)
         self.each(lambda number, run: run.simulation.check_activation(activation[number]))
-        moved = self._move(one.moves_due(n_steps), activation)
+        moves = one.moves_due(n_steps) > 0
         step += n_steps
-        if moved or step % schedule.sample_every == 0 or step % schedule.frame_every == 0:
+        if moves or step % schedule.sample_every == 0 or step % schedule.frame_every == 0:
             self.settle()
         self.each(
             lambda number, run: run.simulation.advanced(
-                self._worms[number].strode(n_steps, moved.get(number)), activation[number], step, number in moved
+                self._worms[number].stride(activation[number]), activation[number][-1], step, moves
             )
         )
 
@@ -273,16 +273,6 @@ class Team(Loop):
                 group.drop(number)
         self._controllers = [group for group in self._controllers if group.rows]
 
-    def _move(self, n_steps: int, activation: Mapping[int, Array]) -> dict[int, Movement]:
-        """Takes physics steps, if any; returns what each of the bodies that could be moved has come to."""
-        moved: dict[int, Movement] = {}
-        for row in list(self.going) if n_steps else ():
-            try:
-                moved[row] = self._worms[row].move(activation[row], n_steps)
-            except SimulationStopped as stopped:
-                self.drop(row, stopped)
-        return moved
-
 
 @runtime_checkable
 class CopiedController(Stateful, Protocol):
@@ -297,7 +287,7 @@ class CopiedController(Stateful, Protocol):
     def step_copies(
         self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
     ) -> tuple[State, Array]:
-        """Returns the copies' states some control steps on, and their activation, ``(n_copies, n_muscles)``."""
+        """Returns the copies' states some control steps on, and all activations, ``(n_copies, n_steps, n_muscles)``."""
         ...
 
 
@@ -326,8 +316,11 @@ class ControllerGroup:
         self._strides = not simulations[0].is_noisy and isinstance(simulations[0].controller, StridingController)
 
     def advance(self, n_steps: int) -> tuple[dict[int, Array], dict[int, Exception]]:
-        """Takes control steps with the bodies at rest; returns the last activations, and errors of those that fail."""
-        activation: dict[int, Array] = {}
+        """Takes control steps with the bodies at rest.
+
+        Returns the activations of every step, ``(n_steps, n_muscles)`` each, and errors of those that fail.
+        """
+        steps: list[list[Array]] = []
         errors: dict[int, Exception] = {}
         try:
             if self._strides:
@@ -335,24 +328,24 @@ class ControllerGroup:
                 return dict(zip(self.rows, self._take(observed, n_steps), strict=True)), errors
             for later in range(n_steps):
                 observed = [_observed(simulation, later) for simulation in self._simulations]
-                activation = dict(zip(self.rows, self._take(observed, 1), strict=True))
-                for row, simulation in zip(self.rows, self._simulations, strict=True):
+                steps.append([of_one[0] for of_one in self._take(observed, 1)])
+                for row, simulation, own in zip(self.rows, self._simulations, steps[-1], strict=True):
                     try:
-                        simulation.check_activation(activation[row])
+                        simulation.check_activation(own[np.newaxis])
                     except Exception as error:
                         errors.setdefault(row, error)
                 if len(errors) == len(self.rows):
                     break
         except Exception as error:
             errors = dict.fromkeys(self.rows, error)
-        return activation, errors
+        return {row: np.array(own) for row, own in zip(self.rows, zip(*steps, strict=False), strict=False)}, errors
 
     def _take(self, observed: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
-        """Takes control steps under what each worm observes; returns each one's activation."""
+        """Takes control steps under what each worm observes; returns each one's activations."""
         controller = self._simulations[0].controller
         if self._strides and isinstance(controller, StridingController):
             return [np.asarray(controller.stride(observed[0], n_steps), dtype=np.float64)]
-        return [np.asarray(controller.step(observed[0]), dtype=np.float64)]
+        return [np.asarray(controller.step(observed[0]), dtype=np.float64)[np.newaxis]]
 
     def settle(self) -> None:
         """Brings every worm's own controller up to the state that was reached; here it is the one that steps."""
@@ -363,12 +356,16 @@ class ControllerGroup:
         del self.rows[place], self._simulations[place]
 
 
+_CARRIED = ("stretch_m", "stretch_rate_m_per_s")
+
+
 def _observed(simulation: Simulation, later: int) -> Sensation:
     """What a worm's controller observes at a control step, so many steps after its body's last event."""
     if not later:
         return simulation.observed()
     simulation.step += 1
-    return replace(simulation.observed(), time_s=simulation.step * simulation.schedule.timestep_s)
+    simulation.sensation = simulation.sensation.later(simulation.step * simulation.schedule.timestep_s)
+    return simulation.observed()
 
 
 class Networks(ControllerGroup):
@@ -386,7 +383,8 @@ class Networks(ControllerGroup):
         self._each = type(self._first.own).of(controller.own for controller in self._controllers)
 
     def _take(self, observed: Sequence[Sensation], n_steps: int) -> Sequence[Array]:
-        together = replace(observed[0], stretch_m=np.stack([one.stretch_m for one in observed]))
+        stretch, rate = (np.stack([getattr(one, name) for one in observed]) for name in _CARRIED)
+        together = replace(observed[0], stretch_m=stretch, stretch_rate_m_per_s=rate)
         self._states, activation = self._first.step_copies(self._states, together, n_steps, self._each)
         return list(activation)
 

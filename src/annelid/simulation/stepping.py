@@ -132,17 +132,17 @@ class Simulation:
         """
         if self._striders is None:
             n_steps = 1
-            activation = np.asarray(self.controller.step(self.observed()), dtype=np.float64)
+            activation = np.asarray(self.controller.step(self.observed()), dtype=np.float64)[np.newaxis]
             self.check_activation(activation)
-            self.sensation = self.plant.step(activation)
+            self.sensation = self.plant.step(activation[0])
         else:
             plant, controller = self._striders
             n_steps = min(plant.steps_to_move(), self.schedule.steps_to_record(self.step))
             activation = np.asarray(controller.stride(self.sensation, n_steps), dtype=np.float64)
             self.check_activation(activation)
-            self.sensation = plant.stride(activation, n_steps)
+            self.sensation = plant.stride(activation)
         step = self.step + n_steps
-        self.advanced(self.sensation, activation, step, step % self._watch_every < n_steps)
+        self.advanced(self.sensation, activation[-1], step, step % self._watch_every < n_steps)
 
     def advanced(self, sensation: Sensation, activation: Array, step: int, moved: bool) -> None:
         """Takes note of control steps up to a number since time zero, whoever has taken them.
@@ -177,19 +177,22 @@ class Simulation:
         return replace(true, stretch_m=true.stretch_m + noise)
 
     def check_activation(self, activation: Array) -> None:
-        """Stops a controller that breaks its promise before its numbers reach the engine."""
-        if activation.shape != self.activation.shape:
+        """Stops a controller that breaks its promise before its numbers reach the engine.
+
+        Given is the activation of some steps, ``(n_steps, n_muscles)``.
+        """
+        if activation.shape[1:] != self.activation.shape:
+            shape = activation.shape[1:]
             raise SimulationStopped(
-                self.at(f"the controller gave activation of shape {activation.shape}, not {self.activation.shape}")
+                self.at(f"the controller gave activation of shape {shape}, not {self.activation.shape}")
             )
-        # Written so that NaN fails it; for a few muscles faster than numpy.
-        if not all(-_ACTIVATION_SLACK <= value <= 1 + _ACTIVATION_SLACK for value in activation.tolist()):
-            bad = ~((activation >= -_ACTIVATION_SLACK) & (activation <= 1 + _ACTIVATION_SLACK))
-            muscle = int(np.argmax(bad))
+        # Written so that NaN fails it.
+        good = (activation >= -_ACTIVATION_SLACK) & (activation <= 1 + _ACTIVATION_SLACK)
+        if not good.all():
+            step, muscle = np.argwhere(~good)[0].tolist()
+            value = activation[step, muscle]
             raise SimulationStopped(
-                self.at(
-                    f"the controller gave muscle {muscle + 1} an activation of {activation[muscle]:g}, not in 0 .. 1"
-                )
+                self.at(f"the controller gave muscle {muscle + 1} an activation of {value:g}, not in 0 .. 1")
             )
 
     def checkpoint(self) -> Checkpoint | None:

@@ -15,7 +15,7 @@ from annelid.body import build_spec, compile_spec
 from annelid.body.formulations.rods.strains import RodStrains, net_stiffness
 from annelid.body.rows import tendons_to_rows
 from annelid.body.worm import WormBody
-from annelid.clock import StepRatio
+from annelid.clock import SLACK_S, StepRatio
 from annelid.config import ArenaKind, RunConfig
 from annelid.errors import SimulationStopped
 from annelid.morphology import Array, heading_turn
@@ -158,6 +158,8 @@ class WormPlant:
         self._floor = cast(Plane, arena.ground())
         self._ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._step_s = config.clock.physics_timestep_s
+        # Otherwise a command lasts for several steps of the body.
+        self._acts_by_command = self._step_s > config.clock.control_timestep_s - SLACK_S
         self._activation: Array = np.zeros(anatomy.n_muscles)
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
@@ -206,6 +208,7 @@ class WormPlant:
     def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
         trial, rings = self._config.trial, self.anatomy.rings
+        self._skin_before = self.posture.skin
         self._activation = activation
         if trial is not None and trial.push_N:
             pushed = trial.push_from_s <= self._time_s < trial.push_from_s + trial.push_s
@@ -213,8 +216,9 @@ class WormPlant:
         try:
             for _ in range(n_steps):
                 # What the actuators have come to at the end of a step acts in it.
-                lengths = self.posture.ring_length
-                self.act[:] = rings.states_after(self.model, activation, self.act, lengths, self._step_s)
+                if not self._acts_by_command:
+                    lengths, commands = self.posture.ring_length, activation[np.newaxis]
+                    self.act[:] = rings.states_after(self.model, commands, self.act, lengths, self._step_s)
                 self.ctrl[:] = rings.control(activation, self.act)
                 self._take_step(self.act.copy() if self.model.na else activation)
         except mujoco.FatalError as error:
@@ -272,7 +276,7 @@ class WormPlant:
         self.energies = EnergyTotals.zero(self.n_muscles)
         self._powers = Powers.none(self.n_muscles)
         self.touch = Touch.none(n)
-        self.posture = self._locate()
+        self.posture, self._rate = self._locate(), None
         self._watch = Watch(self._body, self.geometry, self._config.guard)
         self._elastic_at_start_J, self._potential_at_start_J = self.elastic_energy_J(), self.potential_energy_J()
         return self.observe()
@@ -283,41 +287,49 @@ class WormPlant:
         Raises:
             SimulationStopped: The engine gave up on the step.
         """
-        return self.stride(activation, 1)
+        return self.stride(activation[np.newaxis])
 
     def steps_to_move(self) -> int:
         """Number of control steps up to and with the next one in which the body moves, at least 1."""
         every = self._ratio.control_steps_per_move
         return every - self._control_step % every
 
-    def stride(self, activation: Array, n_steps: int) -> Sensation:
-        """Advances by 1 to `steps_to_move` control steps, of which at most the last one moves the body, as `step`."""
+    def stride(self, activation: Array) -> Sensation:
+        """Advances by 1 to `steps_to_move` control steps, of which at most the last one moves the body, as `step`.
+
+        Given is the activation of every step, ``(n_steps, n_muscles)``.
+        """
+        n_steps = len(activation)
         due = self.moves_due(n_steps)
-        return self.strode(n_steps, self.move(activation, due) if due else None)
+        if self._acts_by_command:
+            lengths, control_s = self.posture.ring_length, self._config.clock.control_timestep_s
+            self.act[:] = self.anatomy.rings.states_after(self.model, activation, self.act, lengths, control_s)
+        return self.after(n_steps, self.move(activation[-1], due) if due else None)
 
     def moves_due(self, n_steps: int) -> int:
         """Number of physics steps at the end of the next ``n_steps`` control steps, at most `steps_to_move` of them."""
         return self._ratio.physics_steps_due(self._control_step + n_steps)
 
-    def strode(self, n_steps: int, moved: Movement | None) -> Sensation:
-        """Takes note of control steps and of a movement of the body, if any, whoever has moved it; then observes."""
+    def after(self, n_steps: int, moved: Movement | None) -> Sensation:
+        """Takes note of control steps, and of what a movement of the body has come to, if any; then observes."""
         time_s = self.moves_due(n_steps) * self._config.clock.physics_timestep_s
         self._control_step += n_steps
         if moved is not None:
-            before, (self.posture, self._forces, ground) = self.posture, moved
-            after = self.posture
+            self.posture, self._forces, ground = moved
+            self._rate = None
             normals = self._forces.met.normal if self._is_scene else None
-            self.touch = self.anatomy.skin.touch(
-                self.touch, ground, before.skin, after.skin, after.axis, time_s, normals
-            )
+            skin, axis = self.posture.skin, self.posture.axis
+            self.touch = self.anatomy.skin.touch(self.touch, ground, self._skin_before, skin, axis, time_s, normals)
         return self.observe()
 
     def observe(self) -> Sensation:
         """Returns the present lengths and forces, in arrays that nobody writes to again."""
-        posture = self.posture
+        posture, rate = self.posture, self._stretch_rate
+        since = self._control_step % self._ratio.control_steps_per_move
+        carried = since * self._config.clock.control_timestep_s
         return Sensation(
             time_s=self._time_s,
-            stretch_m=posture.stretch,
+            stretch_m=posture.stretch + carried * rate if since else posture.stretch,
             rest_stretch_m=self.anatomy.rest_stretch_m,
             ring_length_m=posture.ring_length,
             muscle_force_N=self._tension_N,
@@ -326,7 +338,15 @@ class WormPlant:
             touch_N=self.touch.normal,
             front_m=posture.front,
             heading=posture.heading,
+            stretch_rate_m_per_s=rate,
         )
+
+    @property
+    def _stretch_rate(self) -> Array:
+        """Rates of the stretch sensors since the last movement, m/s."""
+        if self._rate is None:
+            self._rate = self.anatomy.stretch_rate(self.posture, self.data.qvel)
+        return self._rate
 
     def alarm(self) -> str | None:
         """Returns a sentence where the engine has warned or a quantity exceeds its guard, else None."""
@@ -443,7 +463,7 @@ class WormPlant:
         self.energies = EnergyTotals(*(np.array(state[name], dtype=float) for name in EnergyTotals._fields))
         self.touch = Touch.of_state(state)
         self._watch.set_state(state)
-        self.posture = self._locate()
+        self.posture, self._rate = self._locate(), None
 
     def _locate(self) -> Posture:
         return self.anatomy.posture(*self.anatomy.locate(self.data))

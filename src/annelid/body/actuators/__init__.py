@@ -123,14 +123,14 @@ class ActuatorKind(Kind):
     def states_after(
         self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float
     ) -> Array:
-        """Returns the engine's actuator states after a time under an activation; as they are unless the kind says so.
+        """Returns the engine's actuator states after commands, one after the other; as they are unless a kind says so.
 
         Args:
             model: The compiled body.
-            activation: In [0, 1], ``(n_muscles,)``.
-            state: The states before that time, ``(n_states,)``.
+            activation: In [0, 1], ``(n_commands, n_muscles)``.
+            state: The states before, ``(n_states,)``.
             length_m: Lengths of the ring actuators, m, ``(n_muscles,)``.
-            time_s: The time, s.
+            time_s: For which each command lasts, s.
         """
         return state
 

@@ -133,23 +133,28 @@ class ServoRings(ActuatorKind):
     def states_after(
         self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float
     ) -> Array:
-        """Returns the slack lengths of the cables, m, after a time.
+        """Returns the slack lengths of the cables, m, after commands.
 
         A cable winds towards the commanded length, up to half the backlash from it, but never so short that its tension
         would exceed the force limit: a stalled servo does not wind on, gives way to what pulls harder, and lets go at
         once when it is commanded to.
         """
         (shortest, longest), limits_N = model.actuator_actrange.T, -model.actuator_forcerange[:, 0]
-        commanded, play = longest + activation * (shortest - longest), 0.5 * self.backlash_m
-        if play:
-            commanded = state.clip(commanded - play, commanded + play)
+        play, speed = 0.5 * self.backlash_m, self.speed_limit_m_per_s
         stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
-        speed = winding = self.speed_limit_m_per_s
-        if self.no_load_speed_m_per_s is not None:
-            share = (self.stiffness_N_per_m * (length_m - state) / limits_N).clip(0.0, 1.0)
-            winding = np.minimum(speed, self.no_load_speed_m_per_s * (1.0 - share))
-        aim = np.maximum(commanded, stalled) - state
-        return (state + np.minimum(np.maximum(aim, -winding * time_s), speed * time_s)).clip(shortest, longest)
+        # Under one command a cable winds evenly, so that equal ones are one.
+        starts = np.flatnonzero(np.any(np.diff(activation, axis=0), axis=1)) + 1
+        for commands in np.split(activation, starts):
+            commanded, winding = longest + commands[0] * (shortest - longest), speed
+            if play:
+                commanded = state.clip(commanded - play, commanded + play)
+            if self.no_load_speed_m_per_s is not None:
+                share = (self.stiffness_N_per_m * (length_m - state) / limits_N).clip(0.0, 1.0)
+                winding = np.minimum(speed, self.no_load_speed_m_per_s * (1.0 - share))
+            aim, lasts_s = np.maximum(commanded, stalled) - state, len(commands) * time_s
+            wound = np.minimum(np.maximum(aim, -winding * lasts_s), speed * lasts_s)
+            state = (state + wound).clip(shortest, longest)
+        return state
 
     def control(self, activation: Array, state: Array) -> Array:
         """Returns the rates of the slack lengths during a step, none: they are those at its end already."""

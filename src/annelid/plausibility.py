@@ -165,7 +165,7 @@ def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
         return None
     if len(body.groups()) > 1 or body.strands.relative_stiffness is not None or body.relative_friction is not None:
         return None
-    damping_s, rings, rate = body.strands.material_damping_s, body.rings, body.springs.one_number("stiffness_N_per_m")
+    damping_s, rings, rate = body.strands.damping_time_s, body.rings, body.springs.one_number("stiffness_N_per_m")
     whole = body.formulation.has_rigid_crossings and rings.muscle is not None and rings.layout == "whole"
     whole = whole and body.springs.rest_length_m is None
     # Beyond what was measured the lines that were fitted say nothing.

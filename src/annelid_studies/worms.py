@@ -14,12 +14,8 @@ Effort = Literal["quick", "full"]
 CHAIN, RODS, FAST = "riddle2023", "riddle2023-rods", "riddle2023-fast"
 """The three worms that the examinations lay side by side: the paper's, rigid crossings, soft crossings in seconds."""
 PLANAR = "riddle2022-planar"
-PAPERS_RODS: dict[str, Any] = {
-    "body.mesh.elements_per_side": 3,
-    "body.formulation.curvature": "constant",
-    "body.formulation.integrator": "Euler",
-}
-"""The paper's mesh, all of whose joints are equally stiff, in steps of first order."""
+PAPERS_RODS: dict[str, Any] = {"body.mesh.elements_per_side": 3}
+"""The paper's mesh."""
 PAPERS_MESH: dict[str, Any] = {**PAPERS_RODS, "body.formulation.solver_tolerance": 1e-6}
 """How the rods are compared with the chain; their preset solves less sharply."""
 

@@ -149,8 +149,7 @@ CHOICES = frozenset(f"{_WORDS} {_SWITCHES} {_ROBOT['flag'][1]}".split()) - {"gra
 SINGLE = frozenset(["stiffness", "mass", "density", "nrow", "ncol", "width", "height", "maxhullvert"])
 INSTEAD = {
     "include": "write its content into the file",
-    "option": "gravity, step and friction cone are fields of the configuration (arena.gravity_m_per_s2, "
-    "clock.physics_timestep_s, arena.friction_cone)",
+    "option": "gravity and step are fields of the configuration (arena.gravity_m_per_s2, clock.physics_timestep_s)",
     "size": "the engine finds the sizes itself",
     "extension": "plug-ins are code",
     "plugin": "plug-ins are code",

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from annelid.config.run import RunConfig
     from annelid.protocols import Plant
 
-JOINT_DAMPING = 0.12
-"""The paper's, N m s/rad."""
 EQUAL_STIFFNESS_RADIUS_M = 0.00299
 """Radius of a solid strand that bends as the robot's tube: the authors' choice of 2025."""
 ALIKE_IN_A_GROUP = ("mesh", "strands", "pins", "springs")
@@ -100,50 +98,11 @@ class Strands(Section):
     linear_density_kg_per_m: PerSegmentOf[Positive] = Field(
         default=0.01291, description="mass per length of strand, one number for all or one per segment"
     )
-    damping_time_s: NonNegative | None = Field(
-        default=None,
+    damping_time_s: NonNegative = Field(
+        default=0.145,
         description="Kelvin-Voigt time of the material, its viscous over its elastic modulus, for bending in every "
-        "direction and twist (not set: loss_factor or joint_damping_Nms_per_rad)",
+        "direction and twist",
     )
-    loss_factor: Annotated[float, Field(ge=0, le=10)] | None = Field(
-        default=None,
-        description="tan delta of the material at loss_frequency_Hz, instead of damping_time_s (not set: none)",
-    )
-    loss_frequency_Hz: Positive | None = Field(
-        default=None, description="frequency at which the loss factor applies (not set: none)"
-    )
-    joint_damping_Nms_per_rad: NonNegative = Field(
-        default=JOINT_DAMPING,
-        description="viscous resistance to bending between two elements whatever their length; not used where the "
-        "material's damping is given",
-    )
-
-    @model_validator(mode="after")
-    def _damped_once(self) -> Self:
-        time_s, loss, joint = self.damping_time_s, self.loss_factor, self.joint_damping_Nms_per_rad
-        if time_s is not None and loss is not None:
-            raise ValueError(
-                f"body.strands.damping_time_s = {time_s:g} and body.strands.loss_factor = {loss:g} both give the "
-                "damping of the material: set one of them to 'none'"
-            )
-        if self.material_damping_s is not None and joint != JOINT_DAMPING:
-            raise ValueError(
-                f"body.strands.joint_damping_Nms_per_rad = {joint:g} has no effect where the damping of the material "
-                "is given: set body.strands.damping_time_s, or set that to 'none'"
-            )
-        if (loss is None) != (self.loss_frequency_Hz is None):
-            raise ValueError(
-                "body.strands.loss_factor needs body.strands.loss_frequency_Hz, the frequency at which it applies, and "
-                "the other way round"
-            )
-        return self
-
-    @property
-    def material_damping_s(self) -> float | None:
-        """Kelvin-Voigt time of the material, s; None where each joint has a damping of its own instead."""
-        if self.loss_factor is not None and self.loss_frequency_Hz is not None:
-            return self.loss_factor / (2 * pi * self.loss_frequency_Hz)
-        return self.damping_time_s
 
     @property
     def bending_rigidity_Nm2(self) -> float:
@@ -156,11 +115,6 @@ class Strands(Section):
         moduli = (self.young_modulus_Pa, self.shear_modulus_Pa)
         along = any(isinstance(value, tuple) and len(set(value)) > 1 for value in moduli)
         return along or any(share != 1.0 for share in self.relative_stiffness or ())
-
-    def joint_damping(self, stiffness_Nm_per_rad: float) -> float:
-        """Returns the damping of a joint between two elements with a stiffness, N m s/rad."""
-        time_s = self.material_damping_s
-        return self.joint_damping_Nms_per_rad if time_s is None else time_s * stiffness_Nm_per_rad
 
 
 class Pins(Section):

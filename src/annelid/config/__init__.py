@@ -14,11 +14,13 @@ from typing import Any
 
 from annelid.config.arena import ArenaKind
 from annelid.config.checking import (
+    REPLACED,
     check_config,
     check_section,
     field_paths,
     field_value,
     fields_of,
+    has_field,
     unit_of,
     whole_path,
 )
@@ -50,6 +52,7 @@ _RENAMED = {"SnsController": "Sns", "Arena": "ArenaKind"}
 
 __all__ = [
     "LEVELS",
+    "REPLACED",
     "ArenaKind",
     "BodyKind",
     "Clock",
@@ -76,6 +79,7 @@ __all__ = [
     "fields_of",
     "find_cluster",
     "find_level",
+    "has_field",
     "kinds_of",
     "load_config",
     "load_study",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
@@ -56,11 +56,6 @@ class ArenaKind(Kind):
     contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")
     contact_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
-    )
-    friction_cone: Literal["pyramidal", "elliptic"] = Field(
-        default="pyramidal",
-        description="elliptic: friction is alike in every direction of sliding; pyramidal: it is weaker by 16 % at 45 "
-        "degrees to the world's axes",
     )
 
     @property

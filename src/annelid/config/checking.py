@@ -98,6 +98,37 @@ UNITS = frozenset(
 _SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", "uS": "µS"}
 
 
+REPLACED = {
+    "body.formulation.curvature": "a strand's curvature is always linear between two crossings",
+    "body.formulation.integrator": "rods always take second-order steps (BDF2)",
+    "body.formulation.pin_inertance_kg": "pins are tied by springs and dashpots alone",
+    "body.formulation.lateral_damping_Nms_per_rad": "set body.strands.damping_time_s, which damps every direction",
+    "body.strands.joint_damping_Nms_per_rad": "set body.strands.damping_time_s, a joint's damping over its stiffness",
+    "body.strands.loss_factor": "set body.strands.damping_time_s to the loss factor over 2 pi times its frequency",
+    "body.strands.loss_frequency_Hz": "set body.strands.damping_time_s, as for loss_factor",
+    "arena.friction_cone": "rods always have elliptic cones, and a chain pyramidal ones",
+    "controller.landing": "it saved nothing (sns-pressure)",
+}
+"""What replaced fields that older files have, by their dotted paths."""
+
+
+def has_field(path: str, tree: Mapping[str, Any]) -> bool:
+    """Whether the kinds of sections of a configuration, which need not be checked, have the field of a dotted path."""
+    return path.rsplit(".", 1)[-1] in _names_beside(path, tree)
+
+
+def _names_beside(path: str, tree: Mapping[str, Any]) -> dict[str, None]:
+    """Names of all fields of the section of a dotted path, whose kind is the one in a configuration."""
+    members: Sequence[type[BaseModel]] = [RunConfig]
+    level: Any = tree
+    for name in path.split(".")[:-1]:
+        fields = [member.model_fields[name] for member in members if name in member.model_fields]
+        level = level.get(name) if isinstance(level, Mapping) else None
+        kind = level.get("kind") if isinstance(level, Mapping) else None
+        members = _of_kind([section for field in fields for section in sections_in(field.annotation)], kind)
+    return dict.fromkeys(name for member in members for name in member.model_fields)
+
+
 def whole_path(path: str, tree: Mapping[str, Any]) -> str:
     """Completes a dotted path whose field is given without its unit.
 
@@ -112,14 +143,7 @@ def whole_path(path: str, tree: Mapping[str, Any]) -> str:
         ConfigError: Several fields differ by a unit only.
     """
     *sections, leaf = path.split(".")
-    members: Sequence[type[BaseModel]] = [RunConfig]
-    level: Any = tree
-    for name in sections:
-        fields = [member.model_fields[name] for member in members if name in member.model_fields]
-        level = level.get(name) if isinstance(level, Mapping) else None
-        kind = level.get("kind") if isinstance(level, Mapping) else None
-        members = _of_kind([section for field in fields for section in sections_in(field.annotation)], kind)
-    names = dict.fromkeys(name for member in members for name in member.model_fields)
+    names = _names_beside(path, tree)
     if leaf in names:
         return path
     start = f"{leaf}_"
@@ -193,7 +217,10 @@ def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
     kind, given = detail["type"], detail["input"]
     if kind == "extra_forbidden":
         unknown = str(detail["loc"][-1])
-        return f"unknown field {shown('.'.join([*parts, unknown]))}: {_nearest_fields(unknown, parts, section, root)}"
+        path = ".".join([*parts, unknown])
+        if path in REPLACED and root is RunConfig:
+            return f"{path} is no field any more: {REPLACED[path]}; leave it out"
+        return f"unknown field {shown(path)}: {_nearest_fields(unknown, parts, section, root)}"
     path = ".".join(parts)
     if kind == "missing":
         return f"{path} must be given"

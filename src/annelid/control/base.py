@@ -283,7 +283,7 @@ class NeuralController(SegmentController):
         return longer + times * (rate.mean(axis=-1) if rate.size else 0.0)
 
     def _advance(self, inputs_nA: Array, n_steps: int) -> Array:
-        """Advances the network under the same currents; returns potentials after each step, ``(n_steps, n_neurons)``."""
+        """Advances the network under the same currents; returns potentials of each step, ``(n_steps, n_neurons)``."""
         potentials = np.empty((n_steps, self._state.potential.shape[-1]))
         for step in range(n_steps):
             self._stepper.advance(self._state, inputs_nA)

@@ -220,9 +220,8 @@ def load_frame(
 
 def _hastened(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
     """Returns the worm weightless and away from the ground, with its viscous coefficients divided."""
-    damping = ("joint_damping_Nms_per_rad", "damping_time_s", "loss_factor")
-    strands = {name: value / haste for name in damping if (value := getattr(body.strands, name)) is not None}
-    changed: dict[str, object] = {"strands": body.strands.model_copy(update=strands)}
+    damping = {"damping_time_s": body.strands.damping_time_s / haste}
+    changed: dict[str, object] = {"strands": body.strands.model_copy(update=damping)}
     changed["formulation"] = body.formulation.hastened(haste)
     if body.joints is not None:
         viscous = {"viscous_friction_Nms_per_rad": body.joints.viscous_friction_Nms_per_rad / haste}

@@ -98,7 +98,7 @@ def similar_worm(
             strands.one_number("linear_density_kg_per_m") * longer**2,
             "the base's density",
         ),
-        "body.strands.damping_time_s": ((strands.material_damping_s or 0.0) * slower, "a time: radius^0.5"),
+        "body.strands.damping_time_s": (strands.damping_time_s * slower, "a time: radius^0.5"),
         "body.pins.mass_kg": (pins.one_number("mass_kg") * longer**3, "the base's share of the weight"),
         "body.pins.radius_m": (pins.radius_m * scale, "a length"),
         "body.springs.stiffness_N_per_m": (
@@ -129,7 +129,7 @@ def similar_worm(
         "guard.depth_m": (base.guard.depth_m * scale, "a length"),
     }
     # What follows from the whole mesh. The window was measured at the base's damping, which a similar worm's is.
-    similar = load_config(BASE, _values(fields) | {"body.strands.damping_time_s": strands.material_damping_s})
+    similar = load_config(BASE, _values(fields) | {"body.strands.damping_time_s": strands.damping_time_s})
     body = similar.body
     window = tolerance_window_m(similar)
     assert isinstance(body, WormBody)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from annelid.config import RunConfig, field_value, fields_of
+from annelid.config import REPLACED, RunConfig, field_value, fields_of, has_field
 from annelid.errors import ConfigError, RunFileError, UnreadableText, listed
 from annelid.registry import Registry
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
@@ -32,7 +32,7 @@ MESSAGE_BYTES = 512
 WARNINGS = "warnings"
 WARNING_BYTES = 8192
 SCHEMA = "schema_version"
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 """Of the file's names and their meanings; a change that an older reader would take for something else raises it, and
 `migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
@@ -42,8 +42,6 @@ STATUSES = ("running_or_killed", "complete", "interrupted", "stopped_by_guard", 
 """How a run ended, in the order of the file's ``status_code``; ``failed``: its plant or controller raised."""
 
 CPU_TIME = "cpu_time"
-_GONE = {"controller": {"landing"}, "body.formulation": {"pin_inertance_kg", "lateral_damping_Nms_per_rad"}}
-"""Sections and their fields that older files may have."""
 _BOOKKEEPING = ("samples_written", "frames_written", "status_code", "status_message")
 
 
@@ -139,14 +137,14 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
     Up to schema 1 the name of a configuration decided which published numbers its runs were compared with. Up to schema
-    3 there were fields that are gone (`_GONE`); a run in which one acted says so among its warnings.
+    4 there were fields that are gone (`annelid.config.REPLACED`); a run in which one acted says so among its warnings.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
         data = data.assign({name: value for name, value in added.items() if name not in data})
     if data.attrs.get(SCHEMA, 0) < 2:
         data = data.assign_attrs(config=_with_published(data.attrs["config"]))
-    if data.attrs.get(SCHEMA, 0) < 4:
+    if data.attrs.get(SCHEMA, 0) < SCHEMA_VERSION:
         data = _without_gone_fields(data)
     return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
 
@@ -165,12 +163,16 @@ def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
     warnings = []
     try:
         tree = parse_json(data.attrs["config"], "the configuration")
-        for path, fields in _GONE.items():
-            section = reduce(lambda part, name: part.get(name, {}), path.split("."), tree)
-            for field in fields & section.keys():
-                value = section.pop(field)
-                if value and (field != "pin_inertance_kg" or section.get("pins") == "separate"):
-                    warnings.append(f"{path}.{field} was {value}, a field that is gone: its command does not repeat it")
+        for path, instead in REPLACED.items():
+            *sections, field = path.split(".")
+            section = reduce(lambda part, name: part.get(name, {}), sections, tree)
+            if field not in section or has_field(path, tree):
+                continue
+            value = section.pop(field)
+            if value and (field != "pin_inertance_kg" or section.get("pins") == "separate"):
+                warnings.append(f"{path} was {value}, a field that is gone ({instead}): its command does not repeat it")
+        if tree["body"].get("strands", {}).get("damping_time_s", 0.0) is None:
+            del tree["body"]["strands"]["damping_time_s"]
     except (UnreadableText, KeyError, TypeError, AttributeError):
         return data  # What is wrong with it, its reader says.
     if warnings:

@@ -170,7 +170,7 @@ class WormPlant:
         self.two_step: TwoStep | None = None
         if body.formulation.has_rods:
             stiffness = net_stiffness(self.geometry, body.strands)
-            self.strains = RodStrains(self.model, stiffness, body.strands.damping_time_s or 0.0)
+            self.strains = RodStrains(self.model, stiffness, body.strands.damping_time_s)
             first_order = body.formulation.engine_share(arena) == 1.0
             self.two_step = TwoStep(self.model, data, self.strains, first_order=first_order)
         moving = arena.has_moving_planes

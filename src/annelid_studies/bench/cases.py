@@ -41,10 +41,7 @@ _SETTINGS = {
     "tolerance 1e-6": {"body.formulation.solver_tolerance": 1e-6},
     "tolerance 1e-2": {"body.formulation.solver_tolerance": 1e-2},
     "impedance ratio 1": _CREEPING,
-    "pyramidal cones": {"arena.friction_cone": "pyramidal"},
     "edges in 1 ms": {"body.formulation.edge_time_constant_s": 0.001},
-    "constant curvature": {"body.formulation.curvature": "constant"},
-    "Euler": {"body.formulation.integrator": "Euler"},
 }
 _CHAIN: dict[str, Any] = {"body.formulation": TIGHT_CHAIN}
 # 31 segments of three elements a side are beyond the limit of the engine (docs/upstream/sparse_ordering.md).

@@ -29,6 +29,7 @@ class Chain(FormulationKind):
     """The paper's formulation: rigid capsules on damped elastic joints, with a point mass at every pin."""
 
     is_papers: ClassVar[bool] = True
+    friction_cone: ClassVar[Literal["elliptic", "pyramidal"]] = "pyramidal"
     kind: Literal["chain"] = "chain"
     joint: Literal["ball", "hinges"] = Field(
         default="ball",
@@ -111,5 +112,5 @@ def _largest_step_s(body: WormBody, formulation: Chain) -> float:
     swung = max((4.0 * stiffness / inertia) ** 0.5, (4.0 * body.springs.one_number("stiffness_N_per_m") / mass) ** 0.5)
     if formulation.integrator != "RK4":
         return 2.0 / swung
-    damped = 4.0 * strands.joint_damping(stiffness) / inertia
+    damped = 4.0 * strands.damping_time_s * stiffness / inertia
     return min(_RK4_SWUNG / swung, _RK4_DAMPED / damped if damped else inf)

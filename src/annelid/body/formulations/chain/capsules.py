@@ -126,7 +126,7 @@ def _add_joint(
         link.add_joint(
             type=kind,
             stiffness=[stiffness, 0.0, 0.0],
-            damping=[strands.joint_damping(stiffness), 0.0, 0.0],
+            damping=[strands.damping_time_s * stiffness, 0.0, 0.0],
             armature=formulation.armature_kg_m2,
             **axis,
         )

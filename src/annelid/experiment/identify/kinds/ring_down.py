@@ -53,7 +53,7 @@ class RingDown(Experiment):
     def mode(self, config: RunConfig) -> tuple[float, float]:
         """Undamped angular frequency of a worm's strand, rad/s, and the rate at which its amplitude decays, 1/s."""
         strands = config.body.strands if isinstance(config.body, WormBody) else None
-        if strands is None or not strands.material_damping_s:
+        if strands is None or not strands.damping_time_s:
             raise ConfigError(
                 f"experiments.{self.name}: a ring-down needs strands with a damping of the material: set "
                 "body.strands.damping_time_s"
@@ -61,7 +61,7 @@ class RingDown(Experiment):
         density = strands.one_number("linear_density_kg_per_m")
         root = first_root(self.tip_mass_kg / (density * self.length_m))
         frequency = root**2 * sqrt(strands.bending_rigidity_Nm2 / density) / self.length_m**2
-        return frequency, frequency**2 * strands.material_damping_s / 2.0
+        return frequency, frequency**2 * strands.damping_time_s / 2.0
 
 
 def first_root(tip: float) -> float:

@@ -250,14 +250,16 @@ def laid_down(anatomy: Anatomy, body: WormBody) -> Placed:
     return turned(anatomy.model, heading_turn(body.heading_deg) @ turn, -lowest_m)
 
 
-def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0) -> Placed:
-    """Turns a worm at rest by a rotation matrix, ``(3, 3)``, about the model's origin, which is below its front end.
+def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, qpos: Array | None = None) -> Placed:
+    """Turns a worm, at rest unless a posture is given, by a rotation matrix, ``(3, 3)``, about the model's origin.
+
+    That is below its front end.
 
     The model lies along x, and its state at the start is that of the turned worm. So all that belongs to the body
     (which segment and side a part of the skin is on, the grain of setae, rest lengths) is the same for all headings,
     and worms of several headings may share one compiled model.
     """
-    qpos = model.qpos0.copy()
+    qpos = (model.qpos0 if qpos is None else qpos).copy()
     # Points on three slides along the world's axes.
     slides = model.jnt_type[model.body_jntadr] == int(mujoco.mjtJoint.mjJNT_SLIDE)
     scene = in_scene(model)

@@ -207,6 +207,15 @@ class WormPlant:
 
     def move(self, activation: Array, n_steps: int) -> Movement:
         """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
+        return self._move(activation, n_steps, acts=True)
+
+    def _act(self, commands: Array, time_s: float) -> None:
+        """Lets the actuators follow commands, ``(n_commands, n_muscles)``, each for a time, s."""
+        lengths = self.posture.ring_length
+        self.act[:] = self.anatomy.rings.states_after(self.model, commands, self.act, lengths, time_s)
+
+    def _move(self, activation: Array, n_steps: int, *, acts: bool) -> Movement:
+        """As `move`, with actuators that have followed their commands unless they are to do it now."""
         trial, rings = self._config.trial, self.anatomy.rings
         self._skin_before = self.posture.skin
         self._activation = activation
@@ -216,9 +225,8 @@ class WormPlant:
         try:
             for _ in range(n_steps):
                 # What the actuators have come to at the end of a step acts in it.
-                if not self._acts_by_command:
-                    lengths, commands = self.posture.ring_length, activation[np.newaxis]
-                    self.act[:] = rings.states_after(self.model, commands, self.act, lengths, self._step_s)
+                if acts:
+                    self._act(activation[np.newaxis], self._step_s)
                 self.ctrl[:] = rings.control(activation, self.act)
                 self._take_step(self.act.copy() if self.model.na else activation)
         except mujoco.FatalError as error:
@@ -302,9 +310,8 @@ class WormPlant:
         n_steps = len(activation)
         due = self.moves_due(n_steps)
         if self._acts_by_command:
-            lengths, control_s = self.posture.ring_length, self._config.clock.control_timestep_s
-            self.act[:] = self.anatomy.rings.states_after(self.model, activation, self.act, lengths, control_s)
-        return self.after(n_steps, self.move(activation[-1], due) if due else None)
+            self._act(activation, self._config.clock.control_timestep_s)
+        return self.after(n_steps, self._move(activation[-1], due, acts=not self._acts_by_command) if due else None)
 
     def moves_due(self, n_steps: int) -> int:
         """Number of physics steps at the end of the next ``n_steps`` control steps, at most `steps_to_move` of them."""

@@ -22,7 +22,7 @@ from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.formulations import densities_kg_per_m
 from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
-from annelid.body.rows import add_holder, add_tie
+from annelid.body.rows import add_held_coordinate, add_holder, add_tie
 from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
@@ -190,6 +190,8 @@ def add_rod(
     if stiffness_Nm is None:
         flex.young, flex.shear = strands.one_number("young_modulus_Pa"), strands.one_number("shear_modulus_Pa")
         flex.damping = strands.damping_time_s
+    # In every model, so that a written one has as many coordinates as a plant's.
+    add_held_coordinate(spec)
     flex.vertbody = bodies
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
     with _built_apart(spec, f"{name}_") as part:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -13,7 +11,7 @@ import pytest
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
 from annelid.config import load_config
-from annelid.simulation.energies import EnergyMeter, EnergyTotals
+from annelid.simulation.energies import EnergyMeter, EnergyTotals, Powers, done_in
 from annelid.simulation.worm import WormPlant
 
 FREE = {"arena.floor_gap_m": 30.0, "body.rings.passive_peak": 1e-12}
@@ -42,31 +40,27 @@ def remainder(plant: WormPlant, start_J: float) -> float:
 
 
 def test_a_falling_worm_turns_potential_into_kinetic_energy() -> None:
-    """The engine falls n (n + 1) / 2 steps of g h^2; only half a square of g h a step is lost.
-
-    The hinges' holders, a millionth of the mass, do not fall.
-    """
+    """By BDF2 from rest it falls half a step late. The hinges' holders, a millionth of the mass, do not fall."""
     step_s, n_steps, gravity = 0.002, 50, 9.81
     plant = worm(step_s, **FREE)
     start = plant.potential_energy_J()
     for _ in range(n_steps):
         plant.step(np.zeros(3))
-    mass = plant.total_mass_kg
-    assert plant.kinetic_energy_J() == pytest.approx(0.5 * mass * (gravity * n_steps * step_s) ** 2, rel=1e-5)
-    fallen = gravity * step_s**2 * n_steps * (n_steps + 1) / 2
-    assert start - plant.potential_energy_J() == pytest.approx(mass * gravity * fallen, rel=1e-5)
+    mass, falls_s = plant.total_mass_kg, (n_steps - 0.5) * step_s
+    assert plant.kinetic_energy_J() == pytest.approx(0.5 * mass * (gravity * falls_s) ** 2, rel=1e-5)
+    assert start - plant.potential_energy_J() == pytest.approx(0.5 * mass * (gravity * falls_s) ** 2, rel=2e-3)
     assert plant.elastic_energy_J() == pytest.approx(0.0, abs=1e-9)
-    assert remainder(plant, start) == pytest.approx(0.5 * mass * (gravity * step_s) ** 2 * n_steps, rel=1e-3)
+    assert remainder(plant, start) == pytest.approx(0.0, abs=2e-3 * plant.kinetic_energy_J())
     read = plant.read(False)
     assert np.abs(read["muscle_work"]).max() + abs(float(read["damping_loss"])) < 1e-9
 
 
-@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 0.002])
+@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 0.016])
 def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float) -> None:
     """Weightless, set moving lengthwise: what is missing shrinks with the step."""
     missing, swapped, lost = [], [], []
     for step_s in (0.002, 0.001, 0.0005):
-        quiet = {**FREE, "arena.gravity_m_per_s2": 0.0, "body.strands.joint_damping_Nms_per_rad": damping}
+        quiet = {**FREE, "arena.gravity_m_per_s2": 0.0, "body.strands.damping_time_s": damping}
         plant = worm(step_s, **quiet)
         start = 0.0
         for crossing, place in enumerate(plant.geometry.crossings_m):
@@ -74,6 +68,8 @@ def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float
             name = f"crossing_{crossing}"
             plant.data.qvel[plant.model.joint(f"{name}_x").dofadr[0]] = speed
             start += 0.5 * float(plant.model.body(name).mass[0]) * speed**2
+        assert plant.two_step is not None
+        plant.two_step.rest()
         elastic = []
         for _ in range(round(0.1 / step_s)):
             plant.step(np.zeros(3))
@@ -113,42 +109,17 @@ def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(ri
     met = set()
     for _ in range(80):
         plant.step(activation)
-        ids, h = data.efm_aid[: data.nefmA], 0.005
+        ids, h = data.efm_aid[: data.nefmA], plant.model.opt.timestep
         stiffness, metric = np.zeros(n), np.zeros(n)
         stiffness[ids] = data.efm_ak[: data.nefmA]
         metric[ids] = data.efm_as[: data.nefmA]
         per_length, per_rate = energy_meter.slopes(
-            data.actuator_length, data.actuator_velocity, activation, -data.actuator_force
+            data.actuator_length, data.actuator_velocity, data.act, -data.actuator_force
         )
         assert h * per_length == pytest.approx(stiffness, abs=1e-9)
         assert h * per_rate + h * h * per_length == pytest.approx(metric, abs=1e-9)
         met |= set((per_length > 0).tolist())
     assert met == {True, False}
-
-
-@pytest.mark.parametrize("rings", [{}, SERVOS], ids=["muscles", "servos"])
-def test_the_totals_close_with_the_matrices_of_the_engine_s_integrator(rings: dict[str, Any]) -> None:
-    """What is left of the muscles' work is what the integrator takes: weight, contacts and work are all there."""
-    place = Path(__file__).parents[2] / "benchmarks" / "energy_balance.py"
-    spec = importlib.util.spec_from_file_location("energy_balance", place)
-    assert spec is not None
-    assert spec.loader is not None
-    benchmark = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(benchmark)
-    clock = {"control_timestep_s": 0.005, "physics_timestep_s": 0.005}
-    plant = benchmark.AuditedWorm(load_config({"clock": clock}, {"arena.floor_gap_m": 0.0, **rings}))
-    plant.reset(0)
-    start_J, elastic_J = held(plant), plant.elastic_energy_J()
-    activation = np.resize([1.0, 0.0, 0.3], plant.n_muscles)
-    for _ in range(60):
-        plant.step(activation)
-    left = remainder(plant, start_J)
-    integrator = plant.integrator_J - plant.spring_J - (plant.elastic_energy_J() - elastic_J)
-    work = float(np.sum(plant.read(False)["muscle_work"]))
-    assert work > 0.05
-    assert left > 0.02 * work
-    assert left == pytest.approx(integrator, abs=1e-3 * work)
-    assert float(plant.read(False)["constraint_loss"]) != 0.0
 
 
 SPRING_MASS = """
@@ -175,29 +146,30 @@ LAW = "0.75 1.05 117.57 200 0.58 1.6 1.5 1.3 1.2"
 MUSCLE = f'gaintype="muscle" biastype="muscle" lengthrange="0.5 1.1" gainprm="{LAW}" biasprm="{LAW}"'
 
 
-def test_the_totals_of_a_mass_on_a_spring_and_a_servo_in_closed_form() -> None:
-    """All is linear: of the muscle's work, the integrator takes (m dv^2 + k dx^2) / 2 and the damping of the change."""
-    model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=0.01, actuator=SERVO))
-    data = mujoco.MjData(model)
-    data.act[:] = 1.0
-    energy_meter = EnergyMeter(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
-    mass, rate, damping = 2.0, 80.0, 1.5
-    totals, expected = EnergyTotals.zero(1), 0.0
-    data.ctrl[:] = -0.3
-    for _ in range(80):
-        x, v = float(data.qpos[0]), float(data.qvel[0])
-        mujoco.mj_step(model, data)
-        tension, entries = energy_meter.step({name: getattr(data, name) for name in energy_meter.outputs}, data.ctrl)
-        totals = totals.plus(entries)
-        assert tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
-        dx, dv = float(data.qpos[0]) - x, float(data.qvel[0]) - v
-        expected += 0.5 * mass * dv**2 + 0.5 * rate * dx**2 + damping * dv * dx
+def test_the_totals_of_a_mass_on_a_spring_and_a_servo_lack_what_the_step_takes() -> None:
+    """The engine's own step takes a share in proportion to the step; the totals add none of their own."""
+    missing = []
+    for step_s in (0.004, 0.002):
+        model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=step_s, actuator=SERVO))
+        data = mujoco.MjData(model)
+        data.act[:] = 1.0
+        energy_meter = EnergyMeter(model, ServoRings(stiffness_N_per_m=200.0, damping_Ns_per_m=10.0))
+        mass, rate = 2.0, 80.0
+        totals, powers = EnergyTotals.zero(1), Powers.none(1)
+        data.ctrl[:] = -0.3
+        for _ in range(round(0.8 / step_s)):
+            x, v = float(data.qpos[0]), float(data.qvel[0])
+            mujoco.mj_step(model, data)
+            before, powers = powers, energy_meter.read({n: getattr(data, n) for n in energy_meter.outputs}, data.ctrl)
+            assert powers.tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
+            totals = totals.plus(done_in(step_s, np.array([x - float(data.qpos[0])]), before, powers))
         held = 0.5 * mass * data.qvel[0] ** 2 + 0.5 * rate * (data.qpos[0] + 0.1) ** 2 - 0.5 * rate * 0.1**2
         left = float(totals.muscle_work[0] - totals.damping_loss - totals.constraint_loss) - held
-        assert left == pytest.approx(expected, abs=1e-9)
-    assert data.qpos[0] < -0.1
-    assert totals.muscle_work[0] > 0.05
-    assert totals.damping_loss > 0.001
+        assert data.qpos[0] < -0.1
+        assert totals.muscle_work[0] > 0.05
+        assert totals.damping_loss > 0.001
+        missing.append(left)
+    assert 0.0 < missing[1] < 0.6 * missing[0]
 
 
 def pulled(data: mujoco.MjData, before_m_per_s: float) -> float:
@@ -215,31 +187,23 @@ def test_the_tension_of_a_muscle_that_sets_in_at_once_is_what_draws_its_load(ste
         before = float(data.qvel[0])
         mujoco.mj_step(model, data)
         engine = {name: getattr(data, name) for name in energy_meter.outputs}
-        tension, _ = energy_meter.step(engine, data.ctrl)
+        tension = energy_meter.read(engine, data.ctrl).tension
         assert tension[0] == pytest.approx(pulled(data, before), rel=1e-6)
         if step == 0:
             assert 0.0 < tension[0] < -data.actuator_force[0], "the load yields within the step"
     assert data.qpos[0] < -0.1
 
 
-def test_what_pulls_at_the_start_of_a_contraction_is_the_same_at_long_and_short_steps() -> None:
-    """The force before the step is 117 N at any step; work is what pulled times the shortening of the drawn path."""
-    peaks = []
-    for step_s in (0.02, 0.005, 0.002):
-        plant = worm(step_s)
-        before, work = plant.posture.ring_length, 0.0
-        recorded, engine = [], []
-        for _ in range(round(0.1 / step_s)):
-            felt = plant.step(np.array([1.0, 0.0, 0.0]))
-            recorded.append(float(felt.muscle_force_N[0]))
-            engine.append(-float(plant.data.actuator_force[0]))
-            work += float(felt.muscle_force_N[0] * (before - felt.ring_length_m)[0])
-            before = felt.ring_length_m
-        assert max(engine) > 110.0
-        peaks.append(max(recorded))
-        assert work == pytest.approx(plant.energies.muscle_work[0], rel=2e-3)
-        assert np.array_equal(plant.read(False)["muscle_force"], plant.observe().muscle_force_N)
-    assert all(4.0 < peak < 10.0 for peak in peaks), peaks
+def test_work_is_the_mean_pull_times_the_shortening() -> None:
+    plant = worm(0.005)
+    before, pull, work = plant.posture.ring_length, np.zeros(3), np.zeros(3)
+    for _ in range(40):
+        felt = plant.step(np.array([1.0, 0.0, 0.2]))
+        work += 0.5 * (pull + felt.muscle_force_N) * (before - felt.ring_length_m)
+        before, pull = felt.ring_length_m, felt.muscle_force_N
+    assert work[0] > 0.1
+    assert plant.energies.muscle_work == pytest.approx(work, rel=1e-9)
+    assert np.array_equal(plant.read(False)["muscle_force"], plant.observe().muscle_force_N)
 
 
 def test_positive_work_is_that_of_the_steps_in_which_a_muscle_shortens() -> None:
@@ -251,19 +215,3 @@ def test_positive_work_is_that_of_the_steps_in_which_a_muscle_shortens() -> None
         last = plant.energies.muscle_work
     assert plant.energies.positive_work == pytest.approx(expected, abs=1e-12)
     assert (plant.energies.positive_work - last).max() > 1e-3, "a muscle must have been lengthened while it pulled"
-
-
-def test_a_chain_under_euler_lacks_only_the_square_of_its_changes_of_velocity() -> None:
-    """Its mass matrix turns with the strands, which costs the identity a little."""
-    chain = {"body.formulation.kind": "chain", "body.formulation.integrator": "Euler"}
-    plant = worm(0.001, **chain)
-    start_J, squares = held(plant), 0.0
-    change = np.zeros(plant.model.nv)
-    for _ in range(60):
-        before = plant.data.qvel.copy()
-        plant.step(np.array([1.0, 0.0, 0.3]))
-        mujoco.mj_mulM(plant.model, plant.data, change, plant.data.qvel - before)
-        squares += 0.5 * float(change @ (plant.data.qvel - before))
-    work = float(np.sum(plant.read(False)["muscle_work"]))
-    assert squares > 0.02 * work
-    assert remainder(plant, start_J) == pytest.approx(squares, abs=0.01 * work)

@@ -37,12 +37,10 @@ class TwoStep:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, strains: RodStrains, *, first_order: bool) -> None:
         """Takes a compiled worm at rest."""
         self._model, self._data, self._strains, self._first_order = model, data, strains, first_order
-        sites = np.flatnonzero(model.tendon_num > 0)
-        spatial = sites[model.wrap_type[model.tendon_adr[sites]] == int(mujoco.mjtWrap.mjWRAP_SITE)]
-        entries = [np.arange(model.ten_J_rownnz[t]) + model.ten_J_rowadr[t] for t in spatial]
-        self._entry = np.concatenate(entries).astype(np.intp)
-        self._entry_dof = model.ten_J_colind[self._entry].astype(np.intp)
-        self._entry_tendon = np.repeat(spatial, [len(each) for each in entries])
+        spatial = np.flatnonzero(model.wrap_type[model.tendon_adr] == int(mujoco.mjtWrap.mjWRAP_SITE))
+        tendon = np.repeat(np.arange(model.ntendon), model.ten_J_rownnz)
+        self._entry = np.flatnonzero(np.isin(tendon, spatial))
+        self._entry_tendon, self._entry_dof = tendon[self._entry], model.ten_J_colind[self._entry].astype(np.intp)
         self._pulls = model.actuator_trnid[:, 0].astype(np.intp)
         self._rows: np.ndarray | None = None
         self.rest()

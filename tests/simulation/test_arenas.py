@@ -14,7 +14,7 @@ from annelid.arena.surface import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation
-from annelid.simulation.batch_body import BatchWorm, BodyBatch, compile_worms
+from annelid.simulation.batch import compile_worms
 from annelid.simulation.ground import facing
 from annelid.simulation.loop import simulate
 from annelid.simulation.stepping import build_controller
@@ -29,19 +29,21 @@ def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
 
 
 QUICK: dict[str, Any] = {
-    "body__strands__damping_time_s": None,
-    "body__strands__joint_damping_Nms_per_rad": 0.02,
-    "body__formulation__integrator": "Euler",
+    "body__strands__damping_time_s": 0.1,
+    "body__rings__activation_dynamics": False,
 }
 """Damped little, so that a worm soon comes to rest."""
 
 
 def settled(plant: WormPlant, duration_s: float, activation: Array | None = None) -> WormPlant:
-    every = plant.steps_to_move()
-    n = round(duration_s / plant.model.opt.timestep)
-    for _ in range(n):
-        plant.stride(np.zeros(plant.n_muscles) if activation is None else activation, every)
+    pull = np.zeros(plant.n_muscles) if activation is None else activation
+    for _ in range(round(duration_s / plant._config.clock.physics_timestep_s)):
+        plant.stride(np.tile(pull, (plant.steps_to_move(), 1)))
     return plant
+
+
+def batch(configs: list[RunConfig]) -> list[WormPlant]:
+    return [WormPlant(*each) for each in zip(configs, compile_worms(configs), strict=True)]
 
 
 def reset(made: RunConfig) -> WormPlant:
@@ -159,32 +161,23 @@ def test_setae_rectify_a_breath_without_a_wave() -> None:
 @pytest.mark.parametrize("arena", [pytest.param("pipe.s", marks=pytest.mark.slow), "setae"])
 def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
     configs = [config(arena), config(arena, arena__friction=0.6), config(arena)]
-    bodies = BodyBatch(configs, compile_worms(configs))
-    pull = np.array([1.0, 0.0, 0.3])
+    worms = batch(configs)
     alone = [reset(made) for made in configs]
-    for worm in bodies.worms:
-        worm.reset(0)
-    every = alone[0].steps_to_move()
+    pull = np.tile([1.0, 0.0, 0.3], (alone[0].steps_to_move(), 1))
     felt: list[Sensation] = []
     for _ in range(10):
-        felt = [stride(worm, pull, every) for worm in bodies.worms]
+        felt = [worm.stride(pull) for worm in worms]
         for plant, ours in zip(alone, felt, strict=True):
-            theirs = plant.stride(pull, every)
+            theirs = plant.stride(pull)
             assert np.array_equal(ours.center_of_mass_m, theirs.center_of_mass_m)
             assert np.array_equal(ours.contact_force_N, theirs.contact_force_N)
     assert not np.array_equal(felt[0].center_of_mass_m, felt[1].center_of_mass_m)
     assert np.array_equal(felt[0].center_of_mass_m, felt[2].center_of_mass_m)
 
 
-def stride(worm: BatchWorm, activation: Array, n_steps: int) -> Sensation:
-    return worm.stride(activation, n_steps)
-
-
 def test_worms_in_pipes_of_different_shapes_make_one_batch() -> None:
     configs = [config("pipe.bend"), config("pipe.helix"), config("pipe.taper")]
-    bodies = BodyBatch(configs, compile_worms(configs))
-    for worm in bodies.worms:
-        worm.reset(0)
+    for worm in batch(configs):
         assert worm.step(np.zeros(3)).center_of_mass_m[2] == pytest.approx(0.16, abs=0.02)
 
 
@@ -242,7 +235,7 @@ def test_the_start_is_quiet(arena: str) -> None:
     assert surface_of(plant._config.arena).distance_m(skin_places(plant)).min() > radius  # type: ignore[arg-type]
     most = 0.0
     for _ in range(20):
-        settled(plant, plant.model.opt.timestep)
+        settled(plant, plant._config.clock.physics_timestep_s)
         most = max(most, plant.kinetic_energy_J())
     assert most < plant.total_mass_kg * 9.81 * 0.01
 

@@ -100,7 +100,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "heteroclinic channel": {"controller.kind": "shc", "body.rings.layout": "halves"},
     "adaptive network": {"controller.kind": "adaptive"},
     "pressure feedback": {"controller.kind": "sns-pressure"},
-    "chain": CHAIN | {"body.formulation.integrator": "Euler"},
+    "chain": CHAIN | {},
     "chain with direct pins, RK4": CHAIN | {"body.formulation.pins": "direct"},
 }
 

@@ -27,7 +27,6 @@ FORMULATIONS: dict[str, dict[str, Any]] = {
     "rods": {},
     "chain": {
         "body.formulation.kind": "chain",
-        "body.formulation.integrator": "Euler",
         "body.formulation.pins": "direct",
         # As the paper's chain has it: its solver is less exact with elliptic cones.
         "arena.friction_cone": "pyramidal",

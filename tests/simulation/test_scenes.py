@@ -17,7 +17,7 @@ from annelid.body.assemble import mjcf_text
 from annelid.draw.scene import DrawnWorm
 from annelid.errors import ConfigError
 from annelid.simulation import Run
-from annelid.simulation.batch_body import BodyBatch, compile_worms
+from annelid.simulation.batch import compile_worms
 from annelid.simulation.worm import WormPlant
 
 ROOT = Path(__file__).parents[2]
@@ -27,10 +27,8 @@ COARSE: dict[str, Any] = {
     "body.mesh.elements_per_side": 1,
     "clock": {"control_timestep_s": STEP_S, "physics_timestep_s": STEP_S},
     "record": {"signals_interval_s": STEP_S, "frames_interval_s": 0.02},
-    # As scenes whose bodies move have it anyway, to compare with.
-    "body.formulation.integrator": "Euler",
 }
-QUICK = {"body.strands.damping_time_s": None, "body.strands.joint_damping_Nms_per_rad": 0.02}
+QUICK = {"body.strands.damping_time_s": 0.1}
 """Damped little, so that a worm soon comes to rest."""
 
 
@@ -220,13 +218,11 @@ def test_pictures_show_things_where_they_are(tmp_path: Path) -> None:
 
 def test_a_batch_computes_the_same_bits_in_a_scene() -> None:
     configs = [config(BOX), config(BOX, changes={"arena.friction": 0.6})]
-    bodies = BodyBatch(configs, compile_worms(configs))
+    worms = [WormPlant(*each) for each in zip(configs, compile_worms(configs), strict=True)]
     alone = [WormPlant(made) for made in configs]
-    for worm in (*bodies.worms, *alone):
-        worm.reset(0)
     pushed_N = 0.0
     for _ in range(40):
-        for worm, plant in zip(bodies.worms, alone, strict=True):
+        for worm, plant in zip(worms, alone, strict=True):
             ours, theirs = worm.step(np.ones(3)), plant.step(np.ones(3))
             assert np.array_equal(ours.center_of_mass_m, theirs.center_of_mass_m)
             for name in ("object_position", "object_force", "touch", "slip_distance", "potential_energy"):

@@ -20,7 +20,6 @@ FORMULATIONS: dict[str, dict[str, Any]] = {
     "rods": {"body.mesh.elements_per_side": 2},
     "chain": {
         "body.formulation.kind": "chain",
-        "body.formulation.integrator": "Euler",
         "body.mesh.elements_per_side": 2,
         "clock.physics_timestep_s": 0.002,
     },
@@ -39,7 +38,7 @@ BELLY, LEFT, BACK, RIGHT = range(4)
 def resting(formulation: str, seconds: float = 0.6, **changes: Any) -> WormPlant:
     """A worm that has come to rest on level ground."""
     clock = {"control_timestep_s": STEP_S, "physics_timestep_s": STEP_S}
-    common = {"arena.friction": 0.3, "body.strands.joint_damping_Nms_per_rad": 0.02}
+    common = {"arena.friction": 0.3, "body.strands.damping_time_s": 0.16}
     plant = WormPlant(
         load_config(
             {"clock": clock, "record": {"signals_interval_s": STEP_S}},

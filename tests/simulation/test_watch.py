@@ -25,7 +25,6 @@ HARD = {
     "body.strands.linear_density_kg_per_m": 0.036985,
     "arena.contact_time_constant_s": 0.022763,
     "body.strands.damping_time_s": None,
-    "body.formulation.integrator": "Euler",
     "duration_s": 1.0,
 }
 SLACK = {

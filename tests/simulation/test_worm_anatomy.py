@@ -72,7 +72,9 @@ def test_lengths_are_the_distances_along_springs_and_rings() -> None:
 
 def test_contact_sensors_change_nothing_in_the_motion() -> None:
     # A model that moves by itself lacks the material's dampers.
-    undamped = {"body.strands.damping_time_s": None, "body.formulation.integrator": "Euler"}
+    undamped = {
+        "body.strands.damping_time_s": None,
+    }
     config = load_config("riddle2023-rods", SMALL | undamped | {"clock.physics_timestep_s": 0.01})
     plant = WormPlant(config)
     plant.reset(0)

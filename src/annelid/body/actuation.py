@@ -14,7 +14,7 @@ import numpy as np
 from annelid.arena.geoms import HIDDEN_GROUP
 from annelid.body.actuators import ActuatorKind
 from annelid.body.worm import Joints, Springs
-from annelid.morphology import Array, Indices, MeshGeometry
+from annelid.morphology import Indices, MeshGeometry
 
 SPRING_RGBA = (0.75, 0.15, 0.1, 1.0)
 PIN_RGBA = (0.25, 0.25, 0.28, 1.0)
@@ -28,12 +28,12 @@ def crossing_site(crossing: int) -> str:
     return f"crossing_{crossing}"
 
 
-def mark_crossing(pin: mujoco.MjsBody, name: str, radius_m: float, mass_kg: float, place_m: Array) -> None:
-    """Adds the sphere by which a crossing is drawn, and its site, at a place of a body."""
+def mark_crossing(pin: mujoco.MjsBody, name: str, radius_m: float, mass_kg: float) -> None:
+    """Adds the sphere by which a crossing is drawn, and its site, at the origin of a body."""
     ball = mujoco.mjtGeom.mjGEOM_SPHERE
     size = [radius_m, 0.0, 0.0]
-    pin.add_geom(name=name, type=ball, pos=place_m, size=size, mass=mass_kg, contype=0, conaffinity=0, rgba=PIN_RGBA)
-    pin.add_site(name=name, pos=place_m, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
+    pin.add_geom(name=name, type=ball, size=size, mass=mass_kg, contype=0, conaffinity=0, rgba=PIN_RGBA)
+    pin.add_site(name=name, size=[0.002, 0.002, 0.002], group=HIDDEN_GROUP)
 
 
 def ring_names(n_segments: int, rings: ActuatorKind) -> list[str]:

@@ -100,7 +100,9 @@ _SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", 
 
 REPLACED = {
     "body.formulation.curvature": "a strand's curvature is always linear between two crossings",
-    "body.formulation.integrator": "rods always take second-order steps (BDF2)",
+    "body.formulation.integrator": "rods always take second-order steps (BDF2), a chain those of Runge and Kutta",
+    "body.formulation.joint": "a chain's elements are always joined by three hinges",
+    "body.formulation.pins": "a chain's strands are always tied to a pin between them",
     "body.formulation.pin_inertance_kg": "pins are tied by springs and dashpots alone",
     "body.formulation.lateral_damping_Nms_per_rad": "set body.strands.damping_time_s, which damps every direction",
     "body.strands.joint_damping_Nms_per_rad": "set body.strands.damping_time_s, a joint's damping over its stiffness",

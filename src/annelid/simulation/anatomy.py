@@ -250,7 +250,7 @@ def laid_down(anatomy: Anatomy, body: WormBody) -> Placed:
     return turned(anatomy.model, heading_turn(body.heading_deg) @ turn, -lowest_m)
 
 
-def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, qpos: Array | None = None) -> Placed:
+def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, posture: Array | None = None) -> Placed:
     """Turns a worm, at rest unless a posture is given, by a rotation matrix, ``(3, 3)``, about the model's origin.
 
     That is below its front end.
@@ -259,7 +259,7 @@ def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, qpos: Arra
     (which segment and side a part of the skin is on, the grain of setae, rest lengths) is the same for all headings,
     and worms of several headings may share one compiled model.
     """
-    qpos = (model.qpos0 if qpos is None else qpos).copy()
+    qpos: Array = (model.qpos0 if posture is None else posture).copy()
     # Points on three slides along the world's axes.
     slides = model.jnt_type[model.body_jntadr] == int(mujoco.mjtJoint.mjJNT_SLIDE)
     scene = in_scene(model)

@@ -34,7 +34,6 @@ from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 MAIN = Case(CHAIN)
 VARIANTS = {
     "riddle2023": MAIN,
-    "one ball joint an element": Case(CHAIN, {"body.formulation.joint": "ball"}),
     "contacts as in the authors' file": Case(
         CHAIN, {"arena.contact_time_constant_s": 0.01, "arena.contact_impedance": [0.95, 0.99, 0.0001]}
     ),

@@ -252,8 +252,8 @@ def actuation_claims(evidence: Evidence) -> list[Claim]:
 
 def velocity_claim(evidence: Evidence) -> Claim:
     """Judges the claim about how fast a contraction begins."""
-    overshoot = evidence.number("timestep", "times_velocity_limit_chain_rk4_1ms")
-    finer = evidence.number("timestep", "times_velocity_limit_chain_rk4_0.5ms")
+    overshoot = evidence.number("timestep", "times_velocity_limit_chain_1ms")
+    finer = evidence.number("timestep", "times_velocity_limit_chain_0.5ms")
     return _of_actuation(
         "The muscles' maximum shortening velocity bounds the contraction (Eq. 1 at steps of 1 ms).",
         "sections 2.2, 3",

@@ -20,8 +20,6 @@ from annelid_studies.riddle2023.words import CM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other
 
-EULER = {"body.formulation.integrator": "Euler", "clock.physics_timestep_s": 0.001}
-"""At 2 ms the rings shoot to a few millimetres when a contraction sets in, and a guard ends the run."""
 PRESETS_ELEMENTS = 3
 """Elements a side in the presets, and in the paper."""
 HELD: Mapping[Effort, Mapping[Worm, Sequence[int]]] = {
@@ -39,13 +37,8 @@ def _points(effort: Effort) -> list[Point]:
         for n in elements:
             mesh = {"body.mesh.elements_per_side": n}
             walk = worm.case(mesh) if worm is RIGID and n in WALKED[effort] else None
-            integrator = EULER if worm is PAPERS else {}
-            points.append(Point(worm, n, walk, worm.case({**mesh, **integrator, **one_after_the_other()})))
+            points.append(Point(worm, n, walk, worm.case({**mesh, **one_after_the_other()})))
     return points
-
-
-_OWN_INTEGRATOR = PAPERS.case({"body.mesh.elements_per_side": PRESETS_ELEMENTS, **one_after_the_other()})
-"""The chain held with the preset's RK4, to compare Euler's method with."""
 
 
 def convergence_order(elements: ArrayLike, difference: ArrayLike, finest: float) -> float | None:
@@ -131,16 +124,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         for name, apart in found.of_presets.items():
             kind = f"{name.replace(' ', '_')}_{found.worm.name}"
             numbers |= {f"difference_{kind}": apart, f"order_{kind}": found.order[name]}
-    if effort == "full":
-        own = Reading(PAPERS, PRESETS_ELEMENTS, hold=store[_OWN_INTEGRATOR])
-        euler = next(one for one in readings if (one.worm, one.value) == (PAPERS, PRESETS_ELEMENTS))
-        apart = {name: _apart(name, euler, own) for name in QUANTITIES}
-        numbers |= {f"euler_from_rk4_{name.replace(' ', '_')}": value for name, value in apart.items()}
-        remarks.append(
-            "The chain is computed with Euler steps of 1 ms, at half the cost of RK4 at 2 ms. With "
-            f"{PRESETS_ELEMENTS} elements the two differ by {_in_words(apart)}; RK4 elongates the segments by "
-            f"{words.all_in_cm(own.held_m)} cm."
-        )
     lines = {"-": "solid", "--": "dashed", ":": "dotted"}
     columns: Columns = {
         "worm": lambda one: one.worm.label,
@@ -220,6 +203,6 @@ DISCRETIZATION = Examination(
     "Elements per rhombus side",
     "The paper divides each rhombus side into three straight elements. Are held contractions and the walk converged "
     "there?",
-    lambda effort: [*design.cases_of(_points(effort)), *([_OWN_INTEGRATOR] if effort == "full" else [])],
+    lambda effort: design.cases_of(_points(effort)),
     _examine,
 )

@@ -21,10 +21,10 @@ from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, 
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
 from annelid_studies.riddle2023.words import CM, MM, PERCENT
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import HOLD_S, Effort, chain, fast, one_after_the_other, rods
+from annelid_studies.worms import HOLD_S, TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 
 STIFFNESSES_N_PER_M = (12.0, 26.0, 50.0, 100.0, 300.0, 1000.0)
-"""Ties of the rods; 26 N/m are the preset's."""
+"""Ties of the rods; 25.5 N/m are the preset's."""
 DAMPING_TIME_S = 0.04
 """Damping over stiffness of the ties, as the paper's pins have it, s."""
 TIME_CONSTANTS_S = (0.0126, 0.01, 0.008)
@@ -33,19 +33,14 @@ LONG_S = 3.0
 """A contraction long enough to settle, s."""
 
 _FORMULATION = "body.formulation"
-_DIRECT = {
-    f"{_FORMULATION}.pins": "direct",
-    f"{_FORMULATION}.pin_time_constant_s": 0.004,
-    f"{_FORMULATION}.pin_impedance": [0.95, 0.99, 0.001],
-}
+_TIGHT = {f"{_FORMULATION}.{name}": value for name, value in TIGHT_CHAIN.items() if name != "kind"}
 
 
 def tie_stiffness_N_per_m(case: Case) -> float:
     """Stiffness of the tie between a pin and a strand, N/m, averaged over the pins; infinite where they share a vertex.
 
     A soft constraint with time constant T and impedance d at critical damping pulls with ``K = k d / R`` per
-    violation, where ``k = 1 / (d T)^2`` and ``R = (1 - d) / d`` times the inverse mass of the pair. Where strands are
-    tied to each other without a pin between them, one tie does the work of two in series and counts double.
+    violation, where ``k = 1 / (d T)^2`` and ``R = (1 - d) / d`` times the inverse mass of the pair.
     """
     config = case.config
     if not isinstance(config.body, WormBody):
@@ -55,12 +50,12 @@ def tie_stiffness_N_per_m(case: Case) -> float:
         return formulation.pin_stiffness_N_per_m if formulation.pins == "separate" else float("inf")
     model = build_spec(config).compile()
     inverse_mass = model.body_invweight0[model.eq_obj1id, 0] + model.body_invweight0[model.eq_obj2id, 0]
-    pins, (_, impedance, _), time_s = (
-        field_value(config, f"{_FORMULATION}.{name}") for name in ("pins", "pin_impedance", "pin_time_constant_s")
+    (_, impedance, _), time_s = (
+        field_value(config, f"{_FORMULATION}.{name}") for name in ("pin_impedance", "pin_time_constant_s")
     )
     reference = 1.0 / (impedance * time_s) ** 2
     stiffness = reference * impedance / ((1.0 - impedance) / impedance * inverse_mass)
-    return float(stiffness.mean()) * (2.0 if pins == "direct" else 1.0)
+    return float(stiffness.mean())
 
 
 def _tied(stiffness: float) -> dict[str, Any]:
@@ -82,7 +77,7 @@ def _points(effort: Effort) -> list[Point]:
     chains = [paper]
     if effort == "full":
         stiffer = [{f"{_FORMULATION}.pin_time_constant_s": value} for value in TIME_CONSTANTS_S]
-        chains += [paper.but(changes) for changes in (*stiffer, _DIRECT)]
+        chains += [paper.but(changes) for changes in (*stiffer, _TIGHT)]
     walked = STIFFNESSES_N_PER_M if effort == "full" else STIFFNESSES_N_PER_M[1::3]
     sprung = [
         Point(SOFT, k, fast(_tied(k)) if k in walked else None, fast({**one_after_the_other(), **_tied(k)}))
@@ -129,7 +124,7 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         passes = abs(settled[1] / settled[0] - 1.0) < 0.5 * abs(own_m / tight_m - 1.0)
         remarks.insert(
             1,
-            "The stiffest chain here, its strands tied to each other without pin masses, has ties of about "
+            "The stiffest chain here has ties of about "
             f"{_rounded(stiffest.value)} N/m and elongates by {words.in_cm(stiffest.held_m[0])} cm, "
             f"{_beside(stiffest.held_m[0], tight_m)} the rods with rigid crossings.",
         )

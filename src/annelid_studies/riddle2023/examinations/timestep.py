@@ -1,9 +1,8 @@
-"""Integrator and time step: what of the walk, and of a contraction's first instants, is converged."""
+"""Time step: what of the walk, and of a contraction's first instants, is converged."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +21,7 @@ from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, MS
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import Effort, chain, one_after_the_other
+from annelid_studies.worms import Effort, one_after_the_other
 
 TRANSIENT_S = 0.1
 """How much of a contraction's beginning is resolved, s."""
@@ -33,27 +32,18 @@ PAPERS_STEP_MS = 1.0
 # Curves that end nearer than this share one label.
 _LABEL_SPAN_M = 0.05
 
-RK4 = replace(PAPERS, name="chain_rk4", label="the paper's chain, RK4")
-EULER = replace(
-    PAPERS,
-    name="chain_euler",
-    label="the paper's chain, Euler",
-    case=lambda changes: chain({"body.formulation.integrator": "Euler", **(changes or {})}),
-    line="-.",
-)
 WALKS: Mapping[Effort, Mapping[Worm, Sequence[float]]] = {
-    "quick": {RK4: (0.001, 0.002), SOFT: (0.010, 0.020), RIGID: (0.005, 0.010, 0.020)},
+    "quick": {PAPERS: (0.001, 0.002), SOFT: (0.010, 0.020), RIGID: (0.005, 0.010, 0.020)},
     "full": {
-        RK4: (0.0005, 0.001, 0.002, 0.004),
-        EULER: (0.001, 0.002),
+        PAPERS: (0.0005, 0.001, 0.002, 0.004),
         SOFT: (0.002, 0.005, 0.010, 0.020),
         RIGID: (0.001, 0.002, 0.005, 0.010, 0.020),
     },
 }
 """Steps, s, at which each worm walks."""
 STARTS: Mapping[Effort, Mapping[Worm, Sequence[float]]] = {
-    "quick": {RK4: (0.002, 0.001, 0.0005), RIGID: (0.005, 0.0005)},
-    "full": {RK4: (0.002, 0.001, 0.0005, 0.00025), RIGID: (0.005, 0.002, 0.0005)},
+    "quick": {PAPERS: (0.002, 0.001, 0.0005), RIGID: (0.005, 0.0005)},
+    "full": {PAPERS: (0.002, 0.001, 0.0005, 0.00025), RIGID: (0.005, 0.002, 0.0005)},
 }
 """Steps, s, at which the beginning of a contraction is resolved."""
 
@@ -151,7 +141,7 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         f"{words.in_unit(_speed(one))} times real time ({one.worm.label}, {one.value:g} ms)" for one in largest if one
     ]
     columns: Columns = {
-        "worm and integrator": lambda one: one.worm.label,
+        "worm": lambda one: one.worm.label,
         "step, ms": lambda one: f"{one.value:g}",
         "rhythm": lambda one: "flies apart" if _fate(one) == "flies apart" else words.rhythm(one.rhythm),
         "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.NOTHING,
@@ -220,13 +210,13 @@ def _settling_in_words(starts: Starts) -> str:
         f"{lengths(row, EARLY_S)}; after {MS * TRANSIENT_S:g} ms {lengths(row, TRANSIENT_S)}."
         for worm, row in starts.items()
     ]
-    rk4 = starts[RK4]
-    finest = rk4[min(rk4)].at(EARLY_S)
-    gap = rk4[PAPERS_STEP_MS].at(EARLY_S) - finest
+    paper = starts[PAPERS]
+    finest = paper[min(paper)].at(EARLY_S)
+    gap = paper[PAPERS_STEP_MS].at(EARLY_S) - finest
     if abs(gap) > 0.02 * finest:
         sentences.append(
             f"So at the paper's step of {PAPERS_STEP_MS:g} ms the beginning of a contraction is not converged: the "
-            f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {min(rk4):g} ms. "
+            f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {min(paper):g} ms. "
             "An explicit step holds the muscle's force while the light pins gather speed, and so misses the steep fall "
             "of the force with velocity."
         )
@@ -238,8 +228,8 @@ def _settling_in_words(starts: Starts) -> str:
 def _draw(walks: Sequence[Reading], starts: Starts, stem: Path) -> None:
     with canvas(3.5) as figure:
         left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
-        for worm, own in design.by_worm(walks).items():
-            design.draw_over(left, own, lambda one: CM * one.walked_m[0], hollow=worm is EULER)
+        for own in design.by_worm(walks).values():
+            design.draw_over(left, own, lambda one: CM * one.walked_m[0])
         design.cross_out(left, walks, lambda one: CM * one.walked_m[0])
         steps = sorted({one.value for one in walks})
         step, elongation = "physics time step (ms)", "elongation of segment 1 (cm)"
@@ -248,7 +238,7 @@ def _draw(walks: Sequence[Reading], starts: Starts, stem: Path) -> None:
         _draw_starts(right, starts)
         time, ring = "time after the onset (ms)", "ring of segment 1 (m)"
         design.label_panel(right, "Beginning of the first contraction", time, ring)
-        handles = [design.look_handle(**worm.look, hollow=worm is EULER) for worm in design.by_worm(walks)]
+        handles = [design.look_handle(**worm.look) for worm in design.by_worm(walks)]
         crossed = design.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black", markersize=9.0)
         design.legend_below(figure, [*handles, crossed], columns=3)
         save_both(figure, stem)
@@ -278,9 +268,8 @@ def _draw_starts(axes: Axes, starts: Starts) -> None:
 
 TIMESTEP = Examination(
     "timestep",
-    "Integrator and time step",
-    "Do order, period and elongation depend on the integrator and its step, and are the first instants of a "
-    "contraction resolved?",
+    "Time step",
+    "Do order, period and elongation depend on the time step, and are the first instants of a contraction resolved?",
     lambda effort: design.cases_of(_points(effort)),
     _examine,
 )

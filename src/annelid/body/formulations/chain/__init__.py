@@ -31,19 +31,11 @@ class Chain(FormulationKind):
     is_papers: ClassVar[bool] = True
     friction_cone: ClassVar[Literal["elliptic", "pyramidal"]] = "pyramidal"
     kind: Literal["chain"] = "chain"
-    joint: Literal["ball", "hinges"] = Field(
-        default="ball",
-        description="one isotropic ball joint, or three hinges with torsion apart from bending",
-    )
     armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
     pin_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the pin constraints")
     pin_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
     )
-    pins: Literal["separate", "direct"] = Field(
-        default="separate", description="strands tied to a pin mass each, or straight to one another"
-    )
-    integrator: Literal["RK4", "Euler"] = Field(default="RK4", description="time integration")
     solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
         default=500, description="PGS iterations at most"
     )
@@ -51,8 +43,8 @@ class Chain(FormulationKind):
 
     @property
     def step_cost_ms(self) -> float:
-        """About how long a step takes, ms; the Runge-Kutta method evaluates the forces four times."""
-        return 3.8 * (4 if self.integrator == "RK4" else 1)
+        """About how long a step takes, ms."""
+        return 15.2
 
     def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:
         """Estimates time, s, and memory, GB; measured on one core."""
@@ -93,24 +85,20 @@ class Chain(FormulationKind):
                 for body, local in sides
             )
             residual = first - second
-            if self.pins == "separate":
-                # With a pin mass two connections make one crossing.
-                residual = residual[..., 0::2, :] - residual[..., 1::2, :]
-            return norm(residual).max(axis=-1)
+            # Two connections make one crossing.
+            return norm(residual[..., 0::2, :] - residual[..., 1::2, :]).max(axis=-1)
 
         return gap, ("xpos", "xmat")
 
 
 def _largest_step_s(body: WormBody, formulation: Chain) -> float:
-    """Largest stable step of the explicit integrator, s, from the joints' and the springs' own rates."""
+    """Largest stable step of the explicit Runge-Kutta method, s, from the joints' and the springs' own rates."""
     strands, element = body.strands, rhombus_of(body).side_m / body.mesh.elements_per_side
     density = strands.one_number("linear_density_kg_per_m")
     inertia = formulation.armature_kg_m2 + density * element**3 / 12.0
     stiffness = strands.bending_rigidity_Nm2 / element
-    mass = body.pins.one_number("mass_kg") if formulation.pins == "separate" else density * element * 2.0
+    mass = body.pins.one_number("mass_kg")
     # Neighbouring joints act on one element: four times the rate of one at the shortest wave.
     swung = max((4.0 * stiffness / inertia) ** 0.5, (4.0 * body.springs.one_number("stiffness_N_per_m") / mass) ** 0.5)
-    if formulation.integrator != "RK4":
-        return 2.0 / swung
     damped = 4.0 * strands.damping_time_s * stiffness / inertia
     return min(_RK4_SWUNG / swung, _RK4_DAMPED / damped if damped else inf)

@@ -1,9 +1,9 @@
 """The paper's formulation: rigid capsules on damped elastic joints, pinned to one another by constraints.
 
 Each strand is a kinematic tree rooted in its middle, which halves the cost of a step against a root at its end
-and changes nothing in the physics. Neighbouring capsules are joined by a ball joint of stiffness E I / length, or
-by three hinges that resist torsion (G J / length) apart from bending. A crossing is a point mass on three slides,
-tied by two `connect` constraints to its strands, or one constraint straight between them.
+and changes nothing in the physics. Neighbouring capsules are joined by three hinges that resist bending (E I / length)
+and torsion (G J / length). A crossing is a point mass on three slides, tied to its strands by two `connect`
+constraints.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def add_chains(
     spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: ArenaKind, spheres: bool
 ) -> None:
     """Adds the mesh as chains of capsules, which touch by spheres at their vertices if so, and the paper's solver."""
-    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{formulation.integrator.upper()}")
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
     spec.option.iterations = formulation.solver_iterations
     spec.option.tolerance = formulation.solver_tolerance
@@ -120,50 +120,35 @@ def _add_joint(
     length = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
     bending = strands.bending_rigidity_Nm2 * shares[0]
     torsion = strands.one_number("shear_modulus_Pa") * pi * strands.radius_m**4 / 2 * shares[1]
-
-    def add(kind: mujoco.mjtJoint, rate: float, **axis: Array) -> None:
-        stiffness = rate / length
-        link.add_joint(
-            type=kind,
-            stiffness=[stiffness, 0.0, 0.0],
-            damping=[strands.damping_time_s * stiffness, 0.0, 0.0],
-            armature=formulation.armature_kg_m2,
-            **axis,
-        )
-
-    if formulation.joint == "ball":
-        add(mujoco.mjtJoint.mjJNT_BALL, bending)
-        return
     tangent = before / np.linalg.norm(before) + after / np.linalg.norm(after)
     tangent /= np.linalg.norm(tangent)
     normal = np.cross(tangent, AXES[np.argmin(np.abs(tangent))])
     normal /= np.linalg.norm(normal)
     for axis, rate in ((normal, bending), (np.cross(tangent, normal), bending), (tangent, torsion)):
-        add(mujoco.mjtJoint.mjJNT_HINGE, rate, axis=axis)
+        stiffness = rate / length
+        link.add_joint(
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            stiffness=[stiffness, 0.0, 0.0],
+            damping=[strands.damping_time_s * stiffness, 0.0, 0.0],
+            armature=formulation.armature_kg_m2,
+            axis=axis,
+        )
 
 
 def _add_pin(
     spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain, mass_kg: float
 ) -> None:
     name = crossing_site(crossing)
-    position = geometry.crossings_m[crossing]
     vertex = int(geometry.crossing_vertex[geometry.crossing_plane[crossing]])
     links = [spec.body(f"strand_{strand}_{vertex}") for strand in geometry.crossing_strands[crossing]]
-    if formulation.pins == "separate":
-        pin = spec.worldbody.add_body(name=name, pos=position)
-        for axis in AXES:
-            pin.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-        place, pairs = np.zeros(3), [(name, link.name) for link in links]
-    else:
-        # The origin of an element's body is its joint, and its axes are the world's at rest.
-        pin, joint = links[0], vertex if vertex >= _middle_element(geometry.vertices_m.shape[1]) else vertex + 1
-        place = position - geometry.vertices_m[geometry.crossing_strands[crossing, 0], joint]
-        pairs = [(pin.name, links[1].name)]
-    mark_crossing(pin, name, body.pins.radius_m, mass_kg, place)
+    pin = spec.worldbody.add_body(name=name, pos=geometry.crossings_m[crossing])
+    for axis in AXES:
+        pin.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    mark_crossing(pin, name, body.pins.radius_m, mass_kg)
     solver = {"solref": [formulation.pin_time_constant_s, 1.0], "solimp": [*formulation.pin_impedance, 0.5, 2.0]}
     connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
-    for k, pair in enumerate(pairs):
-        add_row(spec, connect, bodies, f"pin_{crossing}_{k}", *pair, data=[*place, *([0.0] * 9)], **solver)
+    for k, link in enumerate(links):
+        add_row(spec, connect, bodies, f"pin_{crossing}_{k}", name, link.name, data=[0.0] * 12, **solver)
 
 
 def _middle_element(n_vertices: int) -> int:

@@ -82,7 +82,7 @@ def _add_vertices(
         place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
         pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
         pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if tie is None else 0.0))
-        mark_crossing(pin, name, body.pins.radius_m, 0.0, ORIGIN)
+        mark_crossing(pin, name, body.pins.radius_m, 0.0)
         if tie is None:
             add_touch(pin, body.strands.radius_m, contact[vertex])
             for strand in strands:

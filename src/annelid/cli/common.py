@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from annelid.config import RunConfig
+    from annelid.experiment.check import Check
     from annelid.experiment.store import Store
     from annelid.simulation.runfile import Run
 
@@ -191,19 +192,25 @@ def numbers_of(run: Run) -> dict[str, Any]:
     return summary(run).to_dict() | {"gait": gait(run).to_dict()}
 
 
-def print_run(run: Run, *, quiet: bool = False) -> None:
-    """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows."""
+def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> None:
+    """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows.
+
+    A check adds how far each number moves, and its sentence at the end.
+    """
     from annelid.analysis import gait, summary
     from annelid.draw.table import closing_sentence, summary_table
     from annelid.terminal import Console
 
     if wants_json():
-        give_files([run.path], {run.path.name: numbers_of(run)})
+        checked = {} if check is None else {"check.json": check.to_dict()}
+        give_files([run.path], {run.path.name: numbers_of(run), **checked})
     if quiet or wants_json():
         return
     numbers = summary(run)
-    Console().print(summary_table(numbers, run.config, gait(run)))
+    Console().print(summary_table(numbers, run.config, gait(run), None if check is None else check.cell))
     for doubt in run.warnings:
         typer.echo(f"warning: {doubt}")
     if closing := closing_sentence(numbers, run.config):
         typer.echo(closing)
+    if check is not None:
+        typer.echo(check.sentence)

@@ -6,9 +6,9 @@ import os
 import re
 import sys
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
@@ -27,9 +27,15 @@ from annelid.cli.common import (
     print_run,
     refuse_existing,
 )
-from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock, typed_command
 from annelid.cli.result import give, wants_json
 from annelid.errors import ConfigError, SimulationStopped
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+    from annelid.experiment.check import Check
+    from annelid.experiment.progress import StudyProgress
+    from annelid.simulation.runfile import Run
 
 
 def run_command(
@@ -71,8 +77,15 @@ def run_command(
             help="Relative error of a parameter: floor_friction=0.2 is 20 %; 0 leaves it out; may be repeated.",
         ),
     ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check", help="Run it also at half the step and with one more element; say how far each number moves."
+        ),
+    ] = False,
     jobs: Annotated[
-        int | None, typer.Option(min=1, max=4096, help="Runs at a time with --uncertainty  [default: as many as cores]")
+        int | None,
+        typer.Option(min=1, max=4096, help="Runs at a time with --check, --uncertainty  [default: as many as cores]"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
     video: Annotated[bool, typer.Option("--video/--no-video", help="Draw a video at the end.")] = True,
@@ -90,6 +103,10 @@ def run_command(
     annelid run --arena pipe.bend --set arena.radius=0.8     elsewhere: annelid arenas lists the places
     annelid run my.toml --duration 20 --out long             your own file, your own folder
     annelid run --resume long --duration 40                  twenty seconds more
+    annelid run riddle2023-rods --check                      how far its numbers depend on step and mesh
+
+    With --check the table says by how much each number moves at half the step or with one more element a side, and marks
+    what moves by more than 10 %; check.json has both changes. It takes about four times as long as the run.
 
     With --uncertainty it also writes uncertainty.json, .csv and .png, and prints every number with its error. N worms
     are drawn with the errors and correlations of a fit to the load frame; the run is repeated at a half and a
@@ -108,10 +125,16 @@ def run_command(
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import FILE_NAME, open_run
 
-    if uncertainty is None and (uncertainty_from, vary, jobs) != (None, None, None):
-        raise typer.BadParameter("--uncertainty-from, --vary and --jobs need --uncertainty N")
-    if uncertainty is not None and resume is not None:
-        raise typer.BadParameter("--uncertainty makes whole runs: it does not go with --resume")
+    if uncertainty is None and (uncertainty_from, vary) != (None, None):
+        raise typer.BadParameter("--uncertainty-from and --vary need --uncertainty N")
+    if uncertainty is None and not check and jobs is not None:
+        raise typer.BadParameter("--jobs needs --check or --uncertainty N")
+    if check and uncertainty is not None:
+        raise typer.BadParameter("--uncertainty has what --check does: leave out --check")
+    if (check or uncertainty is not None) and resume is not None:
+        raise typer.BadParameter(
+            f"{'--check' if check else '--uncertainty'} makes whole runs: it does not go with --resume"
+        )
 
     overrides = overrides_of(assignments, duration_s=duration, seed=seed)
     if resume is None:
@@ -123,10 +146,12 @@ def run_command(
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
     folder = locked_folder(out, config.name)
-    result = None
+    result, checked = None, None
+    progress = False if quiet else _lines(config.duration_s)
     try:
-        if uncertainty is None:
-            progress = False if quiet else _lines(config.duration_s)
+        if check:
+            done, checked = _checked(config, folder, jobs=jobs, force=force, quiet=quiet, progress=progress, out=out)
+        elif uncertainty is None:
             done = simulate(config, folder, resume=resume, progress=progress, overwrite=force)
         else:
             from annelid.experiment import uncertainty as study
@@ -146,7 +171,7 @@ def run_command(
         left = open_run(folder)
         print_run(left, quiet=quiet)
         raise SimulationStopped(f"{stop}; what was computed is in {left.path}") from None
-    print_run(done, quiet=quiet)
+    print_run(done, quiet=quiet, check=checked)
     if done.status == "interrupted":
         complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -225,6 +250,44 @@ def _lines(end_s: float) -> Callable[[float, float], object] | None:
         return None
     lines = Lines(sys.stderr, at_once=False)
     return lambda simulated_s, _: lines(f"simulating {end_s:g} s", 0, 0, simulated_s / end_s)
+
+
+def _checked(
+    config: RunConfig,
+    folder: Path,
+    *,
+    jobs: int | None,
+    force: bool,
+    quiet: bool,
+    progress: bool | Callable[[float, float], object] | None,
+    out: Path | None,
+) -> tuple[Run, Check]:
+    """Runs a worm with its finer runs; on Ctrl-C prints the numbers of the run itself, and says how to go on."""
+    from annelid.experiment.check import check
+    from annelid.experiment.progress import study_progress
+    from annelid.simulation.runfile import FILE_NAME, open_run
+
+    shown: list[StudyProgress | None] = []
+    with ExitStack() as stack:
+
+        def report(*state: Any) -> None:
+            # The bar of the run itself comes first, and two at a time do not go together.
+            if not shown:
+                shown.append(stack.enter_context(study_progress(quiet=quiet)))
+            if shown[0] is not None:
+                shown[0](*state)
+
+        try:
+            return check(config, folder, jobs=jobs, overwrite=force, run_progress=progress, progress=report)
+        except KeyboardInterrupt:
+            stack.close()
+            if not (folder / FILE_NAME).exists():
+                raise
+            left = open_run(folder)
+            print_run(left, quiet=quiet)
+            further = ["--out", str(folder)] if out is None else []
+            complain(f"interrupted: the run is kept in {left.path}; check it with: {typed_command(*further)}")
+            raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def _errors(vary: list[str] | None) -> dict[str, float]:

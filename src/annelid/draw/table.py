@@ -122,43 +122,52 @@ def framed_table(*headings: str, title: str | None = None, caption: str | None =
     return table
 
 
-def summary_table(numbers: Summary, config: RunConfig, locomotion: Gait | None = None) -> Table:
+def summary_table(
+    numbers: Summary, config: RunConfig, locomotion: Gait | None = None, moved: Callable[[str], str] | None = None
+) -> Table:
     """Returns a run's numbers as a table for the terminal, those to compare with beside them, perhaps with its gait.
 
-    Rows without a number are left out, unless there is one to compare with.
+    Rows without a number are left out, unless there is one to compare with. A column says how far each moves in finer
+    runs where a function of its field says that.
     """
     compared = COMPARED if references(config) else ()
     duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
     title = f"{numbers.name}: {numbers.n_segments} segments{duration}, {numbers.status.replace('_', ' ')}"
     caption = legend(numbers, config) if compared else None
-    table = framed_table("quantity", "this run", *compared, title=title, caption=caption)
+    checked = () if moved is None else ("moves by",)
+    table = framed_table("quantity", "this run", *checked, *compared, title=title, caption=caption)
     for column, narrowest in zip(table.columns, (12, 16), strict=False):
         column.min_width = narrowest
-    for row in summary_rows(numbers, config):
-        table.add_row(*row[: 2 + len(compared)])
+    said: Callable[[str], tuple[str, ...]] = lambda field: () if moved is None else (moved(field),)
+    for field, (label, ours, *beside) in _rows_by_field(numbers, config).items():
+        table.add_row(label, ours, *said(field), *beside[: len(compared)])
     if locomotion is not None:
         table.add_section()
-        for row in gait_rows(locomotion):
-            table.add_row(*row)
+        for field, row in _gait_rows_by_field(locomotion).items():
+            table.add_row(*row, *said(field))
     return table
 
 
 def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
     """Returns label and value of every number that a gait has."""
-    rows: list[tuple[str, str]] = []
+    return list(_gait_rows_by_field(numbers).values())
+
+
+def _gait_rows_by_field(numbers: Gait) -> dict[str, tuple[str, str]]:
+    rows: dict[str, tuple[str, str]] = {}
     if numbers.speed_m_per_s is not None and numbers.stride_m is not None:
         lengths = numbers.speed_body_lengths_per_s, numbers.stride_body_lengths
         speed, stride = (f" ({x:.3f} body lengths)" if x is not None else "" for x in lengths)
         of_cycles = f"speed, {numbers.cycles} cycle{'' if numbers.cycles == 1 else 's'}"
-        rows.append((of_cycles, f"{100 * numbers.speed_m_per_s:.2f} cm/s{speed.replace(')', '/s)')}"))
-        rows.append(("stride", f"{100 * numbers.stride_m:.1f} cm{stride}"))
+        rows["speed_m_per_s"] = (of_cycles, f"{100 * numbers.speed_m_per_s:.2f} cm/s{speed.replace(')', '/s)')}")
+        rows["stride_m"] = ("stride", f"{100 * numbers.stride_m:.1f} cm{stride}")
     values: dict[str, Row] = {"contact_duty": ("on the ground", 100.0, 0, "%"), **GAIT_ROWS}
-    rows += [(row[0], quantity(getattr(numbers, field), *row[1:])) for field, row in values.items()]
+    rows |= {field: (row[0], quantity(getattr(numbers, field), *row[1:])) for field, row in values.items()}
     if numbers.turning_radius_m is not None:
         side = "left" if numbers.turning_radius_m > 0 else "right"
-        rows.append(("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}"))
+        rows["turning_radius_m"] = ("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}")
     if (energy := numbers.energy) is not None:
-        rows.append(("muscles' net work, whole run", f"{energy.muscle_work_J:.2f} J"))
+        rows["energy_muscle_work_J"] = ("muscles' net work, whole run", f"{energy.muscle_work_J:.2f} J")
         parts = {
             "stored": energy.kinetic_J + energy.elastic_J + (energy.potential_J or 0.0),
             "slip": energy.slip_J,
@@ -168,8 +177,8 @@ def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
         }
         if energy.muscle_work_J > 0:
             shares = (f"{n} {100 * part / energy.muscle_work_J:.0f} %" for n, part in parts.items() if part is not None)
-            rows.append(("of which", ", ".join(shares)))
-    return [row for row in rows if row[1] != UNKNOWN]
+            rows["energy"] = ("of which", ", ".join(shares))
+    return {field: row for field, row in rows.items() if row[1] != UNKNOWN}
 
 
 def comparison_table(comparison: Comparison) -> Table:
@@ -256,6 +265,10 @@ def summary_rows(
     numbers: Summary, config: RunConfig, only: Collection[str] = ("order", "wave", *SUMMARY_ROWS)
 ) -> list[tuple[str, str, str, str]]:
     """Returns label, our number, the one to compare with and the deviation of every row in which there is a number."""
+    return [row for field, row in _rows_by_field(numbers, config).items() if field in only]
+
+
+def _rows_by_field(numbers: Summary, config: RunConfig) -> dict[str, tuple[str, str, str, str]]:
     beside = references(config)
     pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
     onsets = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
@@ -271,12 +284,11 @@ def summary_rows(
             if field == "period_s" and numbers.period_std_s is not None:
                 text += f" (std {numbers.period_std_s:.3f} s)"
             cells.append((row[0].replace(", first helix", sensor), text, field))
-    rows = [
-        (label, ours, _theirs(field, beside.get(field)), _deviation(field, numbers, beside.get(field)))
+    rows = {
+        field: (label, ours, _theirs(field, beside.get(field)), _deviation(field, numbers, beside.get(field)))
         for label, ours, field in cells
-        if field in only
-    ]
-    return [row for row in rows if row[1] != UNKNOWN or row[2]]
+    }
+    return {field: row for field, row in rows.items() if row[1] != UNKNOWN or row[2]}
 
 
 def _deviation(field: str, numbers: Summary, entry: Published | None) -> str:

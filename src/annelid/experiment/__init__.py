@@ -18,18 +18,19 @@ from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
+    from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
     from annelid.experiment.fingerprint import code_fingerprint
     from annelid.experiment.lifeline import end_after
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import Judged, judge, numerical_problem
-    from annelid.experiment.uncertainty import finer_steps, more_elements
     from annelid.experiment.workers import Workers
 
 __all__ = [
     "SHEAR_OVER_YOUNG",
     "Case",
+    "Check",
     "Hold",
     "Judged",
     "Outcome",
@@ -37,12 +38,15 @@ __all__ = [
     "StudyProgress",
     "Workers",
     "case_key",
+    "check",
     "code_fingerprint",
+    "compare",
     "end_after",
     "finer_steps",
     "judge",
     "more_elements",
     "numerical_problem",
+    "refinements",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

@@ -118,6 +118,7 @@ class Store:
         *,
         progress: Progress | None = None,
         failed: MutableMapping[str, Exception] | None = None,
+        meanwhile: Callable[[], object] = lambda: None,
     ) -> Mapping[str, Outcome]:
         """Runs those cases that are not there yet, the longest first, several at a time.
 
@@ -127,6 +128,7 @@ class Store:
             progress: Called at the start and after every run, in place of the store's own.
             failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
                 end the call.
+            meanwhile: Called in this process once the first runs are under way, or where all are there.
 
         Returns:
             The outcome by its `case_key` of every case but those that failed, in the order of the cases.
@@ -150,9 +152,10 @@ class Store:
 
         report()
         if not missing:
+            meanwhile()
             return found
         with Processes() if self.workers is None else nullcontext(self.workers) as workers:
-            for case, error in self._computed(workers, missing):
+            for case, error in self._computed(workers, missing, meanwhile):
                 left_s, done = left_s - case.cost_s, done + 1
                 if error is None:
                     found[case_key(case)] = self[case]
@@ -199,7 +202,9 @@ class Store:
             for i, case in enumerate(cases)
         ]
 
-    def _computed(self, workers: Workers, missing: Sequence[Case]) -> Iterator[tuple[Case, Exception | None]]:
+    def _computed(
+        self, workers: Workers, missing: Sequence[Case], meanwhile: Callable[[], object]
+    ) -> Iterator[tuple[Case, Exception | None]]:
         """Has runs computed, and yields each as it is there or has failed."""
         self.folder.mkdir(parents=True, exist_ok=True)
         marked = self.folder / MARK_NAME
@@ -215,7 +220,7 @@ class Store:
             if content is not None:
                 fetch_results(content, self.path(missing[number]), missing[number].config, self._keep)
 
-        for number, error in workers.computed(len(missing), task_of, take):
+        for number, error in workers.computed(len(missing), task_of, take, meanwhile):
             yield missing[number], error
 
 

@@ -24,12 +24,13 @@ from annelid.draw.figures.experiments import Panel, uncertainty_figure
 from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
+from annelid.experiment.check import ELEMENTS, STEP, finer_steps, go_on_in, more_elements
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Progress, Store, case_key
 from annelid.experiment.workers import Processes
 from annelid.output import whole_file, write_csv, write_json
 from annelid.simulation.lock import locks
-from annelid.simulation.runfile import FILE_NAME, read_config, refuse_used_folder
+from annelid.simulation.runfile import FILE_NAME
 
 __all__ = [
     "Quantity",
@@ -45,7 +46,6 @@ __all__ = [
 RUNS = "uncertainty"
 """Subfolder of the runs."""
 FEWEST = 2
-STEP, ELEMENTS, MOST_ELEMENTS = "clock.physics_timestep_s", "body.mesh.elements_per_side", 32
 DEFINITIONS = {
     "parameters": "sample standard deviation over the Monte Carlo samples",
     "time step": "largest difference between the run and one of finer physics steps",
@@ -262,11 +262,7 @@ def uncertainty(
     variants: list[tuple[Kind, Case]] = [
         (kind, Case(config.name, changed, config)) for kind, changed in plan(config, n, chosen)
     ]
-    # A study goes on in its own folder, and into an empty one.
-    if overwrite or not (folder / RUNS).is_dir():
-        refuse_used_folder(folder, overwrite)
-    elif (folder / FILE_NAME).exists() and read_config(folder) != config:
-        raise ConfigError(f"the output folder {folder} has another run in it: name another, or allow overwriting")
+    go_on_in(folder, RUNS, config, overwrite=overwrite)
     with Processes(jobs) as workers:
         outcomes = Store(folder / RUNS, workers).compute([case for _, case in variants], progress=progress)
     found = [outcomes[case_key(case)] for _, case in variants]
@@ -290,32 +286,6 @@ def plan(config: RunConfig, n: int, spread: Spread) -> list[tuple[Kind, dict[str
         *(("time step", finer) for finer in finer_steps(config)),
         *(("elements", {ELEMENTS: count}) for count in more_elements(config)),
     ]
-
-
-def finer_steps(config: RunConfig) -> list[dict[str, float]]:
-    """Returns the changes to about half of a physics step and, if that is a multiple of the control step, a quarter.
-
-    What is longer than the control step stays a whole multiple of it, so that half of 5 ms is 2 ms where that is 1 ms.
-    """
-    control_s, step_s = config.clock.control_timestep_s, config.clock.physics_timestep_s
-    ratio = round(step_s / control_s)
-
-    def part(duration_s: float, divisor: int) -> float:
-        """The greatest multiple of the control step that is no longer than a part of a duration, s."""
-        return round(max(round(duration_s / control_s) // divisor, 1) * control_s, 12)
-
-    def finer(divisor: int) -> dict[str, float]:
-        step = step_s / divisor if ratio <= 1 else part(step_s, divisor)
-        return {STEP: step, "record.signals_interval_s": part(config.record.signals_interval_s, divisor)}
-
-    return [finer(2), *([finer(4)] if ratio > 1 and ratio % 4 == 0 else [])]
-
-
-def more_elements(config: RunConfig) -> list[int]:
-    """Returns one and two elements a side more than a worm has, as far as that is allowed."""
-    assert isinstance(config.body, WormBody)
-    count = config.body.mesh.elements_per_side
-    return [finer for finer in (count + 1, count + 2) if finer <= MOST_ELEMENTS]
 
 
 def readings(numbers: Summary) -> dict[str, float | None]:

@@ -52,7 +52,11 @@ class Workers(ABC):
         return error
 
     def computed(
-        self, n: int, task_of: Callable[[int], Work], take: Callable[[int, bytes | None], object]
+        self,
+        n: int,
+        task_of: Callable[[int], Work],
+        take: Callable[[int, bytes | None], object],
+        meanwhile: Callable[[], object] = lambda: None,
     ) -> Iterator[tuple[int, Exception | None]]:
         """Has n tasks computed, and yields the number of each as what it sends is taken, or with its error.
 
@@ -60,17 +64,21 @@ class Workers(ABC):
             n: How many there are.
             task_of: Gives a task by its number, from 0.
             take: Keeps what a task sent.
+            meanwhile: Called in this process once the first tasks are under way.
 
         Raises:
             ClusterError: The workers are lost for good, or have other code.
         """
         # No more than the workers take at once: what lies in their own queue could not be taken back, and a worker that
         # dies would be counted against the runs behind the one that killed it.
-        waiting, running, tries = deque(range(n)), dict[Result, int](), Counter[int]()
+        waiting, running, tries, begun = deque(range(n)), dict[Result, int](), Counter[int](), False
         while waiting or running:
             while waiting and len(running) < self.slots():
                 number = waiting.popleft()
                 running[self.submit(task_of(number))] = number
+            if not begun:
+                begun = True
+                meanwhile()
             if not running:
                 time.sleep(POLL_S)
             done, _ = wait(running, POLL_S, FIRST_COMPLETED)

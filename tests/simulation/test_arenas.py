@@ -29,7 +29,7 @@ def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
 
 
 QUICK: dict[str, Any] = {
-    "body__strands__damping_time_s": 0.1,
+    "body__strands__damping_time_s": 0.3,
     "body__rings__activation_dynamics": False,
 }
 """Damped little, so that a worm soon comes to rest."""

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import h5py
+import mujoco
 import numpy as np
 import pytest
-from mujoco.batch import Batch, SimulationError
 
 from annelid import RunConfig, load_config, open_run, simulate, simulate_batch, summary
 from annelid.errors import AnnelidError, ConfigError, RunFileError
 from annelid.protocols import Sensation
+from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.batch import ALIKE
 from annelid.simulation.checkpoint import Checkpoint
 from annelid.simulation.recorder import Recorder
 from annelid.simulation.runfile import read_checkpoint
+from annelid.simulation.two_step import TwoStep
+from annelid.simulation.worm import WormPlant
 
 FAST = {
     "duration_s": 0.3,
@@ -152,17 +156,24 @@ def test_a_worm_that_fails_ends_as_it_does_alone_and_the_others_go_on(tmp_path: 
 
 
 def test_an_error_of_the_engine_ends_one_worm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    step = Batch.step
+    step, configs = TwoStep.step, [config(**own) for own in DIFFERENT]
 
-    def failing(batch: Batch, ids: Any = None, nstep: int = 1) -> None:
-        if batch.bind("time")[1] > 0.09 and 1 in ids:
-            step(batch, [i for i in ids if i != 1], nstep)
-            raise SimulationError(np.array([1]), "", len(ids))
-        step(batch, ids, nstep)
+    def failing(of: TwoStep, prepare: Callable[[], None]) -> None:
+        if of is broken and of._data.time > 0.09:
+            raise mujoco.FatalError("broken")
+        step(of, prepare)
 
-    configs = [config(**own) for own in DIFFERENT]
+    broken = None
+    placed = WormPlant.__init__
+
+    def made(plant: WormPlant, own: RunConfig, anatomy: Anatomy | None = None) -> None:
+        nonlocal broken
+        placed(plant, own, anatomy)
+        broken = plant.two_step if own == configs[1] else broken
+
     with monkeypatch.context() as patched:
-        patched.setattr(Batch, "step", failing)
+        patched.setattr(TwoStep, "step", failing)
+        patched.setattr(WormPlant, "__init__", made)
         result = simulate_batch(configs, tmp_path / "batch", threads=1, progress=False)
     assert result.statuses == ("complete", "stopped_by_guard", "complete")
     assert "the engine stopped at 0.100 s" in result.messages[1]
@@ -235,7 +246,7 @@ def test_a_second_ctrl_c_leaves_at_once_with_all_files_closed(tmp_path: Path, mo
         ("body.mesh.n_segments", 4),
         ("body.mesh.elements_per_side", 3),
         ("body.rings.layout", "halves"),
-        ("body.rings.activation_dynamics", True),
+        ("body.rings.activation_dynamics", False),
         ("body.formulation.pins", "separate"),
         ("clock.physics_timestep_s", 0.01),
         ("controller.kind", "shc"),

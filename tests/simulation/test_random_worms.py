@@ -44,7 +44,7 @@ FACTORS = {
     "body.strands.shear_modulus_Pa": 4.0,
     "body.strands.radius_m": 1.5,
     "body.strands.linear_density_kg_per_m": 3.0,
-    "body.strands.joint_damping_Nms_per_rad": 3.0,
+    "body.strands.damping_time_s": 3.0,
     "body.springs.stiffness_N_per_m": 30.0,
     "body.mesh.radius_m": 2.0,
     "body.mesh.angular_rate_rad_per_m": 2.0,
@@ -95,14 +95,6 @@ def draw(rng: np.random.Generator) -> Drawn:
     chosen = rng.choice(list(FACTORS), size=rng.integers(2, 9), replace=False)
     factors = {str(name): exp(rng.uniform(-1.0, 1.0) * log(FACTORS[str(name)])) for name in chosen}
     changes = _multiplied(base, factors)
-    strands = base.body.strands
-    per_joint = changes.pop("body.strands.joint_damping_Nms_per_rad", None)
-    if per_joint is not None:
-        own = strands.damping_time_s
-        name, value = "joint_damping_Nms_per_rad", per_joint
-        if own is not None:
-            name, value = "damping_time_s", own * per_joint / strands.joint_damping_Nms_per_rad
-        changes[f"body.strands.{name}"] = value
     if rng.random() < 0.4:
         changes["body.mesh.n_helices"] = int(rng.choice([8, 12, 16, 20, 24]))
     if rng.random() < 0.5:

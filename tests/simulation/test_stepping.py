@@ -56,10 +56,11 @@ class StridingToy(StepwiseToy):
     def steps_to_move(self) -> int:
         return self.move_every - self._steps % self.move_every
 
-    def stride(self, activation: Array, n_steps: int) -> Sensation:
+    def stride(self, activation: Array) -> Sensation:
+        n_steps = len(activation)
         assert 1 <= n_steps <= self.steps_to_move()
         self._steps += n_steps - 1
-        sensation = self.step(activation)
+        sensation = self.step(activation[-1])
         self.strides[-1] = n_steps
         return sensation
 

@@ -26,7 +26,7 @@ FORMULATIONS: dict[str, dict[str, Any]] = {
 }
 SOFT = {"arena.contact_time_constant_s": 0.06}
 SMOOTH: dict[str, dict[str, Any]] = {
-    "rods": SOFT | {"body.formulation.friction_impedance_ratio": 1.0, "body.strands.joint_damping_Nms_per_rad": 1.0},
+    "rods": SOFT | {"body.formulation.friction_impedance_ratio": 1.0, "body.strands.damping_time_s": 2.0},
     "chain": SOFT,
 }
 """A worm that slides fast hops and shakes; on soft ground it hardly does."""

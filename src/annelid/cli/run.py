@@ -105,7 +105,7 @@ def run_command(
     annelid run --resume long --duration 40                  twenty seconds more
     annelid run riddle2023-rods --check                      how far its numbers depend on step and mesh
 
-    With --check the table says by how much each number moves at half the step or with one more element a side, and marks
+    With --check the table says how far each number moves at half the step or with one more element a side, and marks
     what moves by more than 10 %; check.json has both changes. It takes about four times as long as the run.
 
     With --uncertainty it also writes uncertainty.json, .csv and .png, and prints every number with its error. N worms

@@ -138,7 +138,10 @@ def summary_table(
     table = framed_table("quantity", "this run", *checked, *compared, title=title, caption=caption)
     for column, narrowest in zip(table.columns, (12, 16), strict=False):
         column.min_width = narrowest
-    said: Callable[[str], tuple[str, ...]] = lambda field: () if moved is None else (moved(field),)
+
+    def said(field: str) -> tuple[str, ...]:
+        return () if moved is None else (moved(field),)
+
     for field, (label, ours, *beside) in _rows_by_field(numbers, config).items():
         table.add_row(label, ours, *said(field), *beside[: len(compared)])
     if locomotion is not None:

@@ -63,6 +63,7 @@ class EnergyMeter:
     outputs = (
         "qpos",
         "qvel",
+        "qacc",
         "qfrc_damper",
         "qfrc_constraint",
         "actuator_force",
@@ -80,6 +81,7 @@ class EnergyMeter:
         # Other integrators take the actuators' forces as they are at the start of a step.
         implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
         self.slopes = rings.slopes(model) if implicit else None
+        self._dof_damping = model.dof_damping.copy() if implicit and model.dof_damping.any() else None
         self.motor_power = rings.motor_power(model)
 
     def read(self, engine: Engine, drive: Array, rods: tuple[float, float] = (0.0, 0.0)) -> Powers:
@@ -98,7 +100,10 @@ class EnergyMeter:
         if self.slopes is not None:
             per_length, per_rate = self.slopes(engine["actuator_length"], earlier, drive, tension)
             tension = tension + per_length * (self._engine_s * rate) + per_rate * (rate - earlier)
-        damped, constrained = (-float(engine[force] @ velocity) for force in ("qfrc_damper", "qfrc_constraint"))
+        damper = engine["qfrc_damper"]
+        if self._dof_damping is not None:
+            damper = damper - self._dof_damping * (self._engine_s * engine["qacc"])
+        damped, constrained = -float(damper @ velocity), -float(engine["qfrc_constraint"] @ velocity)
         # The engine counts rows among its constraints.
         damped, constrained = damped + rods[0], constrained - rods[1]
         if self._ties is not None:

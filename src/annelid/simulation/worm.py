@@ -121,8 +121,8 @@ class WormPlant:
     """The 3D worm in its arena: what it senses, records and is alarmed by, with an engine of its own.
 
     Lengths and positions are those at the end of the step; forces are those that acted during the last physics step,
-    since the engine computes them before it moves the body. Edge strains are those at the end of a step; gaps of pins
-    those at the end, and of a chain those at the start.
+    since the engine computes them before it moves the body. Edge strains and gaps of pins are those at the end of a
+    step.
 
     Attributes:
         anatomy: The compiled body; the worm's own where `owns_model` says so.
@@ -231,7 +231,6 @@ class WormPlant:
                 self._take_step(self.act.copy() if self.model.na else activation)
         except mujoco.FatalError as error:
             raise SimulationStopped(f"the engine stopped at {self.data.time:.3f} s: {error}") from None
-        # Gaps of a chain's pins are read before positions are brought up to the end of the step.
         forces, ground = self.anatomy.forces(self.engine)
         return Movement(self.posture, forces, ground)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from itertools import pairwise
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,11 +14,11 @@ from annelid.body import assemble, build_spec, compile_spec
 from annelid.body.elimination import minimum_degree, nested_dissection, order_elimination
 from annelid.config import load_config
 from annelid.morphology import Array, Indices
+from annelid.simulation.worm import WormPlant
 
 SHORT = {"body.mesh.elements_per_side": 1}
 LONG = {
     "body.mesh.n_segments": 12,
-    "body.formulation.curvature": "constant",
     "body.mesh.elements_per_side": 3,
     "body.formulation.solver_tolerance": 1e-12,
 }
@@ -87,20 +86,20 @@ def test_each_further_length_of_a_tube_adds_the_same_fill() -> None:
     assert abs(second / (2 * first) - 1) < 0.1
 
 
-def stepped(model: mujoco.MjModel, n_steps: int) -> mujoco.MjData:
-    data = mujoco.MjData(model)
-    data.ctrl[::3] = 0.5
-    mujoco.mj_step(model, data, n_steps)
-    return data
+def moved() -> WormPlant:
+    plant = WormPlant(load_config("riddle2023-rods", LONG))
+    plant.move(np.where(np.arange(plant.n_muscles) % 3, 0.0, 0.5), 8)
+    return plant
 
 
-def test_a_long_worm_moves_the_same_with_a_smaller_factor() -> None:
-    spec = build_spec(load_config("riddle2023-rods", LONG))
-    plain, ordered = spec.compile(), compile_spec(spec)
-    assert sorted(ordered.efmC_perm) == sorted(plain.efmC_perm)
-    theirs, ours = stepped(plain, 8), stepped(ordered, 8)
+def test_a_long_worm_moves_the_same_with_a_smaller_factor(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = moved()
+    monkeypatch.setattr(assemble, "order_elimination", lambda model: None)
+    theirs = moved()
+    assert sorted(ours.model.efmC_perm) == sorted(theirs.model.efmC_perm)
+    assert np.ptp(ours.observe().ring_length_m) > 0.1, "it must have moved"
     np.testing.assert_allclose(ours.qpos, theirs.qpos, atol=1e-9)
-    assert ours.solver_nnz[0] < 0.9 * theirs.solver_nnz[0]
+    assert ours.data.solver_nnz[0] < 0.9 * theirs.data.solver_nnz[0]
 
 
 def test_short_worms_and_chains_keep_the_engines_order() -> None:

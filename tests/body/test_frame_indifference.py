@@ -139,7 +139,7 @@ def test_a_motion_is_damped_alike_whichever_way_the_worm_lies(plant: WormPlant) 
     for turn in ORIENTATIONS.as_matrix():
         own = velocity.copy()
         own[slides] = velocity[slides] @ turn.T
-        powers.append(lost(plant, turned(model, turn, qpos=placed.qpos), own).power_W)
+        powers.append(lost(plant, turned(model, turn, posture=placed.qpos), own).power_W)
     assert powers[0] > 1e-3
     assert powers == pytest.approx([powers[0]] * len(powers), rel=1e-9)
 

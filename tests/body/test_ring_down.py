@@ -173,7 +173,7 @@ def chain(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.
     spec = mujoco.MjSpec()
     spec.option.timestep = step_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    formulation = Chain(joint="hinges", armature_kg_m2=0.0)
+    formulation = Chain(armature_kg_m2=0.0)
     add_chain(spec, "rod", case.vertices(elements), strands, formulation, root=0, fixed_root=True)
     return spec
 

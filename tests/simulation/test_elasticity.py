@@ -12,7 +12,7 @@ from annelid.body.formulations.rods.strains import N_COEFFICIENTS
 from annelid.config import load_config
 from annelid.simulation.worm import WormPlant
 
-CHAIN = {"body.formulation.kind": "chain", "body.formulation.joint": "hinges"}
+CHAIN = {"body.formulation.kind": "chain"}
 DIFFER = {
     "body.mesh.radius_m": [0.16, 0.14, 0.12],
     "body.rings.length_range_m": [[0.566, 1.067], [0.495, 0.934], [0.425, 0.8]],

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import build_spec, compile_spec, mesh_of
+from annelid.body import assemble, build_spec, compile_spec, mesh_of
 from annelid.body.assemble import mjcf_text
 from annelid.body.formulations.rods.strains import net_stiffness
 from annelid.body.worm import Strands, WormBody
@@ -254,3 +254,15 @@ def test_rods_and_tight_chain_agree_on_a_deep_contraction_with_fine_elements() -
     """Deep bends need six elements a side: with three, rods are 5 % stiffer (tangent against angle)."""
     fine = {"arena.gravity_m_per_s2": 0.0, "body.mesh.elements_per_side": 6}
     assert assert_rings_and_springs_agree(2.5, 4.0, **fine) < 0.46 * 0.96
+
+
+def test_a_worm_beyond_the_engines_limit_is_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    spec = build_spec(load_config("riddle2023-rods", {"body.mesh.elements_per_side": 1}))
+    moving = sum(len(body.joints) > 0 for body in spec.worldbody.bodies)
+    monkeypatch.setattr(assemble, "MOST_ORDERED_BODIES", moving)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compile_spec(spec)
+    monkeypatch.setattr(assemble, "MOST_ORDERED_BODIES", moving - 1)
+    with pytest.warns(UserWarning, match=f"{moving} moving bodies"):
+        compile_spec(spec)

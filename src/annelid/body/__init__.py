@@ -2,7 +2,7 @@
 
 `build_spec` is the one entrance to the engine, and `compile_spec` makes the engine's model of it. Kinds of formulation
 (`formulations`) build the mesh with a site at every crossing; springs and ring actuators (`actuators`) between those
-sites are the same for all. `elimination` orders the engine's factor along the tube. The sections (`worm`) are read
+sites are the same for all. The sections (`worm`) are read
 without the engine, which is loaded on first use of the names below.
 """
 

@@ -18,7 +18,6 @@ from annelid.body.actuation import (
     add_springs,
     stretch_sensors,
 )
-from annelid.body.elimination import order_elimination
 from annelid.body.worm import Mesh, WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
@@ -91,7 +90,7 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
 
 
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compiles a worm and lets the engine factor it in an order fit for a long tube.
+    """Compiles a worm.
 
     Args:
         spec: What `build_spec` returned, with anything added to it.
@@ -108,7 +107,6 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
         remedy = next((f"{remedy} ({reason})" for words, remedy in _REMEDIES.items() if words in reason), reason)
         raise ConfigError(f"the engine refuses this body: {remedy}") from None
-    order_elimination(model)
     moving = np.unique(model.dof_bodyid).size
     if model.nflex and moving > MOST_ORDERED_BODIES:
         warnings.warn(

@@ -367,12 +367,11 @@ def test_five_seconds_of_the_paper_s_worm_are_ordered(tmp_path: Path) -> None:
 
 
 def test_sensors_that_never_switch_off_silence_the_worm(tmp_path: Path) -> None:
-    """At a tolerance of 5 cm segment 2 is felt at rest while it contracts, so it lets go and none takes over."""
-    coarse = {"body.mesh.elements_per_side": 2}
-    config = load_config("riddle2023-rods", {"sensor.tolerance_m": 0.05, "duration_s": 3.0, **coarse})
+    """At a tolerance of 8 cm segment 1 is felt at rest while it contracts, so it lets go and none takes over."""
+    config = load_config("riddle2023-rods", {"sensor.tolerance_m": 0.08, "duration_s": 3.0})
     found = rhythm_score(simulate(config, tmp_path, progress=False))
-    assert (found.verdict, found.order) == ("silent", (1, 2))
-    assert found.reason == "no contraction begins after 0.75 s"
+    assert (found.verdict, found.order) == ("silent", (1,))
+    assert found.reason == "no contraction begins after 0.01 s"
 
 
 def lengthened(peaks_m: list[float]) -> RhythmScore:

@@ -88,6 +88,6 @@ def test_a_stride_under_a_drive_is_its_steps_bit_for_bit(slope_per_s: float) -> 
         longer = np.asarray(rest + extra[:, np.newaxis], dtype=np.float64)
         felt = Sensation(first * 0.001, longer, rest, zeros, zeros, np.zeros((N, 3)), np.zeros(3))
         stepped = [walked.step(replace(felt, time_s=(first + k) * 0.001)) for k in range(10)]
-        assert np.array_equal(strode.stride(felt, 10), stepped[-1])
+        assert np.array_equal(strode.stride(felt, 10), stepped)
     assert all(np.array_equal(walked.get_state()[name], value) for name, value in strode.get_state().items())
     assert np.asarray(walked.read(frame=False)["drive"], dtype=np.float64) > 0.0

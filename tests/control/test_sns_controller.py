@@ -204,8 +204,11 @@ chunk_sizes = st.lists(st.integers(1, 30), min_size=1, max_size=8)
     timestep_s=st.sampled_from([0.001, 0.0005, 0.0007]),
     scheme=st.sampled_from(["euler", "toolbox", "heun"]),
     seed=st.integers(0, 999),
+    is_carried_on=st.booleans(),
 )
-def test_a_stride_is_bitwise_so_many_steps(chunks, hold_s, tolerance_m, hysteresis_m, timestep_s, scheme, seed):
+def test_a_stride_is_bitwise_so_many_steps(
+    chunks, hold_s, tolerance_m, hysteresis_m, timestep_s, scheme, seed, is_carried_on
+):
     section = SensorSection(tolerance_m=tolerance_m, hysteresis_m=hysteresis_m, startup_hold_s=hold_s)
     one, other = (controller(timestep_s=timestep_s, sensor=section, scheme=scheme, kick_nA=2.0) for _ in range(2))
     assert isinstance(one, StridingController)
@@ -213,11 +216,11 @@ def test_a_stride_is_bitwise_so_many_steps(chunks, hold_s, tolerance_m, hysteres
     taken = 0
     for n_steps in chunks:
         excess = rng.uniform(-0.01, 0.03, 3)
-        strode = one.stride(sensation(taken * timestep_s, excess), n_steps)
-        stepped = np.array([])
-        for step in range(taken, taken + n_steps):
-            stepped = other.step(sensation(step * timestep_s, excess))
-        np.testing.assert_array_equal(strode, stepped)
+        felt = replace(
+            sensation(taken * timestep_s, excess), stretch_rate_m_per_s=rng.uniform(-0.5, 0.5, (3, 1)) * is_carried_on
+        )
+        stepped = [other.step(felt.later(step * timestep_s)) for step in range(taken, taken + n_steps)]
+        np.testing.assert_array_equal(one.stride(felt, n_steps), stepped)
         same_state(one, other)
         taken += n_steps
 

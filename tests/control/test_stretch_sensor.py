@@ -111,8 +111,9 @@ def test_worms_with_tolerances_of_their_own_are_read_as_alone(n_worms, n_sensors
     # Some memory layout: the bits of a mean must not depend on it.
     lengths = np.empty(shape[list(axes)]).transpose(np.argsort(axes))
     lengths[...] = rest + rng.uniform(-0.01, 0.03, shape)
-    together = sensor(9.9, startup_hold_s=0.2).reading(
-        before, lengths, rest, time_s, tolerance[:, np.newaxis], hysteresis[:, np.newaxis]
+    longer = lengthening_m(lengths, rest)[np.newaxis]
+    (together,) = sensor(9.9, startup_hold_s=0.2).readings(
+        before, longer, [time_s], tolerance[:, np.newaxis], hysteresis[:, np.newaxis]
     )
     for worm in range(n_worms):
         alone = sensor(tolerance[worm], hysteresis[worm], startup_hold_s=0.2)
@@ -121,5 +122,4 @@ def test_worms_with_tolerances_of_their_own_are_read_as_alone(n_worms, n_sensors
         assert np.array_equal(together[worm], alone.read(stretch, rest, time_s))
         # A worm that sits right on its threshold finds any other order of the sum.
         mean = (stretch - rest).sum(axis=-1) / n_sensors
-        on_edge = sensor(9.9).reading(before[worm], lengths[worm], rest, time_s, mean, 0.0)
-        assert on_edge.all()
+        assert sensor(9.9).readings(before[worm], longer[:, worm], [time_s], mean, 0.0).all()

@@ -88,9 +88,10 @@ class StretchSensor:
         on[:held, ..., 0] = False
         if np.any(hysteresis):
             for number, longer in enumerate(longer_m):
-                on[number] = before = longer <= tolerance + hysteresis * before
+                on[number] = longer <= tolerance + hysteresis * before
                 if number < held:
                     on[number, ..., 0] = False
+                before = on[number]
         return on
 
     def held_at(self, time_s: float) -> bool:

@@ -1,8 +1,7 @@
 """Counts the instructions of steps with valgrind's callgrind: they do not depend on caches or on what else runs.
 
 ``python benchmarks/instructions.py [--segments 12 47]`` says which of the engine's functions grow with the worm's
-length, in instructions and calls a step, in some minutes. A wave contracts every third ring, as in
-``benchmarks/growth.py``.
+length, in instructions and calls a step, in some minutes. A wave contracts every third ring.
 
 ``python benchmarks/instructions.py --step`` says in half a minute what a step of the closed loop costs. Its parts are
 counted in fixed work of the same process: the engine's in a step of a small model, ours in some Python with numpy. So
@@ -30,6 +29,8 @@ from pathlib import Path
 from typing import Any
 
 STEPS = 11
+STAGES = "mj_fwdPosition", "mj_fwdVelocity", "mj_step2"
+"""What a step of rods calls of the engine."""
 SHOWN = 12
 
 WARM_STEPS, LOOP_STEPS, SMALL_STEPS = 3, 20, 50
@@ -48,17 +49,13 @@ STEADY = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "GLIBC_TUNABLES": 
 
 def step_a_worm(n_segments: int) -> None:
     """Steps a worm some times; the parent watches the engine meanwhile."""
-    import mujoco
     import numpy as np
 
     from annelid import load_config
-    from annelid.body import build_spec, compile_spec
+    from annelid.simulation import WormPlant
 
-    model = compile_spec(build_spec(load_config("riddle2023-rods", {"body.mesh.n_segments": n_segments})))
-    data = mujoco.MjData(model)
-    data.ctrl[:] = 0.5 * (np.arange(model.nu) % 3 == 0)
-    for _ in range(STEPS):
-        mujoco.mj_step(model, data)
+    plant = WormPlant(load_config("riddle2023-rods", {"body.mesh.n_segments": n_segments}))
+    plant.move(0.5 * (np.arange(plant.n_muscles) % 3 == 0), STEPS)
 
 
 def step_the_loop(path: Path) -> None:
@@ -148,7 +145,7 @@ def under_callgrind(child: list[str], *options: str, **variables: str) -> list[l
 
 def counted(n_segments: int) -> tuple[Counter[str], Counter[str]]:
     """Instructions of every function itself, and its calls, within all steps."""
-    (lines,) = under_callgrind(["--child", str(n_segments)], "--toggle-collect=mj_step")
+    (lines,) = under_callgrind(["--child", str(n_segments)], *(f"--toggle-collect={stage}" for stage in STAGES))
     own, calls, _ = parsed(lines)
     return own, calls
 
@@ -162,7 +159,7 @@ def counted_step() -> dict[str, float]:
             name = next(line.rpartition(": ")[2] for line in lines if line.startswith("desc: Trigger: "))
             own, _, inclusive = parsed(lines)
             every[name] += sum(own.values())
-            engine[name] += inclusive["mj_step"]
+            engine[name] += sum(inclusive[function] for function in (("mj_step",) if name == SMALL else STAGES))
     ours = {PLANT: every[PLANT] - engine[PLANT], CONTROL: every[CONTROL], REST: every[REST]}
     in_small_steps = engine[PLANT] / LOOP_STEPS / (engine[SMALL] / SMALL_STEPS)
     return {"engine": in_small_steps} | {name: n / LOOP_STEPS / every[PYTHON] for name, n in ours.items()}

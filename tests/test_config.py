@@ -93,7 +93,7 @@ def test_the_whole_of_a_file_of_the_user_s_names_what_is_inherited(tmp_path: Pat
     assert found["sensor.tolerance_m"].startswith("riddle2023-rods: [M]")
     assert (found["controller.kind"], found["controller.ramp_s"]) == ("", "default")
     # Of the other kind of formulation, which its ancestors have.
-    assert found["body.formulation.integrator"] == "default"
+    assert found["body.formulation.armature_kg_m2"] == "default"
     assert "body.formulation.edge_time_constant_s" not in found
     mine.write_text("friction = 1", encoding="utf-8")
     with pytest.raises(ConfigError, match=r"did you mean 'arena\.friction'"):
@@ -205,7 +205,7 @@ def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
         ("record.signals_interval_s=0.0015", "record.signals_interval_s = 0.0015 must be an integer multiple"),
         ("body.formulation.kind=chian", "'chian': must be one of 'rods', 'chain'; did you mean 'chain'?"),
         ("controller.kind=sns-robst", "did you mean 'sns-robust'"),
-        ("body.formulation.joint=glue", "must be one of 'ball' or 'hinges'"),
+        ("body.formulation.joint=ball", "is no field any more: a chain's elements are always joined by three hinges"),
         ("body.mesh.segments=4", "unknown field 'body.mesh.segments': did you mean 'n_segments'"),
         ("friction=1", "did you mean 'arena.friction'"),
         ("body.formulation.solver_iteration=9", "did you mean 'solver_iterations'"),

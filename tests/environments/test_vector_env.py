@@ -83,7 +83,8 @@ def test_one_that_breaks_down_leaves_the_others_alone() -> None:
     alone, beside = WormEnv(changes=CHANGES[0], **OPTIONS), batched(threads=1)
     alone.reset(seed=0)
     beside.reset(seed=0)
-    beside._episodes[FRAIL].worm._bodies.bound["qvel"][:] = np.nan  # type: ignore[attr-defined]
+    for episode in beside._episodes[1:]:
+        episode.worm.data.qvel[:] = np.nan  # type: ignore[attr-defined]
     beside._episodes[0].reset(np.random.default_rng())
     beside.reset(seed=0, options={"reset_mask": np.array([True, False, False])})
     expected = alone.step(np.full(3, 0.5))

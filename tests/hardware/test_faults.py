@@ -297,7 +297,7 @@ def test_a_stop_comes_before_the_file_is_closed(tmp_path: Path) -> None:
     assert run.status == "complete"
     assert line.sent[-1].kind == Kind.STOP, "nobody else has called stop"
     with pytest.raises(SimulationStopped, match="has been stopped"):
-        plant.stride(np.full(3, 0.5), N_STEPS)
+        plant.stride(np.full((N_STEPS, 3), 0.5))
 
 
 @pytest.mark.parametrize(

@@ -267,7 +267,7 @@ def test_the_c_client_steps_the_controller(tmp_path: Path) -> None:
             center_of_mass_m=np.zeros(3),
         )
         assert SENSED["lengthening_m"].read(sensation) == pytest.approx(values)
-        expected = controller.stride(sensation, 10)
+        expected = controller.stride(sensation, 10)[-1]
         assert frame.numbers(3) == pytest.approx(expected, abs=1e-5)
 
 

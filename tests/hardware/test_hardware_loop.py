@@ -114,7 +114,7 @@ def test_a_robot_of_servos_follows_with_its_lag_and_is_read_in_whole_counts() ->
     bus = Bus(robot, FakeClock())
     plant = servo_plant(bus)
     assert plant.reset(0).stretch_m == pytest.approx(0.3)
-    sensed = [plant.stride(np.array([1.0, 0.5, 0.0]), 10).stretch_m[:, 0] - 0.3 for _ in range(60)]
+    sensed = [plant.stride(np.tile([1.0, 0.5, 0.0], (10, 1))).stretch_m[:, 0] - 0.3 for _ in range(60)]
     counts = np.array(sensed) / WIRING.m_per_count
     assert counts == pytest.approx(np.rint(counts), abs=1e-6)
     # First order, from the first exchange on; an answer is some 1 ms later than its command.
@@ -142,12 +142,12 @@ def test_a_bus_that_fails_stops_the_loop(fault: Callable[[bytes], bytes], senten
     bus = Bus(robot, FakeClock())
     plant = servo_plant(bus)
     plant.reset(0)
-    plant.stride(np.ones(3), 10)
+    plant.stride(np.ones((10, 3)))
     bus.fault = fault
 
     def go_on() -> None:
         for _ in range(10):
-            plant.stride(np.ones(3), 10)
+            plant.stride(np.ones((10, 3)))
 
     with pytest.raises(SimulationStopped, match=sentence):
         go_on()
@@ -158,7 +158,7 @@ def test_a_bus_that_fails_stops_the_loop(fault: Callable[[bytes], bytes], senten
     bus.receive(0.0)
     assert robot.contraction == pytest.approx(0.0, abs=1e-3)
     with pytest.raises(SimulationStopped, match="has been stopped"):
-        plant.stride(np.ones(3), 10)
+        plant.stride(np.ones((10, 3)))
 
 
 def test_a_servo_that_is_unplugged_or_missing_or_overheated_is_said() -> None:
@@ -168,14 +168,14 @@ def test_a_servo_that_is_unplugged_or_missing_or_overheated_is_said() -> None:
     bus = Bus(PseudoRobot(3, 3), FakeClock())
     plant = servo_plant(bus)
     plant.reset(0)
-    plant.stride(np.ones(3), 10)
+    plant.stride(np.ones((10, 3)))
 
     def unplugged(data: bytes) -> bytes:
         raise OSError(5, "Input/output error")
 
     bus.fault = unplugged
     with pytest.raises(SimulationStopped, match="the line to the robot at bus is gone: Input/output error"):
-        plant.stride(np.ones(3), 10)
+        plant.stride(np.ones((10, 3)))
     plant.stop()
     bus = Bus(robot := PseudoRobot(3, 3), FakeClock())
     plant = servo_plant(bus)
@@ -183,7 +183,7 @@ def test_a_servo_that_is_unplugged_or_missing_or_overheated_is_said() -> None:
     answer = robot._answer
     robot._answer = lambda servo, error, data: answer(servo, 0x80 if servo == 2 else error, data)  # type: ignore[method-assign]
     with pytest.raises(SimulationStopped, match="servo 2 at bus reports error 0x80"):
-        plant.stride(np.ones(3), 10)
+        plant.stride(np.ones((10, 3)))
 
 
 def test_a_servo_without_a_host_stays_where_it_is() -> None:
@@ -192,7 +192,7 @@ def test_a_servo_without_a_host_stays_where_it_is() -> None:
     plant = servo_plant(bus)
     plant.reset(0)
     for _ in range(5):
-        plant.stride(np.ones(3), 10)
+        plant.stride(np.ones((10, 3)))
     bus.clock.now += 0.06
     bus.receive(0.0)
     there = robot.contraction

@@ -21,7 +21,7 @@ from annelid_studies.challenge.tasks import REFERENCE, Entrant, all_tasks, entri
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
-SCORE = Score(REFERENCE, "slope", 1, 1000, "", 3, "setup", "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True, 1.2, nan)
+SCORE = Score(REFERENCE, "slope", 2, 1000, "", 3, "setup", "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True, 1.2, nan)
 
 
 @pytest.fixture
@@ -35,17 +35,18 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_draws_of_a_version_stay_what_they_are() -> None:
     """Whoever changes a number here changes the benchmark, and must raise its version."""
     found = all_tasks()
-    assert found.version == 1
-    assert found.drawn("friction", 1000) == {"arena.friction": 0.1779}
-    assert found.drawn("slope", 1000) == {"arena.slope_deg": 5.067, "arena.friction": 0.5955}
-    assert found.drawn("delay", 1001) == {"trial.delay_s": 0.02109, "arena.friction": 0.6036}
+    assert found.version == 2
+    assert found.drawn("friction", 1000) == {"arena.friction": 1.376}
+    assert found.drawn("slope", 1000) == {"arena.slope_deg": 3.486, "arena.friction": 0.6054}
+    assert found.drawn("delay", 1001) == {"trial.delay_s": 0.05559, "arena.friction": 0.6012}
 
 
 @pytest.mark.parametrize("name", all_tasks().tasks)
 def test_draws_lie_in_their_range_and_differ_by_seed(name: str) -> None:
     task, seeds = all_tasks().tasks[name], range(40)
     draws = [all_tasks().drawn(name, seed) for seed in seeds]
-    assert len({str(each) for each in draws}) > len(seeds) / 2
+    # A friction that is drawn within 1 % only has few values, as it is rounded.
+    assert len({str(each) for each in draws}) > len(seeds) / 4
     for field, among in task.draw.items():
         values = np.array([abs(each[field]) for each in draws])
         spread = 0.01 if field == "arena.friction" else 0.0
@@ -247,7 +248,7 @@ def test_rankings_agree_or_are_reversed(tmp_path: Path) -> None:
         ("entrant,", "name,", r"row 0, entrant: "),
         ("0.05", "fast", r"row 0, speed_m_per_s: "),
         ("0.05", "nan", r"row 0, speed_m_per_s: .*finite"),
-        ("slope,1,", "slope,7,", r"version 7 of the tasks; here it is 1"),
+        ("slope,2,", "slope,7,", r"version 7 of the tasks; here it is 2"),
         ("slope", "slope,more", r"no runs\.csv"),
     ],
 )

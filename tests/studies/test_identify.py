@@ -129,16 +129,6 @@ def test_a_cantilever_has_the_frequency_of_beam_theory() -> None:
     assert rate == pytest.approx(frequency**2 * 0.06 / 2)
 
 
-def test_a_strand_without_damping_of_its_material_is_refused(tmp_path: Path) -> None:
-    write(tmp_path / "strand.csv", strand_table(np.random.default_rng(1)))
-    study = study_of({"young_modulus": {}}, STRAND)
-    study["set"] = WORM | {
-        "body.strands.damping_time_s": "none",
-    }
-    with pytest.raises(ConfigError, match=r"set body\.strands\.damping_time_s"):
-        identify(load_identify_study(study), tmp_path)
-
-
 # Errors of points
 
 

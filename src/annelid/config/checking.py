@@ -115,7 +115,12 @@ REPLACED = {
 
 
 def has_field(path: str, tree: Mapping[str, Any]) -> bool:
-    """Whether the kinds of sections of a configuration, which need not be checked, have the field of a dotted path."""
+    """Returns whether a configuration's kinds of sections have a field.
+
+    Args:
+        path: Dotted path of the field.
+        tree: The configuration; need not be checked.
+    """
     return path.rsplit(".", 1)[-1] in _names_beside(path, tree)
 
 

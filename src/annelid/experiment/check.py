@@ -160,6 +160,9 @@ def percent(share: float) -> str:
 def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], tuple[str, ...]]:
     """Returns how a run is repeated more finely, and what is left as it is, a sentence each.
 
+    Args:
+        config: The run's configuration.
+
     Raises:
         ConfigError: Half of the physics step is no multiple of the control step.
     """
@@ -184,7 +187,13 @@ def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], tuple[str, .
 
 
 def compare(run: Outcome, finer: Mapping[Refinement, Outcome], left_out: Sequence[str] = ()) -> Check:
-    """Compares a run's numbers with those of finer ones."""
+    """Compares a run's numbers with those of finer ones.
+
+    Args:
+        run: The run.
+        finer: What came of each refinement.
+        left_out: What was not refined, and why, a sentence each.
+    """
     moved: dict[str, dict[str, float]] = {}
     differences: list[str] = []
     for one, found in finer.items():

@@ -110,6 +110,10 @@ def similar_worm(
             rings.model_dump()["maximum_velocity"] / slower,
             "lengths a second: radius^-0.5",
         ),
+        "body.rings.activation_times_s": (
+            [time_s * slower for time_s in rings.model_dump()["activation_times_s"]],
+            "times: radius^0.5",
+        ),
         "body.formulation.edge_time_constant_s": (
             known.formulation.model_dump()["edge_time_constant_s"] * slower,
             "a time",

@@ -24,12 +24,8 @@ LOWEST_MUSCLE, SPAN_OF_MUSCLE = 0.75, 0.3
 """The engine lays a muscle's length range from 0.75 to 1.05 of its optimal length."""
 MOST_OVER = 200.0
 """Largest force of a muscle at rest length over what the mesh bears; the paper's is 100 times that."""
-ACTIVATION_TIMES_S = (0.01, 0.04)
-"""MuJoCo's time constants of muscle activation and deactivation."""
-
-
-LAG_STEP_S = 0.001
-"""Longest step of a muscle's lag, s."""
+LAG_STEPS = 10
+"""Steps of a muscle's lag within its shorter time constant, at least."""
 
 
 class Rings(ActuatorKind):
@@ -54,7 +50,10 @@ class Rings(ActuatorKind):
     passive_peak: Positive = Field(default=1.3, description="fpmax, relative to the peak force")
     lengthening_peak: Positive = Field(default=1.2, description="fvmax, relative to the peak force")
     activation_dynamics: bool = Field(
-        default=True, description="true: MuJoCo's first-order 10/40 ms lag; false: activation acts at once"
+        default=True, description="true: activation lags behind its command as MuJoCo's; false: it acts at once"
+    )
+    activation_times_s: tuple[Positive, Positive] = Field(
+        default=(0.01, 0.04), description="MuJoCo's time constants of activation and deactivation, for the lag"
     )
 
     @property
@@ -68,13 +67,13 @@ class Rings(ActuatorKind):
         """Returns what acts of the activation after commands: the engine's lag.
 
         It is ``(activation - state) / time``, with a time of ``rise (0.5 + 1.5 state)`` or ``fall / (0.5 + 1.5 state)``
-        (Millard et al. 2013, as MuJoCo has it). Within a millisecond the time is that of the middle, which is accurate
-        to 1e-3; the engine's own steps of first order are stable below 10 ms only.
+        (Millard et al. 2013, as MuJoCo has it). Within a tenth of the shorter one the time is that of the middle, which
+        is accurate to 1e-3; the engine's own steps of first order are stable below 10 ms only.
         """
         if not self.activation_dynamics:
             return state
-        rise_s, fall_s = ACTIVATION_TIMES_S
-        n_parts = ceil(time_s / LAG_STEP_S - 1e-6)
+        rise_s, fall_s = self.activation_times_s
+        n_parts = ceil(LAG_STEPS * time_s / min(rise_s, fall_s) - 1e-6)
         part_s = time_s / n_parts
         # A few muscles at a time: plain numbers are faster than arrays.
         after = []
@@ -111,7 +110,7 @@ class Rings(ActuatorKind):
             ctrlrange=[0.0, 1.0],
         )
         actuator.set_to_muscle(
-            timeconst=ACTIVATION_TIMES_S,
+            timeconst=self.activation_times_s,
             tausmooth=0.0,
             range=[0.75, 1.05],
             force=force_N,

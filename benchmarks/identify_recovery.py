@@ -46,7 +46,6 @@ STUDY: dict[str, Any] = {
         "body.mesh.elements_per_side": 1,
         "body.mesh.n_helices": 6,
         "body.springs.stiffness_N_per_m": 24.5,
-        "body.formulation.integrator": "Euler",
     },
     "parameters": {
         "young_modulus": {"start": 0.3e9},

@@ -42,12 +42,13 @@ import mujoco
 import numpy as np
 
 from annelid.body import compile_spec
-from annelid.body.damping import MaterialDamping, add_row, tendons_to_rows
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
+from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
+from annelid.body.rows import add_row, tendons_to_rows
 from annelid.body.worm import Strands
 from annelid.config import load_config
 from annelid.morphology import Array, helical_mesh
@@ -199,24 +200,23 @@ def annelid(scene: Scene, *, exact: bool = False) -> tuple[Step, float]:
     shared = {place for pair in scene.crossings for place in pair}
     for place in [*crossing, *(place for place in np.ndindex(masses.shape) if place not in shared)]:
         add_vertex(spec, names[place[0]][place[1]], scene.vertices_m[place], float(masses[place]))
+    edges_m = np.linalg.norm(np.diff(scene.vertices_m, axis=1), axis=-1)
+    stiffness_Nm = vertex_stiffness(edges_m, strands, np.ones((2, n_strands, n_vertices - 2)))
     for s, vertices_m in enumerate(scene.vertices_m):
-        add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, rods)
+        add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, rods, stiffness_Nm=stiffness_Nm[:, s])
         if scene.clamped:
             spec.joint(f"strand_{s}_twist_0").armature = CLAMP_KG
     tendons_to_rows(spec)
     model = compile_spec(spec)
     data = mujoco.MjData(model)
-    damping = MaterialDamping(model, strands)
-    two_step = TwoStep(model, data.qpos, data.qvel, data.act, strands, damping)
+    strains = RodStrains(model, stiffness_Nm, strands.damping_time_s)
+    two_step = TwoStep(model, data, strains, first_order=False)
     pulled = [model.body(names[s][v]).id for s, v in scene.pulled]
     slides = model.jnt_qposadr[model.body_jntadr[pulled]][:, None] + np.arange(3)
 
     def step(forces_N: Array) -> Array:
         data.xfrc_applied[pulled, :3] = forces_N
-        two_step.begin()
-        damping.renew(data.qpos)
-        mujoco.mj_step(model, data)
-        two_step.end()
+        two_step.step(lambda: None)
         return model.body_pos[pulled] + data.qpos[slides]
 
     return step, step_s
@@ -226,19 +226,18 @@ def chain(scene: Scene, *, published: bool) -> tuple[Step, float]:
     """The paper's capsules on joints, which here resist torsion as the material does.
 
     With the paper's numerics, or with those that vanish with the mesh: the paper's added inertia is there for its
-    explicit method, and the formulation's other method is implicit in the damping.
+    explicit method, and Euler's method is implicit in the damping.
     """
     coarseness = scene.coarseness
     finer = {
-        "integrator": "Euler",
         "armature_kg_m2": CHAIN_KG_M2 * coarseness,
         "pin_time_constant_s": CHAIN_PIN_S * coarseness,
     }
-    settings = Chain(joint="hinges").model_copy(update={} if published else finer)
+    settings = Chain().model_copy(update={} if published else finer)
     step_s = PAPERS_S if published else dividing(CHAIN_S * coarseness)
     spec = mujoco.MjSpec()
     engine(spec, step_s)
-    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4 if published else mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
     spec.option.iterations = settings.solver_iterations
     spec.option.tolerance = settings.solver_tolerance

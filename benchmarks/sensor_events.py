@@ -8,7 +8,7 @@ which the releasing and the next segment are equally long.
 
     python benchmarks/sensor_events.py
     python benchmarks/sensor_events.py --windows --csv docs/results/tolerance_windows.csv
-    python benchmarks/sensor_events.py --windows --integrator Euler --step-ms 1
+    python benchmarks/sensor_events.py --windows --step-ms 1
 """
 
 from __future__ import annotations
@@ -29,15 +29,6 @@ from annelid.plausibility import tolerance_window_m
 from annelid_studies.robustness import TIMED
 from annelid_studies.worms import PAPERS_MESH
 
-SLIPPERY = {"arena.friction": 0.3}
-UNDAMPED_ACROSS = {
-    "body.strands.damping_time_s": None,
-    "body.strands.joint_damping_Nms_per_rad": 0.12,
-    "body.mesh.elements_per_side": 2,
-    "arena.friction_cone": "pyramidal",
-}
-"""The body of the first edition: the engine's own damping, in the plane of the bend alone."""
-
 
 def strands(modulus_GPa: float) -> dict[str, Any]:
     """Changes to strands of another Young's modulus, GPa."""
@@ -51,8 +42,6 @@ CASES: dict[str, dict[str, Any]] = {
     "tolerance 40 mm": {"sensor.tolerance_m": 0.04},
     "0.8 GPa, friction 0.1": {**strands(0.8), "arena.friction": 0.1},
     "0.8 GPa, friction 0.1, tolerance 26 mm": {**strands(0.8), "arena.friction": 0.1, "sensor.tolerance_m": 0.026},
-    "undamped across, friction 0.3": {**UNDAMPED_ACROSS, **SLIPPERY},
-    "undamped across, friction 0.3, tolerance 26 mm": {**UNDAMPED_ACROSS, **SLIPPERY, "sensor.tolerance_m": 0.026},
 }
 WINDOWS = [
     *((modulus, friction, 0.145) for modulus in (0.3, 0.45, 0.8) for friction in (1.0, 0.3, 0.05)),
@@ -101,13 +90,12 @@ def window_mm(run: Run) -> tuple[float, float]:
     return max(lifts), min(passings)
 
 
-def print_windows(path: Path | None, integrator: str, step_s: float) -> None:
+def print_windows(path: Path | None, step_s: float) -> None:
     rows = []
     for modulus, friction, damping in WINDOWS:
         settings = {
             "body.mesh.elements_per_side": 2,
             "clock.physics_timestep_s": step_s,
-            "body.formulation.integrator": integrator,
             "record.signals_interval_s": 0.01,
             "controller": TIMED,
             "duration_s": 6.6,
@@ -134,11 +122,10 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--windows", action="store_true", help="measure windows of the tolerance")
     parser.add_argument("--csv", type=Path, help="file for these")
-    parser.add_argument("--integrator", default="BDF2", choices=["BDF2", "Euler"], help="of these runs")
     parser.add_argument("--step-ms", type=float, default=10.0, help="of these runs, ms")
     given = parser.parse_args()
     if given.windows:
-        print_windows(given.csv, given.integrator, given.step_ms / 1e3)
+        print_windows(given.csv, given.step_ms / 1e3)
         return
     for name, changes in CASES.items():
         settings = {"clock.physics_timestep_s": 0.005, "duration_s": DURATION_S, "record.signals_interval_s": 0.005}

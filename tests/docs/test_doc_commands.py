@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +135,6 @@ BENCHMARKS = sorted((one for one in NAMED if starts_with(one.words, ("python", "
 """Benchmarks that pages name, with their arguments."""
 
 BENCHMARKS_NEED = {
-    "gpu_batch": find_spec("mujoco_warp"),
     "instructions": shutil.which("valgrind"),
     "firmware": shutil.which("cc") and shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
 }
@@ -229,7 +227,7 @@ def test_an_unknown_option_field_or_preset_is_found() -> None:
         "annelid run --set arena.frictoin=0.3",
         "annelid sing",
         "pytest tests/test_nothing.py",
-        "python benchmarks/growth.py --elephants 2",
+        "python benchmarks/batch_throughput.py --elephants 2",
     ):
         check = check_annelid if line.startswith("annelid") else check_program
         with pytest.raises((Exception, SystemExit)):

@@ -16,8 +16,6 @@ from doc_commands import PAGES, ROOT, Command
 from test_doc_commands import check_annelid, check_program
 
 import measure_runs
-from annelid.body import WormBody
-from annelid.config import load_config, preset_names
 from fill_tables import DOCS, MARKED, WORMS, FillError, filled, main, measured, waiting, worm
 
 MOST = 5
@@ -54,12 +52,10 @@ NO_WORM = {
     "loop.csv": "times of a loop with a pseudo-robot",
     "robust_network.csv": "networks without a body",
     "firmware_random.csv": "the same",
-    "lateral_damping.csv": "rods with and without the damping that it is about",
     "peers.csv": "a strand and a net without a worm",
     "calibration_default.json": "a fit with a body of its own",
     "identify_recovery.csv": "synthetic robots",
     "identify_recovery_table.csv": "the same",
-    "tube_law.csv": "fits to the load frame, each with a body of its own",
     "material.csv": "the swept materials are its rows",
 }
 """Result files that are not of presets, and why."""
@@ -141,15 +137,6 @@ def test_numbers_are_of_worms_as_they_are() -> None:
     assert set(known) == there - set(NO_WORM), "run: python docs/site/fill_tables.py --measured FILE PRESET.."
     changed = {file for file, worms in known.items() if any(worm(preset) != digest for preset, digest in worms.items())}
     assert changed == set(STALE)
-
-
-def test_rods_are_damped_by_their_material() -> None:
-    """The paper's worm is of chains, as published."""
-    bodies = {preset: load_config(preset).body for preset in preset_names()}
-    rods = {
-        name: body for name, body in bodies.items() if isinstance(body, WormBody) and body.formulation.damps_material
-    }
-    assert not {name for name, body in rods.items() if not body.strands.damping_time_s}
 
 
 def test_a_result_file_is_noted_with_its_worms(docs: Path) -> None:

@@ -91,7 +91,7 @@ def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
     [
         (("--uncertainty", "1"), "greater than or equal to 2"),
         (("--vary", "spring_rate=0.1"), "need --uncertainty"),
-        (("--jobs", "2"), "need --uncertainty"),
+        (("--jobs", "2"), "needs --check or --uncertainty"),
         (("--uncertainty-from", "c.json"), "need --uncertainty"),
         (("--uncertainty", "2", "--resume", "walk"), "does not go with --resume"),
     ],
@@ -111,3 +111,37 @@ def test_force_replaces_a_run(annelid: Command) -> None:
     assert open_run("here").config.seed == 0
     assert annelid(*command, "--seed", "4", "--force").exit_code == 0
     assert open_run("here").config.seed == 4
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_checked_run_says_how_far_its_numbers_move(annelid: Command) -> None:
+    command = ("run", "riddle2022-planar", "--duration", "3", "--check", "--jobs", "1", "-o", "walk")
+    done = annelid(*command)
+    assert done.exit_code == 0, done.err
+    assert "moves by" in done.out
+    assert "Resolved: with half the step (0.5 ms) no number moves by more than 10 %" in " ".join(done.out.split())
+    content = json.loads(annelid(*command, "--json").out)["results"]["check.json"]
+    assert content == json.loads(Path("walk/check.json").read_text())
+    assert content["resolved"] is True
+    for words, sentence in (
+        (("--check", "--uncertainty", "4"), "--uncertainty has what --check does"),
+        (("--check", "--resume", "walk"), "makes whole runs"),
+        (("--jobs", "2"), "--jobs needs --check or --uncertainty"),
+    ):
+        assert sentence in " ".join(annelid("run", *words).err.split())
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_interrupted_check_keeps_the_run_and_names_the_command(
+    annelid: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from annelid.experiment import check as checking
+
+    def interrupted(*given: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    assert annelid("run", "riddle2022-planar", "--duration", "1", "--no-video", "-q", "-o", "walk").exit_code == 0
+    monkeypatch.setattr(checking, "check", interrupted)
+    done = annelid("run", "riddle2022-planar", "--duration", "1", "--check", "-o", "walk")
+    assert done.exit_code == 130
+    assert "the run is kept in walk/run.nc; check it with: annelid run" in " ".join(done.err.split())

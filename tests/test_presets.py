@@ -242,7 +242,7 @@ def test_the_four_segment_robot_has_equal_servos() -> None:
     assert value_at("riddle2025", "body.rings.force_limit_N") == (16.0, 31.0, 31.0, 31.0, 31.0, 16.0)
 
 
-@pytest.mark.parametrize("preset", ["wang", "riddle2025"])
+@pytest.mark.parametrize("preset", ["wang-network", "riddle2025"])
 @pytest.mark.parametrize(
     "path", [p for p in PUBLISHED if p.startswith("controller.") and p != "controller.gate_time_constant_ms"]
 )

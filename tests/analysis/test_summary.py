@@ -113,7 +113,7 @@ def test_published_numbers_go_with_a_preset_whatever_a_worm_is_called(tmp_path: 
     mine.write_text('extends = "riddle2023-rods"\n', encoding="utf-8")
     assert published(load_config(mine)) == published(load_config("riddle2023"))
     assert {name for name in preset_names() if published(load_config(name))} == {
-        "riddle2022-planar", "riddle2023", "riddle2023-fast", "riddle2023-rods", "wang",
+        "riddle2022-planar", "riddle2023", "riddle2023-fast", "riddle2023-rods", "wang", "wang-network",
     }  # fmt: skip
 
 

@@ -55,13 +55,14 @@ class Published:
 def published(config: RunConfig) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
-    These are the numbers that its field ``published`` names, in ``data/published.toml``, where the controller is
-    the paper's and the fields that the numbers are given for have those values.
+    These are the numbers that its field ``published`` names, in ``data/published.toml``, where the fields that the
+    numbers are given for have those values, and the controller is the paper's unless they are of a robot.
     """
-    if config.published is None or paper_controller(config.controller) is None:
+    if config.published is None:
         return {}
+    of_papers = paper_controller(config.controller) is not None
     for worm in published_worms()[config.published]:
-        if all(_value(config, path) == value for path, value in worm["given"].items()):
+        if (of_papers or worm.get("any_controller")) and all(_value(config, path) == value for path, value in worm["given"].items()):
             return {field: Published(_tuple(value), *source) for field, (value, *source) in worm["numbers"].items()}
     return {}
 

@@ -194,7 +194,7 @@ def annelid(scene: Scene, *, exact: bool = False) -> tuple[Step, float]:
         masses[first] += masses[second]
         names[second[0]][second[1]] = names[first[0]][first[1]]
     if scene.clamped:
-        # The dampers know no fixed vertices: mass clamps the rods.
+        # Rows know no fixed vertices: mass clamps the rods.
         masses[:, :2] = CLAMP_KG
     crossing = [first for first, _ in scene.crossings]
     shared = {place for pair in scene.crossings for place in pair}

@@ -161,7 +161,7 @@ def test_the_energy_totals_close_with_a_box_that_the_worm_pushes() -> None:
         start, place_m, pushed = total_J(plant), plant.posture.objects[0].copy(), 0.0
         for _ in range(round(0.8 / step_s)):
             plant.step(np.ones(plant.n_muscles))
-            pushed = min(pushed, float(plant.read(False)["object_force"][0, 0]))
+            pushed = min(pushed, float(np.asarray(plant.read(False)["object_force"])[0, 0]))
         assert plant.posture.objects[0, 0] < place_m[0] - 0.01, "the box must move"
         assert pushed < -0.3 * 9.81 * 0.03, "the worm must push it ahead"
         work = float(plant.energies.muscle_work.sum())

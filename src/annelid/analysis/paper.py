@@ -62,7 +62,8 @@ def published(config: RunConfig) -> dict[str, Published]:
         return {}
     of_papers = paper_controller(config.controller) is not None
     for worm in published_worms()[config.published]:
-        if (of_papers or worm.get("any_controller")) and all(_value(config, path) == value for path, value in worm["given"].items()):
+        given = all(_value(config, path) == value for path, value in worm["given"].items())
+        if given and (of_papers or worm.get("any_controller")):
             return {field: Published(_tuple(value), *source) for field, (value, *source) in worm["numbers"].items()}
     return {}
 

@@ -60,7 +60,48 @@ NO_WORM = {
 }
 """Result files that are not of presets, and why."""
 
-STALE: tuple[str, ...] = ()
+STALE: tuple[str, ...] = (
+    "arena_contacts.csv",
+    "challenge.csv",
+    "challenge_10ms.csv",
+    "challenge_2ms_runs.csv",
+    "challenge_5ms.csv",
+    "challenge_bend_wave.csv",
+    "challenge_draws.csv",
+    "challenge_half.csv",
+    "challenge_half_runs.csv",
+    "challenge_runs.csv",
+    "challenge_six_wave.csv",
+    "challenge_six_wave_5ms.csv",
+    "challenge_tasks.csv",
+    "challenge_tune_5ms.csv",
+    "challenge_wave_2ms.csv",
+    "challenge_wave_5ms.csv",
+    "environments.csv",
+    "fast.csv",
+    "firmware.csv",
+    "gaits.csv",
+    "lems.csv",
+    "levels.csv",
+    "limits.csv",
+    "pipes.csv",
+    "presets.csv",
+    "readme.csv",
+    "resolution.csv",
+    "riddle2025.csv",
+    "robustness_three_segments.json",
+    "slip.csv",
+    "slip_detector.csv",
+    "speed.csv",
+    "tolerance_windows.csv",
+    "tune_sns.csv",
+    "tune_timed.csv",
+    "turning.csv",
+    "uncertainty_rods.csv",
+    "uncertainty_turns.csv",
+    "wang.csv",
+    "weak_middle.csv",
+)
 """Result files whose worms have changed since: to be measured again."""
 
 LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))

@@ -99,7 +99,6 @@ STALE: tuple[str, ...] = (
     "turning.csv",
     "uncertainty_rods.csv",
     "uncertainty_turns.csv",
-    "wang.csv",
     "weak_middle.csv",
 )
 """Result files whose worms have changed since: to be measured again."""

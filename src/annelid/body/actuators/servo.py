@@ -142,17 +142,16 @@ class ServoRings(ActuatorKind):
         (shortest, longest), limits_N = model.actuator_actrange.T, -model.actuator_forcerange[:, 0]
         play, speed = 0.5 * self.backlash_m, self.speed_limit_m_per_s
         stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
-        # Under one command a cable winds evenly, so that equal ones are one.
-        starts = np.flatnonzero(np.any(np.diff(activation, axis=0), axis=1)) + 1
-        for commands in np.split(activation, starts):
-            commanded, winding = longest + commands[0] * (shortest - longest), speed
+        # One by one, so that commands that are given together come to the same bits as single ones.
+        for command in activation:
+            commanded, winding = longest + command * (shortest - longest), speed
             if play:
                 commanded = state.clip(commanded - play, commanded + play)
             if self.no_load_speed_m_per_s is not None:
                 share = (self.stiffness_N_per_m * (length_m - state) / limits_N).clip(0.0, 1.0)
                 winding = np.minimum(speed, self.no_load_speed_m_per_s * (1.0 - share))
-            aim, lasts_s = np.maximum(commanded, stalled) - state, len(commands) * time_s
-            wound = np.minimum(np.maximum(aim, -winding * lasts_s), speed * lasts_s)
+            aim = np.maximum(commanded, stalled) - state
+            wound = np.minimum(np.maximum(aim, -winding * time_s), speed * time_s)
             state = (state + wound).clip(shortest, longest)
         return state
 

@@ -24,14 +24,14 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next((path for name in _NAMES if (path := shutil.which(name))), None)
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 ARGUMENTS += ["--disable-gpu-compositing"]
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 
 
 def wait_for(is_so: Callable[[], object], page: Page | None = None) -> None:
-    """Waits until something is so; gives up after a minute, which a busy machine may need."""
+    """Waits until something is so; gives up after what a busy machine may need."""
     end = perf_counter() + PATIENCE_S
     while not is_so():
-        assert perf_counter() < end, "it did not happen within a minute"
+        assert perf_counter() < end, "it did not happen in time"
         if page is None:
             sleep(0.05)
         else:

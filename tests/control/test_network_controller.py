@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 
@@ -59,10 +60,13 @@ def test_it_is_the_network_stepped_by_hand() -> None:
     assert ours.read(False)["potential"] == pytest.approx(state.potential[0], abs=0.0)
 
 
-def test_a_stride_is_so_many_steps() -> None:
-    by_step, by_stride, longer_m = controller(), controller(), np.linspace(0.0, 0.05, N)
-    single = [by_step.step(sensed(longer_m, step)) for step in range(20)]
-    assert np.array_equal(by_stride.stride(sensed(longer_m), 20), single)
+@pytest.mark.parametrize("rate_m_per_s", [0.0, 0.8])
+def test_a_stride_is_so_many_steps(rate_m_per_s: float) -> None:
+    by_step, by_stride = controller(), controller()
+    rates = rate_m_per_s * np.linspace(1.0, -1.0, N)[:, np.newaxis]
+    felt = replace(sensed(np.linspace(0.0, 0.05, N)), stretch_rate_m_per_s=rates)
+    single = [by_step.step(felt.later(step * 1e-3)) for step in range(20)]
+    assert np.array_equal(by_stride.stride(felt, 20), single)
 
 
 def test_currents_and_gates_are_recorded_by_name_and_add_up() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +12,13 @@ import pytest
 from annelid.config.run import StretchSensor as SensorSection
 from annelid.control import AdaptiveController, SnsController
 from annelid.control.base import design_of
+from annelid.control.pressure import PressureController, PressureSns
 from annelid.control.robust import RobustController, RobustSns
 from annelid.control.sns import AdaptiveSns, Sns
+from annelid.control.turning import ConstantTurning, TurningController
 from annelid.nervous import PeristalsisParameters
 from annelid.nervous.robust import RobustParameters
-from annelid.protocols import Sensation
+from annelid.protocols import SIDES, Sensation
 
 Neural = SnsController | AdaptiveController | RobustController
 
@@ -91,3 +94,38 @@ def test_a_stride_under_a_drive_is_its_steps_bit_for_bit(slope_per_s: float) -> 
         assert np.array_equal(strode.stride(felt, 10), stepped)
     assert all(np.array_equal(walked.get_state()[name], value) for name, value in strode.get_state().items())
     assert np.asarray(walked.read(frame=False)["drive"], dtype=np.float64) > 0.0
+
+
+HELD = SensorSection(startup_hold_s=0.013, hysteresis_m=0.004)
+
+
+STRIDING: dict[str, Callable[[], Any]] = {
+    "sns": lambda: SnsController(Sns(), HELD, N, N, 0.001),
+    "adaptive": lambda: AdaptiveController(AdaptiveSns(drive=0.3, stretch_gain_per_m=5.0), HELD, N, N, 0.001),
+    "sns-pressure": lambda: PressureController(PressureSns(), HELD, N, N, 0.001),
+    "sns-robust": lambda: RobustController(RobustSns(), N, N, 0.001),
+    "turned": lambda: TurningController(
+        SnsController(Sns(), HELD, N, 2 * N, 0.001), ConstantTurning(modulation=0.5), N, 2 * N, 0.001
+    ),
+}
+
+
+@pytest.mark.parametrize("make", STRIDING.values(), ids=STRIDING)
+def test_within_a_stride_lengths_go_on_at_their_rates(make: Callable[[], Any]) -> None:
+    walked, strode, unmoved = make(), make(), make()
+    rng, rest, zeros = np.random.default_rng(4), np.full((N, 3), 0.1), np.zeros(N)
+    moved_by_mV = 0.0
+    for first in range(0, 200, 10):
+        lengths, rates = rest + rng.uniform(0.0, 0.06, (N, 3)), rng.uniform(-4.0, 4.0, (N, 3))
+        felt = Sensation(
+            first * 0.001, lengths, rest, zeros, zeros, np.zeros((N, 3)), np.zeros(3),
+            touch_N=np.zeros((N, len(SIDES))), stretch_rate_m_per_s=rates,
+        )  # fmt: skip
+        stepped = [walked.step(felt.later((first + k) * 0.001)) for k in range(10)]
+        # A mean of lengths carried on, and a length carried on by a mean of rates, differ by rounding.
+        np.testing.assert_allclose(strode.stride(felt, 10), stepped, rtol=1e-9, atol=1e-12)
+        unmoved.stride(replace(felt, stretch_rate_m_per_s=np.zeros((0, 0))), 10)
+        by_steps, by_stride, without = (one.read(frame=False)["potential"] for one in (walked, strode, unmoved))
+        np.testing.assert_allclose(by_stride, by_steps, rtol=1e-9, atol=1e-9)
+        moved_by_mV = max(moved_by_mV, float(np.abs(by_stride - without).max()))
+    assert moved_by_mV > 0.1, "the rates are of consequence"

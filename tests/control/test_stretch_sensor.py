@@ -75,6 +75,31 @@ def test_startup_hold_keeps_segment_1_off_until_it_ends():
         assert one.read(REST_M, REST_M, time_s).tolist() == [first, True, True]
 
 
+def test_a_sensor_kept_off_is_off_for_the_hysteresis_too():
+    """Within the tolerance while the hold lasts, and beyond it, within the hysteresis, once it is over."""
+    longer, times_s = np.array([[0.008], [0.008], [0.012], [0.012]]), [0.198, 0.199, 0.2, 0.201]
+    for startup_hold_s, expected in ((0.2, [False] * 4), (0.0, [True] * 4)):
+        one = sensor(hysteresis_m=0.005, startup_hold_s=startup_hold_s, n_segments=1)
+        assert one.readings(one.on, longer, times_s)[:, 0].tolist() == expected
+
+
+@given(
+    n_times=st.integers(1, 12), n_held=st.integers(0, 12), hysteresis_m=st.sampled_from([0.0, 0.005]), data=st.data()
+)
+def test_readings_at_many_instants_are_those_of_one_after_another(n_times, n_held, hysteresis_m, data):
+    # On both sides of the tolerance and of the hysteresis.
+    lengths = st.lists(st.sampled_from([0.008, 0.012, 0.016]), min_size=3, max_size=3)
+    longer = np.array(data.draw(st.lists(lengths, min_size=n_times, max_size=n_times)))
+    times_s = [0.001 * k for k in range(n_times)]
+    one = sensor(hysteresis_m=hysteresis_m, startup_hold_s=0.001 * n_held)
+    together = one.readings(one.on, longer, times_s)
+    alone = [
+        one.read((REST_M[:, :1] + each[:, np.newaxis]), REST_M[:, :1], t)
+        for each, t in zip(longer, times_s, strict=True)
+    ]
+    assert np.array_equal(together, alone)
+
+
 def test_reset_forgets():
     one = sensor(hysteresis_m=0.005)
     assert sweep(one, [0.008, 0.012]) == [True, True]

@@ -74,7 +74,7 @@ def test_a_sweep_tells_of_runs_that_a_guard_stopped(annelid: Command, monkeypatc
         done = swept(*words, **options)  # type: ignore[arg-type]
         outcomes = [run.outcome for run in done.runs if run.outcome is not None]
         runs = tuple(Done(replace(outcome, message="too fast")) for outcome in outcomes)
-        return Sweep(done.plan, done.numbers, runs, done.folder)
+        return replace(done, runs=runs)
 
     monkeypatch.setattr("annelid.experiment.sweep.swept", stopped)
     Path("study.toml").write_text(STUDY.format(values=GOOD))

@@ -15,8 +15,10 @@ from annelid.errors import ConfigError
 from annelid.experiment import check as package
 from annelid.experiment.check import HALF, MORE, RESOLVED, Check, check, compare, refinements
 from annelid.experiment.outcome import Outcome, outcome
+from annelid.output import write_json
 from annelid.simulation import Run, simulate
 from annelid.simulation.runfile import open_run
+from annelid.textfiles import read_json
 
 PLANAR = {"duration_s": 3.0}
 
@@ -81,6 +83,12 @@ def test_what_is_lost_or_in_another_order_is_said(planar: Outcome) -> None:
     (half, *_), _ = refinements(load_config("riddle2022-planar"))
     stopped = compare(planar, {half: replace(planar, message="edge strain is 0.1")})
     assert "is stopped (edge strain is 0.1)" in stopped.sentence
+    assert "fails (no memory)" in compare(planar, {half: "no memory"}).sentence
+
+
+def test_what_is_lost_is_null_in_json(planar: Outcome, tmp_path: Path) -> None:
+    written = write_json(tmp_path / "check.json", compared(planar, period_s=None).to_dict())
+    assert read_json(written)["moved"]["period_s"] == {HALF: None}
 
 
 @pytest.mark.usefixtures("runs_in_this_process")

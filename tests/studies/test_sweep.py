@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import json
+import re
 from collections.abc import Mapping
 from concurrent.futures import Future
 from pathlib import Path
@@ -26,12 +28,14 @@ from annelid.experiment.space import unit_samples
 from annelid.experiment.sweep import (
     Plan,
     Sweep,
+    checked_sentence,
     failures,
     flattened,
     plan_of,
     results_table,
     shown_numbers,
     swept,
+    to_check,
     write_results,
 )
 from annelid.experiment.workers import Result, Workers
@@ -315,6 +319,89 @@ def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
     data = annelid.sweep(
         study(ONE, keep="outcomes", outputs=["duration_s", "muscle_work_J"]).model_dump(by_alias=True), tmp_path
     )
-    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm", "warnings"}
+    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm", "warnings", "check"}
     assert not list(tmp_path.glob(f"runs/*/{FILE_NAME}"))
     assert data.duration_s.values == pytest.approx(0.2)
+
+
+@settings(max_examples=50)
+@given(
+    n_cells=st.integers(1, 12),
+    repeats=st.integers(1, 3),
+    n=st.integers(0, 40),
+    lost=st.sets(st.integers(0, 35)),
+)
+def test_runs_to_check_are_spread_and_of_every_cell_before_a_second_of_one(
+    n_cells: int, repeats: int, n: int, lost: set[int]
+) -> None:
+    plan = plan_of(study([{"field": GATE, "values": [100.0 + i for i in range(n_cells)]}], repeats=repeats))
+    usable = [i not in lost for i in range(n_cells * repeats)]
+    chosen = to_check(plan, n, usable)
+    assert len(chosen) == len(set(chosen)) == min(n, sum(usable))
+    assert all(usable[i] for i in chosen)
+    of_cell = [
+        [i in chosen for i in range(repeats * cell, repeats * (cell + 1)) if usable[i]] for cell in range(n_cells)
+    ]
+    most = max(map(sum, of_cell))
+    assert all(sum(its) >= most - 1 or all(its) for its in of_cell), "a second of one before the first of another"
+    if all(usable) and 1 < n <= n_cells:
+        cells = [i // repeats for i in chosen]
+        assert (cells[0], cells[-1]) == (0, n_cells - 1)
+        assert np.ptp(np.diff(cells)) <= 1
+
+
+def test_a_sample_of_a_sweep_is_checked_and_kept(tmp_path: Path) -> None:
+    of = study([{"field": "body.gain", "values": [1.31, 1.4, 1.5, 1e4]}])
+    done = swept(of, tmp_path, check=2)
+    assert list(done.checks) == [0, 2], "the last fails, so the nearest stands in"
+    assert done.data.check.values.tolist() == ["resolved", "", "resolved", ""]
+    assert checked_sentence(done) == "Checked 2 of 4 runs at half the step: all resolved."
+    write_results(done)
+    rows = list(csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines()))
+    assert [row["check"] for row in rows] == ["resolved", "", "resolved", ""]
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob(f"runs/*/{FILE_NAME}")}
+    assert len(before) == 5
+    again = swept(of, tmp_path, check=2)
+    assert [one.to_dict() for one in again.checks.values()] == [one.to_dict() for one in done.checks.values()]
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob(f"runs/*/{FILE_NAME}")} == before
+
+
+def test_what_is_not_resolved_is_named_with_what_moves_most(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.experiment.check.RESOLVED", 1e-9)
+    done = swept(study([{"field": "body.gain", "values": [1.31, 1.4]}], repeats=2), tmp_path, check=2)
+    assert list(done.checks) == [0, 2]
+    found = checked_sentence(done)
+    assert found.startswith(
+        "Checked 2 of 4 runs at half the step: 0 resolved; not resolved: body.gain = 1.31, seed = 0 ("
+    )
+    assert re.search(r"body.gain = 1.4, seed = 0 \([a-z ]+ [0-9.e-]+ %( and \d+ more)?\)\.$", found)
+    assert all(text.startswith("Not resolved: with half the step") for text in done.data.check.values[:, 0])
+    assert done.data.check.values[:, 1].tolist() == ["", ""]
+
+
+def test_a_3d_worm_is_checked_in_step_and_mesh(tmp_path: Path) -> None:
+    of = study([{"field": "arena.friction", "values": [0.5]}], preset="riddle2023-rods", set={"duration_s": 0.1})
+    done = swept(of, tmp_path, check=1)
+    assert [one.name for one in done.checks[0].refinements] == ["half_step", "more_elements"]
+    assert checked_sentence(done).startswith("Checked 1 of 1 runs at half the step and with one more element a side: ")
+
+
+def test_a_run_that_cannot_be_checked_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    steps = [{"field": "clock.physics_timestep_s", "values": [0.005, 0.004]}]
+    of = study(steps, preset="riddle2023-rods", set={"record.signals_interval_s": 0.02})
+    with pytest.raises(ConfigError, match=r"0\.005: half of it is no multiple .* set it to 0\.004 or 0\.006"):
+        swept(of, tmp_path / "out", check=1)
+    with pytest.raises(ConfigError, match="check = -1: must be at least 0"):
+        swept(of, tmp_path / "out", check=-1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_check_keeps_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("annelid.experiment.sweep.check_runs", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        annelid.sweep(study(ONE), tmp_path, check=1)
+    data = xr.load_dataset(tmp_path / "sweep.nc", engine="h5netcdf")
+    assert (data.status.item(), data.check.item()) == ("complete", "")

@@ -161,8 +161,10 @@ def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
         raise RunFileError(f"{path} cannot be written: {written} does not allow it")
 
 
-def print_results(paths: Iterable[Path], *tables: Table, quiet: bool, results: Mapping[str, Any] | None = None) -> None:
-    """Prints the tables of a study unless it is to be quiet, and the paths of its files.
+def print_results(
+    paths: Iterable[Path], *tables: Table | str, quiet: bool, results: Mapping[str, Any] | None = None
+) -> None:
+    """Prints the tables and sentences of a study unless it is to be quiet, and the paths of its files.
 
     With --json these are the paths and what the files hold, and further results by name.
     """
@@ -173,7 +175,7 @@ def print_results(paths: Iterable[Path], *tables: Table, quiet: bool, results: M
         give_files((), {**records(written), **(results or {})})
     else:
         for table in () if quiet else tables:
-            Console().print(table)
+            Console().print(table, soft_wrap=isinstance(table, str))
     print_paths(written)
 
 

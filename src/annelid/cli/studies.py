@@ -286,6 +286,12 @@ def sweep_command(
     samples: Annotated[
         int | None, typer.Option(min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]")
     ] = None,
+    check: Annotated[
+        int,
+        typer.Option(
+            min=0, max=1_000_000, metavar="N", help="Runs to repeat at half the step and with one more element."
+        ),
+    ] = 0,
     example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
     quiet: Quiet = False,
 ) -> None:
@@ -302,12 +308,17 @@ def sweep_command(
     Needs the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the
     study describes is used where --cluster names the file.
 
+    With --check N, N complete runs, spread evenly over the sweep, run also at half the step and with one more element a
+    side. A sentence at the end says which of them are not resolved; the column check of sweep.csv says what moves, and
+    what to try.
+
     \b
     annelid sweep --example > study.toml
     annelid sweep study.toml
     annelid sweep study.toml --cluster tcp://10.0.0.1:8786
     annelid sweep study.toml --cluster study.toml
     annelid sweep study.toml --samples 512
+    annelid sweep study.toml --check 4                 do its results depend on step and mesh?
     """
     refuse_json(example, "--example")
     if example:
@@ -319,7 +330,7 @@ def sweep_command(
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
     from annelid.experiment.progress import study_progress
-    from annelid.experiment.sweep import results_table, swept, write_results
+    from annelid.experiment.sweep import checked_sentence, results_table, swept, write_results
 
     loaded = load_study(study)
     if samples is not None:
@@ -327,8 +338,10 @@ def sweep_command(
     lock(output)
     with going_on(output / "runs"), study_progress(quiet=quiet) as progress:
         to_use = f"add --cluster {shlex.quote(str(study))}"
-        done = swept(loaded, output, cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
-    print_results(write_results(done), results_table(done), quiet=quiet)
+        done = swept(loaded, output, cluster=cluster, jobs=jobs, check=check, progress=progress, to_use=to_use)
+    sentences = [checked_sentence(done)] if check else []
+    results = {"check": {i: one.to_dict() for i, one in done.checks.items()}} if check else {}
+    print_results(write_results(done), results_table(done), *sentences, quiet=quiet, results=results)
     failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
     end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)
 

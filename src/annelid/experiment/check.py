@@ -85,7 +85,7 @@ class Check:
             itself. The largest over the segments; infinite where only one of the two runs has the number.
         refinements: What was made finer.
         left_out: What was not, and why, a sentence each.
-        differences: What differs otherwise (order of contractions, a finer run that a guard stopped), a clause each.
+        differences: What differs otherwise (order of contractions, a finer run is stopped or fails), a clause each.
     """
 
     moved: Mapping[str, Mapping[str, float]]
@@ -139,12 +139,15 @@ class Check:
         return f"Try --set {path}={finer.changes[path]:g}, and check again."
 
     def to_dict(self) -> dict[str, Any]:
-        """Returns all of it for JSON."""
+        """Returns all of it for JSON, where a change is None if only one of the two runs has the number."""
         return {
             "resolved": self.resolved,
             "sentence": self.sentence,
             "limit": RESOLVED,
-            "moved": {name: dict(by) for name, by in self.moved.items()},
+            "moved": {
+                name: {of: None if math.isinf(share) else share for of, share in by.items()}
+                for name, by in self.moved.items()
+            },
             "not_resolved": list(self.unresolved),
             "refinements": [asdict(one) for one in self.refinements],
             "left_out": list(self.left_out),
@@ -186,17 +189,20 @@ def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], tuple[str, .
     return tuple(found), (f"The mesh has {MOST_ELEMENTS} elements a side, the most that are allowed.",)
 
 
-def compare(run: Outcome, finer: Mapping[Refinement, Outcome], left_out: Sequence[str] = ()) -> Check:
+def compare(run: Outcome, finer: Mapping[Refinement, Outcome | str], left_out: Sequence[str] = ()) -> Check:
     """Compares a run's numbers with those of finer ones.
 
     Args:
         run: The run.
-        finer: What came of each refinement.
+        finer: What came of each refinement, or why it failed.
         left_out: What was not refined, and why, a sentence each.
     """
     moved: dict[str, dict[str, float]] = {}
     differences: list[str] = []
     for one, found in finer.items():
+        if isinstance(found, str):
+            differences.append(f"the run with {one.words} fails ({found})")
+            continue
         if found.message:
             differences.append(f"the run with {one.words} is stopped ({found.message})")
             continue
@@ -279,6 +285,19 @@ def check(
     )
     write_json(folder / f"{RUNS}.json", found.to_dict())
     return done[0], found
+
+
+def check_runs(store: Store, cases: Sequence[Case]) -> list[Check]:
+    """Checks runs that a store has, by finer ones that it computes and keeps.
+
+    Raises:
+        ConfigError: Half of a step is no multiple of the control step.
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    plans = [(case, *refinements(case.config)) for case in cases]
+    finer = [Case(case.preset, dict(one.changes), case.config) for case, found, _ in plans for one in found]
+    came = iter([done.outcome or done.reason for done in store.finish(finer, "finer runs")])
+    return [compare(store[case], {one: next(came) for one in found}, left_out) for case, found, left_out in plans]
 
 
 def go_on_in(folder: Path, runs: str, config: RunConfig, *, overwrite: bool) -> None:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import product, zip_longest
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -36,8 +36,9 @@ from annelid.config.study import MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
+from annelid.experiment.check import MORE, Check, check_runs, percent, refinements
 from annelid.experiment.cluster import workers_of
-from annelid.experiment.numbers import PREFERRED, Number, chosen_numbers
+from annelid.experiment.numbers import NUMBERS, PREFERRED, Number, chosen_numbers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
@@ -93,12 +94,20 @@ class Sweep:
         numbers: What is read from every run.
         runs: What became of the plan's points, in their order.
         folder: Folder of the results.
+        checks: What the check of a run has found, by the run's number; only of those that were checked.
     """
 
     plan: Plan
     numbers: tuple[Number, ...]
     runs: tuple[Done, ...]
     folder: Path
+    checks: Mapping[int, Check]
+
+    @property
+    def checked(self) -> list[str]:
+        """What the check says of each run: "resolved" or its sentence; empty where it was not checked."""
+        found = map(self.checks.get, range(len(self.runs)))
+        return ["" if one is None else "resolved" if one.resolved else one.sentence for one in found]
 
     @cached_property
     def data(self) -> xr.Dataset:
@@ -109,9 +118,11 @@ class Sweep:
         """
         plan, dims = self.plan, tuple(self.plan.levels)
         variables: dict[str, Any] = {}
-        for name, (text, words_of) in _WORDS.items():
-            words = np.array([words_of(run) for run in self.runs], dtype=object).reshape(plan.shape)
-            variables[name] = (dims, words, {"units": "1", "long_name": text})
+        words = {name: (text, [words_of(run) for run in self.runs]) for name, (text, words_of) in _WORDS.items()}
+        words["check"] = ("resolved, or what moves at half the step or with one more element a side", self.checked)
+        for name, (text, of_runs) in words.items():
+            table = np.array(of_runs, dtype=object).reshape(plan.shape)
+            variables[name] = (dims, table, {"units": "1", "long_name": text})
         outcomes = [run.outcome for run in self.runs]
         read = {number: [None if one is None else number.read(one) for one in outcomes] for number in self.numbers}
         lengths = [len(value or ()) for number, values in read.items() if number.per_segment for value in values]
@@ -178,6 +189,7 @@ def sweep(
     *,
     cluster: Cluster | str | None = None,
     jobs: int | None = None,
+    check: int = 0,
     progress: StudyProgress | None = None,
 ) -> xr.Dataset:
     """Computes a sweep, writes its results, and returns them.
@@ -190,22 +202,27 @@ def sweep(
         cluster: Where runs are computed: a section, or a word as `find_cluster` takes; default: processes of this
             machine. What a study says of it is not used, since a scheduler and a job run code: name its file here.
         jobs: Workers, instead of as many as there are cores, or as the cluster says.
+        check: How many of the runs are repeated at half the step and with one more element a side.
         progress: Called at the start and after every run.
 
     Returns:
         Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
         ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason``, ``warnings``
-        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder.
+        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder;
+        ``check`` is "resolved" or what moves in finer runs, and empty where a run was not checked.
 
     Raises:
-        ConfigError: The study is refused, or all of its runs are.
+        ConfigError: The study is refused, or all of its runs are, or one to be checked has a step that is no multiple
+            of twice the control step.
         MissingDependency: Dask or dask-jobqueue is needed and not installed.
         ClusterError: The workers are lost for good; finished runs are kept.
         RunFileError: A file cannot be written.
-        KeyboardInterrupt: Finished runs are kept.
+        KeyboardInterrupt: Finished runs are kept, and the results if only the check was interrupted.
     """
     to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
-    done = swept(load_study(study), Path(folder), cluster=cluster, jobs=jobs, progress=progress, to_use=to_use)
+    done = swept(
+        load_study(study), Path(folder), cluster=cluster, jobs=jobs, check=check, progress=progress, to_use=to_use
+    )
     write_results(done)
     return done.data
 
@@ -216,12 +233,14 @@ def swept(
     *,
     cluster: Cluster | str | None = None,
     jobs: int | None = None,
+    check: int = 0,
     progress: StudyProgress | None = None,
     to_use: str = "pass it as cluster",
 ) -> Sweep:
-    """Computes a sweep as `sweep` does, in a folder that the caller has locked, and writes nothing but the runs.
+    """Computes a sweep as `sweep` does, in a folder that the caller has locked.
 
-    ``to_use`` is what the user has to do to have the cluster used that the study describes, for a sentence.
+    Writes nothing but the runs and, before a check begins, the results as they are without it. ``to_use`` is what the
+    user has to do to have the cluster used that the study describes, for a sentence.
     """
     numbers = chosen_numbers(study.outputs, study.rank)
     if cluster is None and study.cluster is not None:
@@ -232,12 +251,86 @@ def swept(
     to_join = find_cluster(cluster or "processes") if isinstance(cluster, str | None) else cluster
     its_workers = workers_of(to_join, jobs)
     plan = plan_of(study)
+    cases = [case for _, case in plan.points]
+    refusals = [_refusal(case) if check else None for case in cases]
+    for i in to_check(plan, check, [True] * len(cases)):
+        if (refusal := refusals[i]) is not None:
+            raise refusal
     with its_workers as workers:
-        cases = [case for _, case in plan.points]
-        done = Store(folder / RUNS, workers, study.keep, progress).finish(cases, "sweep")
-    if all(one.refused for one in done) and done[0].error is not None:
-        raise done[0].error
-    return Sweep(plan, numbers, tuple(done), folder)
+        store = Store(folder / RUNS, workers, study.keep, progress)
+        done = store.finish(cases, "sweep")
+        if all(one.refused for one in done) and done[0].error is not None:
+            raise done[0].error
+        found = Sweep(plan, numbers, tuple(done), folder, {})
+        if check:
+            # Whoever interrupts the check keeps the sweep.
+            write_results(found)
+            usable = [one.status == "complete" and no is None for one, no in zip(done, refusals, strict=True)]
+            chosen = to_check(plan, check, usable)
+            found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
+    return found
+
+
+def _refusal(case: Case) -> ConfigError | None:
+    """Why a run cannot be checked; None also where it cannot even be built, since that is told as its failure."""
+    try:
+        config = case.config
+    except ConfigError:
+        return None
+    try:
+        refinements(config)
+    except ConfigError as error:
+        return error
+    return None
+
+
+def to_check(plan: Plan, n: int, usable: Sequence[bool]) -> list[int]:
+    """Returns the numbers of n runs, spread evenly over the plan; in place of one that is not usable the nearest is.
+
+    Of runs that differ in their seed only, a second is taken once there is one of all others.
+    """
+    if n < 0:
+        raise ConfigError(f"check = {n}: must be at least 0")
+    cells: dict[str, list[int]] = {}
+    for i, (_, case) in enumerate(plan.points):
+        its = cells.setdefault(repr([item for item in case.changes.items() if item[0] != "seed"]), [])
+        its += [i] if usable[i] else []
+    chosen: list[int] = []
+    for one_each in zip_longest(*cells.values()):
+        free = {at: run for at, run in enumerate(one_each) if run is not None}
+        places = np.linspace(0, len(one_each) - 1, min(n - len(chosen), len(free))).round()
+        chosen += [free.pop(min(free, key=lambda at, place=place: abs(at - place))) for place in places]
+    return sorted(chosen)
+
+
+def checked_sentence(sweep: Sweep) -> str:
+    """Says how many of the runs are resolved, and which are not and why."""
+    if not sweep.checks:
+        return "No run is complete, so none was checked."
+    more = any(one.name == MORE for check in sweep.checks.values() for one in check.refinements)
+    how = f"at half the step{' and with one more element a side' if more else ''}"
+    faults = [f"{_named(sweep, i)} ({_brief(check)})" for i, check in sweep.checks.items() if not check.resolved]
+    n = len(sweep.checks)
+    said = f"Checked {n} of {len(sweep.runs)} runs {how}: {n - len(faults) if faults else 'all'} resolved"
+    if len(faults) > N_FAILED:
+        faults[N_FAILED:] = [f"{len(faults) - N_FAILED} more, which {ROWS} has"]
+    return f"{said}{'; not resolved: ' if faults else ''}{', '.join(faults)}."
+
+
+def _named(sweep: Sweep, i: int) -> str:
+    """Names a run by its varied fields, or by its number where these are many."""
+    fields = [*sweep.plan.fields, "seed"]
+    pairs = zip(fields, _varied(sweep, i), strict=False)
+    return f"run {i}" if len(sweep.plan.fields) > 2 else ", ".join(f"{field} = {value}" for field, value in pairs)
+
+
+def _brief(check: Check) -> str:
+    """What keeps a run from being resolved, in a few words: another order, or the number that moves most."""
+    if check.differences:
+        return check.differences[0]
+    worst, n = max(check.unresolved, key=lambda name: check.largest(name) or 0.0), len(check.unresolved)
+    words = worded(worst, NUMBERS[worst].unit).partition(" (")[0]
+    return f"{words} {percent(check.largest(worst) or 0.0)}{f' and {n - 1} more' if n > 1 else ''}"
 
 
 def plan_of(study: Study) -> Plan:
@@ -307,6 +400,7 @@ def _write_rows(sweep: Sweep, path: Path) -> Path:
         values = sweep.data[number.name].values.reshape(len(sweep.runs), -1)
         names = [f"{number.name}_{i}" for i in sweep.data[SEGMENT].values] if number.per_segment else [number.name]
         columns |= dict(zip(names, values.T, strict=True))
+    checked = sweep.checked
     rows = (
         [
             i,
@@ -314,13 +408,15 @@ def _write_rows(sweep: Sweep, path: Path) -> Path:
             run.status,
             run.reason,
             " | ".join(run.warnings),
+            checked[i],
             "" if run.outcome is None else run.outcome.path.name,
             *("" if np.isnan(values[i]) else f"{values[i]:.10g}" for values in columns.values()),
         ]
         for i, run in enumerate(sweep.runs)
     )
     seed = ["seed"] if REPEAT in sweep.plan.levels else []
-    return write_csv(path, ["number", *sweep.plan.fields, *seed, "status", "reason", "warnings", "run", *columns], rows)
+    words = ["status", "reason", "warnings", "check", "run"]
+    return write_csv(path, ["number", *sweep.plan.fields, *seed, *words, *columns], rows)
 
 
 def shown_numbers(sweep: Sweep) -> list[str]:

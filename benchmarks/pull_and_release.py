@@ -44,7 +44,7 @@ import numpy as np
 from annelid.body import compile_spec
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain import Chain
-from annelid.body.formulations.chain.capsules import add_chain
+from annelid.body.formulations.chain.capsules import SOLVER_ITERATIONS, add_chain
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
@@ -239,8 +239,7 @@ def chain(scene: Scene, *, published: bool) -> tuple[Step, float]:
     engine(spec, step_s)
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4 if published else mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
-    spec.option.iterations = settings.solver_iterations
-    spec.option.tolerance = settings.solver_tolerance
+    spec.option.iterations = SOLVER_ITERATIONS
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     n_elements = scene.vertices_m.shape[1] - 1
     root = 0 if scene.clamped else n_elements // 2

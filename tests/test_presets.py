@@ -53,7 +53,6 @@ PAPER_S_FORMULATION = {
     "body.mesh.elements_per_side": 3,
     "body.formulation.kind": "chain",
     "body.formulation.armature_kg_m2": 0.01,
-    "body.formulation.solver_iterations": 500,
     "body.rings.length_range_m": ((0.548, 1.052), (0.609, 1.080), (0.541, 1.071)),
     "clock.physics_timestep_s": 0.001,
     "controller.gate_start": "toolbox",

@@ -8,11 +8,13 @@ are those of ``annelid show RUN --json``, but for times of computing.
 
 from __future__ import annotations
 
+import os
 import shlex
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -52,11 +54,13 @@ def _flat(numbers: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, A
 
 
 def main(path: Path) -> None:
-    """Measures all runs of a list, one after the other."""
+    """Measures all runs of a list, as many at a time as there are cores."""
+    runs = tomllib.loads(path.read_text(encoding="utf-8"))["runs"]
     rows: list[dict[str, Any]] = []
-    for name, command in tomllib.loads(path.read_text(encoding="utf-8"))["runs"].items():
-        print(command, flush=True)
-        rows.append({"run": name, "command": command, **measured(command)})
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        for (name, command), numbers in zip(runs.items(), threads.map(measured, runs.values()), strict=True):
+            print(command, flush=True)
+            rows.append({"run": name, "command": command, **numbers})
     columns = dict.fromkeys(name for row in rows for name in row)
     print(write_csv(path.with_suffix(".csv"), columns, ([row.get(name) for name in columns] for row in rows)))
 

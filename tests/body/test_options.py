@@ -89,8 +89,6 @@ RODS: list[tuple[dict[str, Any], Read, Any]] = [
         (mujoco.mjtIntegrator.mjINT_DISCRETE, mujoco.mjtSolver.mjSOL_NEWTON, mujoco.mjtCone.mjCONE_ELLIPTIC),
     ),
     ({"body.formulation.edge_time_constant_s": 0.003}, lambda m: set(m.eq_solref[:, 0]), {0.003}),
-    ({"body.formulation.solver_iterations": 55}, lambda m: m.opt.iterations, 55),
-    ({"body.formulation.solver_tolerance": 1e-5}, lambda m: m.opt.tolerance, 1e-5),
     ({"body.formulation.friction_impedance_ratio": 17.0}, lambda m: m.opt.impratio, 17.0),
     ({"body.strands.radius_m": 0.003}, lambda m: set(m.flex_radius) | set(m.geom_size[touching(m), 0]), {0.003}),
     ({"body.mesh.elements_per_side": 2}, lambda m: set(m.flex_elemnum), {14 * 2 + 2 * 2}),
@@ -100,11 +98,9 @@ RODS: list[tuple[dict[str, Any], Read, Any]] = [
 CHAINS: list[tuple[dict[str, Any], Read, Any]] = [
     (
         {},
-        lambda m: (m.opt.integrator, m.opt.solver, m.opt.cone),
-        (mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_PGS, mujoco.mjtCone.mjCONE_PYRAMIDAL),
+        lambda m: (m.opt.integrator, m.opt.solver, m.opt.cone, m.opt.iterations),
+        (mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtSolver.mjSOL_PGS, mujoco.mjtCone.mjCONE_PYRAMIDAL, 500),
     ),
-    ({"body.formulation.solver_iterations": 77}, lambda m: m.opt.iterations, 77),
-    ({"body.formulation.solver_tolerance": 1e-7}, lambda m: m.opt.tolerance, 1e-7),
     ({"body.formulation.armature_kg_m2": 0.02}, lambda m: set(m.dof_armature[m.dof_armature > 0]), {0.02}),
     ({"body.formulation.pin_time_constant_s": 0.009}, lambda m: set(m.eq_solref[pins(m), 0]), {0.009}),
     (

@@ -16,6 +16,7 @@ from annelid.control.pressure import PressureController, PressureSns
 from annelid.control.robust import RobustController, RobustSns
 from annelid.control.sns import AdaptiveSns, Sns
 from annelid.control.turning import ConstantTurning, TurningController
+from annelid.control.waiting import WaitingController, WaitingSns
 from annelid.nervous import PeristalsisParameters
 from annelid.nervous.robust import RobustParameters
 from annelid.protocols import SIDES, Sensation
@@ -103,6 +104,7 @@ STRIDING: dict[str, Callable[[], Any]] = {
     "sns": lambda: SnsController(Sns(), HELD, N, N, 0.001),
     "adaptive": lambda: AdaptiveController(AdaptiveSns(drive=0.3, stretch_gain_per_m=5.0), HELD, N, N, 0.001),
     "sns-pressure": lambda: PressureController(PressureSns(), HELD, N, N, 0.001),
+    "sns-waiting": lambda: WaitingController(WaitingSns(), HELD, N, N, 0.001),
     "sns-robust": lambda: RobustController(RobustSns(), N, N, 0.001),
     "turned": lambda: TurningController(
         SnsController(Sns(), HELD, N, 2 * N, 0.001), ConstantTurning(modulation=0.5), N, 2 * N, 0.001

@@ -38,6 +38,7 @@ WORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "linear": ("riddle2022-planar", {}),
     "adaptive": ("riddle2023-rods", {"controller": {"kind": "adaptive", "drive": 0.2, "drive_slope_per_s": 0.1}}),
     "pressure": ("riddle2023-rods", {"controller": {"kind": "sns-pressure"}}),
+    "waiting": ("riddle2023-rods", {"controller": {"kind": "sns-waiting"}}),
     "robust": ("riddle2023-rods", {"controller": {"kind": "sns-robust", "scheme": "heun"}}),
     "driven": ("riddle2025-adaptive", {}),
     "constant": ("riddle2025-3x1", {"controller": {"kind": "sns"}, "turning.modulation": -0.6}),
@@ -240,7 +241,7 @@ def test_a_hostile_network_compiles(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @COMPILER
-@pytest.mark.parametrize("worm", ["sns", "robust", "pressure", "adaptive"])
+@pytest.mark.parametrize("worm", ["sns", "robust", "pressure", "waiting", "adaptive"])
 def test_the_papers_networks_give_the_same_bits_for_100_000_steps(
     worm: str, benchmark: ModuleType, exactly: Callable[..., float], tmp_path: Path
 ) -> None:

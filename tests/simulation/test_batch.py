@@ -104,6 +104,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "heteroclinic channel": {"controller.kind": "shc", "body.rings.layout": "halves"},
     "adaptive network": {"controller.kind": "adaptive"},
     "pressure feedback": {"controller.kind": "sns-pressure"},
+    "waiting network": {"controller.kind": "sns-waiting"},
     "chain": CHAIN | {},
     "chain with direct pins, RK4": CHAIN | {"body.formulation.pins": "direct"},
 }

@@ -109,7 +109,6 @@ def test_a_turned_run_is_told_forwards_and_goes_on_to_the_last_bit(tmp_path: Pat
         "body.rings.speed_limit_m_per_s": 0.4,
         "body.rings.force_limit_N": 8.9,
         "arena.contact_time_constant_s": 0.06,
-        "body.formulation.solver_tolerance": 1e-10,
     }
     runs = {}
     for heading in (0.0, 90.0, 180.0):

@@ -162,7 +162,8 @@ def test_the_engine_s_warnings_become_alarms_and_no_file(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     stiff = {"clock.physics_timestep_s": 0.1, "body.strands.young_modulus_Pa": 1e12}
-    plant = WormPlant(config(**stiff, **{"body.formulation.solver_iterations": 10}))
+    plant = WormPlant(config(**stiff))
+    plant.model.opt.iterations = 10
     plant.reset(0)
     alarms = [(plant.step(np.array([1.0, 0.0, 0.0])), plant.alarm())[1] for _ in range(300)]
     assert any(alarm and "did not converge" in alarm for alarm in alarms)

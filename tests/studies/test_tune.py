@@ -106,7 +106,7 @@ def test_a_field_is_varied_once() -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", ["sns", "adaptive", "sns-robust", "sns-pressure", "sine", "timed", "shc", "phase-chain"]
+    "kind", ["sns", "adaptive", "sns-robust", "sns-pressure", "sns-waiting", "sine", "timed", "shc", "phase-chain"]
 )
 def test_every_controller_has_something_to_tune(kind: str) -> None:
     assert parsed_variables([], load_config(PRESET, {"controller.kind": kind}))

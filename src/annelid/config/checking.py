@@ -109,6 +109,8 @@ REPLACED = {
     "body.strands.loss_factor": "set body.strands.damping_time_s to the loss factor over 2 pi times its frequency",
     "body.strands.loss_frequency_Hz": "set body.strands.damping_time_s, as for loss_factor",
     "arena.friction_cone": "rods always have elliptic cones, and a chain pyramidal ones",
+    "body.formulation.solver_iterations": "the solver's limits are constants of the formulation",
+    "body.formulation.solver_tolerance": "the solver's limits are constants of the formulation",
     "controller.landing": "it saved nothing (sns-pressure)",
 }
 """What replaced fields that older files have, by their dotted paths."""

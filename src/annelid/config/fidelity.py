@@ -40,14 +40,14 @@ class Fidelity:
 
 LEVELS = {
     "accurate": Fidelity(
-        "rods, three elements a rhombus side, 10 ms",
+        "rods, three elements a rhombus side, 5 ms",
         {
             "body.mesh.elements_per_side": 3,
-            "clock.physics_timestep_s": 0.01,
-            "record.signals_interval_s": 0.01,
+            "clock.physics_timestep_s": 0.005,
+            "record.signals_interval_s": 0.005,
         },
     ),
-    "fast": Fidelity("rods, two elements a rhombus side, 20 ms; as riddle2023-rods has it"),
+    "fast": Fidelity("rods, two elements a rhombus side, 10 ms; as riddle2023-rods has it"),
     "preview": Fidelity(
         "rods, two elements a side, 40 ms: edges stretch by up to 2 %, and what rests on a slope creeps by 1 mm/s",
         {

@@ -101,7 +101,7 @@ def _coded(controller: Controller) -> Coded:
     if not isinstance(controller, Coded):
         raise ConfigError(
             f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
-            "a network can (sns, adaptive, sns-pressure, sns-robust, NetworkController)"
+            "a network can (sns, adaptive, sns-pressure, sns-waiting, sns-robust, NetworkController)"
         )
     return controller
 

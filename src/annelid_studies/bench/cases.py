@@ -38,8 +38,6 @@ _ELEMENTS = {"full": (1, 2, 3, 4, 6), "quick": (1, 2, 3)}
 _ELEMENT_STEPS_MS = {"full": (5, 20), "quick": (20,)}
 _CREEPING = {"body.formulation.friction_impedance_ratio": 1.0}
 _SETTINGS = {
-    "tolerance 1e-6": {"body.formulation.solver_tolerance": 1e-6},
-    "tolerance 1e-2": {"body.formulation.solver_tolerance": 1e-2},
     "impedance ratio 1": _CREEPING,
     "edges in 1 ms": {"body.formulation.edge_time_constant_s": 0.001},
 }

@@ -25,19 +25,6 @@ class Ground(ArenaKind):
         description="how steeply it rises towards -x, where a worm with body.heading_deg = 0 leads; the model's axes "
         "lie in the slope",
     )
-    rail_gap_m: Positive | None = Field(
-        default=None, description="distance of two upright guard rails, the worm midway (not set: none)"
-    )
-    posts: Annotated[tuple[Post, ...], Field(max_length=1000)] | None = Field(
-        default=None,
-        description="x, y and radius of upright round posts, m; a worm with body.heading_deg = 0 starts along "
-        "0 <= x <= its length, leads towards -x, and its left is -y (not set: none)",
-    )
-
-    @property
-    def walls(self) -> Walls:
-        """Guard rails and posts."""
-        return Walls(self.rail_gap_m, self.posts or ())
 
     @property
     def slope_rad(self) -> float:
@@ -62,6 +49,19 @@ class Floor(Ground):
     """A plane: level, or a slope that the worm climbs; between guard rails and with posts if wanted."""
 
     kind: Literal["floor"] = "floor"
+    rail_gap_m: Positive | None = Field(
+        default=None, description="distance of two upright guard rails, the worm midway (not set: none)"
+    )
+    posts: Annotated[tuple[Post, ...], Field(max_length=1000)] | None = Field(
+        default=None,
+        description="x, y and radius of upright round posts, m; a worm with body.heading_deg = 0 starts along "
+        "0 <= x <= its length, leads towards -x, and its left is -y (not set: none)",
+    )
+
+    @property
+    def walls(self) -> Walls:
+        """Guard rails and posts."""
+        return Walls(self.rail_gap_m, self.posts or ())
 
     @property
     def is_plane(self) -> bool:

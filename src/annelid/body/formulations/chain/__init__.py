@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from math import inf
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -36,10 +36,6 @@ class Chain(FormulationKind):
     pin_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
     )
-    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
-        default=500, description="PGS iterations at most"
-    )
-    solver_tolerance: NonNegative = Field(default=1e-8, description="PGS tolerance")
 
     @property
     def step_cost_ms(self) -> float:

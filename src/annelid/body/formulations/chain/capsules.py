@@ -26,6 +26,9 @@ from annelid.morphology import Array, MeshGeometry
 if TYPE_CHECKING:
     from annelid.body.formulations.chain import Chain
 
+SOLVER_ITERATIONS = 500
+"""As the authors' model files have it; the tolerance is the engine's default."""
+
 
 def add_chains(
     spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: ArenaKind, spheres: bool
@@ -33,8 +36,7 @@ def add_chains(
     """Adds the mesh as chains of capsules, which touch by spheres at their vertices if so, and the paper's solver."""
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
-    spec.option.iterations = formulation.solver_iterations
-    spec.option.tolerance = formulation.solver_tolerance
+    spec.option.iterations = SOLVER_ITERATIONS
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
     places = x if spheres else (x[:-1] + x[1:]) / 2

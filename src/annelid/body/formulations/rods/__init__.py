@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
 from annelid.body.estimates import Finding
 from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader, Tie
-from annelid.config.sections import NonNegative, Positive
+from annelid.config.sections import Positive
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm
 
@@ -29,10 +29,6 @@ class Rods(FormulationKind):
     has_rods: ClassVar[bool] = True
     kind: Literal["rods"] = "rods"
     edge_time_constant_s: Positive = Field(default=0.001, description="time constant of the inextensible edges")
-    solver_iterations: Annotated[int, Field(ge=10, le=100_000)] = Field(
-        default=100, description="Newton iterations at most"
-    )
-    solver_tolerance: NonNegative = Field(default=1e-6, description="Newton tolerance")
     friction_impedance_ratio: Positive = Field(
         default=100.0, description="MuJoCo's impratio; 1 lets light vertices creep on the floor"
     )

@@ -22,8 +22,9 @@ A record goes by the text of its first column: ``{crawler.speed_m_per_s:.3f}``. 
 for every record, with its columns as names. Characters that no name may have are underscores:
 ``arena.friction`` is ``arena_friction``. ``results/bench.json:cases`` takes records from within a JSON file; a whole
 one is a record that goes by the file's name. Columns ``speed_1``, ``speed_2`` .. are together ``speed``, an array whose
-numbers are written side by side. True and false read yes and no, what is missing a dash. A table whose file
-does not exist yet stays as it is.
+numbers are written side by side. True and false read yes and no, what is missing a dash. Within ``for each``,
+``other("text")`` is the record that goes by that text, with dashes only if there is none. A table whose file does not
+exist yet stays as it is.
 """
 
 from __future__ import annotations
@@ -154,12 +155,17 @@ def table(template: Sequence[str], records: Sequence[Mapping[str, Any]]) -> str:
         FillError: An expression has no value.
     """
     by_label = {identifier(str(next(iter(record.values())))): SimpleNamespace(**record) for record in records}
+
+    def other(label: str) -> SimpleNamespace:
+        return by_label.get(identifier(label), SimpleNamespace(**dict.fromkeys(records[0], math.nan)))
+
     lines, names = [], [by_label]
     for line in template:
         if each := EACH.fullmatch(line):
-            names = [{**by_label, **record} for record in records if evaluated(each["condition"] or "True", record)]
+            chosen = [record for record in records if evaluated(each["condition"] or "True", record)]
+            names = [{**by_label, **record, "other": other} for record in chosen]
         else:
-            lines += [re.sub(r"\bnan\b", "–", evaluated(f"rf'''{line}'''", each_of)) for each_of in names]
+            lines += [re.sub(r"[+-]?\bnan\b", "–", evaluated(f"rf'''{line}'''", each_of)) for each_of in names]
             names = [by_label]
     return "\n".join(lines)
 

@@ -37,7 +37,8 @@ def measured(command: str) -> dict[str, Any]:
         if done.returncode not in (0, 3):
             done.check_returncode()
         run = annelid.open_run(f"{folder}/run")
-        numbers = {**annelid.summary(run).to_dict(), "gait": annelid.gait(run).to_dict()}
+        step_s = run.config.clock.physics_timestep_s
+        numbers = {"step_s": step_s, **annelid.summary(run).to_dict(), "gait": annelid.gait(run).to_dict()}
     return {name: value for name, value in _flat(numbers) if name not in LEFT_OUT}
 
 

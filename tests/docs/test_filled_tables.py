@@ -206,6 +206,16 @@ def test_numbers_are_filled_in(docs: Path) -> None:
     assert filled(page, docs) == page
 
 
+def test_a_row_may_use_another_one_s_numbers(docs: Path) -> None:
+    row = '| {run} | {other(run + " one").speed_m:.2f} | {other("nobody").speed_m:+.1f} |'
+    page = (
+        PAGE[: PAGE.index("for each")] + f"for each if run in ('fast', 'none'):\n{row}\n-->\n\n<!-- end of table -->\n"
+    )
+    rows = docs / "results" / "gaits.csv"
+    rows.write_text(rows.read_text() + "none one,,0.04,nan,\n")
+    assert filled(page, docs).endswith("| none | 0.04 | – |\n| fast | – | – |\n\n<!-- end of table -->\n")
+
+
 def test_a_changed_file_is_found(docs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page, root = docs / "page.md", docs.parent
     page.write_text(PAGE)

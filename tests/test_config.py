@@ -208,7 +208,7 @@ def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
         ("body.formulation.joint=ball", "is no field any more: a chain's elements are always joined by three hinges"),
         ("body.mesh.segments=4", "unknown field 'body.mesh.segments': did you mean 'n_segments'"),
         ("friction=1", "did you mean 'arena.friction'"),
-        ("body.formulation.pin_time_s=9", "did you mean 'body.formulation.pin_time_constant_s'"),
+        ("body.formulation.pin_time_s=9", "did you mean 'pin_time_constant_s'"),
         ("body.rings.length_range_m=[1.0, 0.5]", "lower bound below its upper bound"),
         ("body.rings.length_range_m=[[0.5, 1.0], [0.5, 1.0]]", "2 ranges for 3 segments"),
         ("body=3", "is a section"),

@@ -63,10 +63,10 @@ def test_levels_go_from_slow_to_fast() -> None:
 
 def test_overrides_win_over_the_level_and_the_level_over_the_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
-    file.write_text("[clock]\nphysics_timestep_s = 0.01\n[sensor]\ntolerance_m = 0.017\n", encoding="utf-8")
-    assert load_config(file).clock.physics_timestep_s == 0.01
+    file.write_text("[clock]\nphysics_timestep_s = 0.02\n[sensor]\ntolerance_m = 0.017\n", encoding="utf-8")
+    assert load_config(file).clock.physics_timestep_s == 0.02
     accurate = load_config(file, fidelity="accurate")
-    assert accurate.clock.physics_timestep_s == 0.01
+    assert accurate.clock.physics_timestep_s == LEVELS["accurate"].changes["clock.physics_timestep_s"] == 0.005
     assert accurate.sensor.tolerance_m == 0.017
     own = load_config(file, {"clock.physics_timestep_s": 0.002}, fidelity="accurate")
     assert own.clock.physics_timestep_s == 0.002

@@ -201,12 +201,13 @@ def _steps(base: RunConfig, n_segments: int, slower: float) -> Fields:
     n_control = round(base.clock.physics_timestep_s / base.clock.control_timestep_s)
     physics_s = n_control * control_s
     n_physics = ceil(CYCLES * n_segments * TURN_S * slower / physics_s)
+    n_frame = round(base.record.frames_interval_s / base.clock.physics_timestep_s)
     return {
         "duration_s": (round(n_physics * physics_s, 9), f"{CYCLES} cycles"),
         "clock.control_timestep_s": (control_s, "a time: radius^0.5"),
         "clock.physics_timestep_s": (round(physics_s, 9), f"{n_control} steps of the network"),
         "record.signals_interval_s": (round(physics_s, 9), "every step of the body"),
-        "record.frames_interval_s": (round(2 * physics_s, 9), "every other step of the body"),
+        "record.frames_interval_s": (round(n_frame * physics_s, 9), f"{n_frame} steps of the body"),
     }
 
 

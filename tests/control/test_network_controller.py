@@ -121,12 +121,14 @@ def test_what_cannot_be_sensed_or_does_not_fit_is_refused() -> None:
 
 
 def test_a_run_goes_on_bit_for_bit_and_its_network_can_be_drawn(tmp_path: Path) -> None:
-    preset, changes = "riddle2025-muscles", {"duration_s": 0.06}
-    whole = annelid.simulate(annelid.load_config(preset, changes), tmp_path / "whole", controller=controller())
-    half = annelid.load_config(preset, {"duration_s": 0.03})
+    step_s = 0.01
+    changes = {"clock.physics_timestep_s": step_s, "record.signals_interval_s": step_s}
+    config, half = (
+        annelid.load_config("riddle2025-muscles", {**changes, "duration_s": steps * step_s}) for steps in (6, 3)
+    )
+    whole = annelid.simulate(config, tmp_path / "whole", controller=controller())
     first = annelid.simulate(half, tmp_path / "first", controller=controller())
-    longer = annelid.load_config(preset, changes)
-    rest = annelid.simulate(longer, tmp_path / "rest", resume=first, controller=controller())
+    rest = annelid.simulate(config, tmp_path / "rest", resume=first, controller=controller())
     assert (whole.data["potential"].values[-1] == rest.data["potential"].values[-1]).all()
     assert (whole.data["synaptic_current"].values[-1] == rest.data["synaptic_current"].values[-1]).all()
     assert list(whole.data["neuron"].values) == NAMES

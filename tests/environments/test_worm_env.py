@@ -211,11 +211,13 @@ def test_weights_change_the_reward_and_nothing_else() -> None:
 
 
 def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
-    own = WormEnv(CHEAP["preset"], {"body.mesh.n_helices": 6}, fidelity=None, episode_s=0.12)
-    assert own.task.config.clock.physics_timestep_s == 0.01
-    assert isinstance(own.task.config.body, WormBody)
-    assert own.task.config.body.mesh.elements_per_side == 2
-    assert own.task.moves_per_step == 12
+    few = {"body.mesh.n_helices": 6}
+    for fidelity, step_s, elements in ((None, 0.02, 2), ("fast", 0.01, 2), ("coarse", 0.02, 1)):
+        made = WormEnv(CHEAP["preset"], few, fidelity=fidelity, episode_s=0.12)
+        assert made.task.config.clock.physics_timestep_s == step_s
+        assert isinstance(made.task.config.body, WormBody)
+        assert made.task.config.body.mesh.elements_per_side == elements
+        assert made.task.moves_per_step == round(0.12 / step_s)
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,9 @@ from annelid.morphology import Array
 
 COARSE = "coarse"
 COARSE_BASE = "fast"
-COARSE_CHANGES: Mapping[str, Any] = {"body.mesh.elements_per_side": 1}
-"""The default resolution: level `fast` with 0.43 of its coordinates; docs/environments.md says what that costs."""
+COARSE_CHANGES: Mapping[str, Any] = {"body.mesh.elements_per_side": 1, "clock.physics_timestep_s": 0.02}
+"""The default resolution: level `fast` with 0.43 of its coordinates and twice its step; docs/environments.md has its
+cost."""
 FIDELITIES = (COARSE, *LEVELS)
 UNUSED = ("controller", "turning", "record", "duration", "seed", "clock.control")
 """Beginnings of fields that an environment has no use for: the agent acts, and nothing is recorded."""

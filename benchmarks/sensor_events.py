@@ -27,7 +27,7 @@ from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
 from annelid.plausibility import tolerance_window_m
 from annelid_studies.robustness import TIMED
-from annelid_studies.worms import PAPERS_MESH
+from annelid_studies.worms import PAPERS_RODS
 
 
 def strands(modulus_GPa: float) -> dict[str, Any]:
@@ -129,7 +129,7 @@ def main() -> None:
         return
     for name, changes in CASES.items():
         settings = {"clock.physics_timestep_s": 0.005, "duration_s": DURATION_S, "record.signals_interval_s": 0.005}
-        config = load_config("riddle2023-rods", {**PAPERS_MESH, **settings, **changes})
+        config = load_config("riddle2023-rods", {**PAPERS_RODS, **settings, **changes})
         with tempfile.TemporaryDirectory() as folder:
             run = simulate(config, folder, progress=False, overwrite=True)
             found = rhythm_score(run)

@@ -12,7 +12,6 @@ from outcome import Command
 REPORT = {
     "machine": "2 cores",
     "cases": [],
-    "fronts": {},
     "cost_exponents": {},
     "levels": {},
 }

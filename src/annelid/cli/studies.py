@@ -83,7 +83,7 @@ def paper_command(
 
 def bench_command(
     output: ResultsFolder = Path("bench"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points, one converged run: 7 minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: about 6 minutes.")] = False,
     cases: Annotated[
         list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
     ] = None,
@@ -95,20 +95,18 @@ def bench_command(
     """Measure speed and error side by side.
 
     Times closed loops with their recording, each in a process of its own on one core, and compares their
-    elongation, period, travel, work and slip with converged runs, three times with slightly different friction.
-    Writes bench.json, bench.png and bench.svg: error against speed, cost against the number of segments, and where
-    the time of a step goes.
+    elongation, period, travel, work and slip with a converged run, three times with slightly different friction.
+    Writes bench.json, bench.png and bench.svg: error against speed, processor time beside the paper's formulation,
+    cost against the number of segments, and where the time of a step goes.
 
     \b
-    --cases levels      the levels of --fidelity
-    --cases steps       physics steps of 1 to 60 ms
-    --cases elements    1 to 6 elements a rhombus side
-    --cases settings    other settings of solver, contact and rods; the worm as a chain
+    --cases levels      the levels of --fidelity, riddle2025-muscles and riddle2023-fast, beside riddle2023
+    --cases steps       physics steps of 1 to 40 ms
     --cases segments    rods of 3 to 30 segments
     --cases chain       the paper's formulation, 3 to 12 segments
     --cases duration    10 and 60 s, for the memory
 
-    The whole takes about half an hour. Leave the machine alone meanwhile: what else runs is measured too.
+    The whole takes about ten minutes. Leave the machine alone meanwhile: what else runs is measured too.
     Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
     a full run takes over what --quick measured. Delete that folder to measure again.
 
@@ -118,7 +116,7 @@ def bench_command(
     \b
     annelid bench                                   everything, into the folder bench
     annelid bench --quick                           an overview
-    annelid bench --cases levels -o levels          the levels of fidelity only
+    annelid bench --cases levels -o levels          levels of fidelity and presets only
     annelid bench --cases segments --cases chain    how the cost grows with the worm
     annelid bench --quick -o now --against before/bench.json    has it become slower?
     """

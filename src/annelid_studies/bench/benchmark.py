@@ -23,7 +23,7 @@ from annelid.experiment import StudyProgress, case_key, code_fingerprint
 from annelid.output import write_json, write_text
 from annelid.simulation import locks
 from annelid.textfiles import read_json
-from annelid_studies.bench.cases import BenchCase, bench_cases, level_of
+from annelid_studies.bench.cases import BenchCase, as_it_is, bench_cases, converged
 from annelid_studies.worms import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
@@ -49,13 +49,14 @@ SCHEMA = {
     "cases[].shares": "fractions of the wall-clock time: the engine's own timers over the first 2.7 s, the rest of the "
     "plant, the network with its control, and recording with the loop; they add up to 1",
     "cases[].rhythm": "the score of the rhythm; errors of a rhythm that is not ordered are stated all the same",
-    "cases[].errors": "by converged run and quantity, of the case as it is and of each perturbed one against the "
-    "converged run of its friction: relative errors as fractions, of the elongation of the segment that is furthest "
-    "off, the period, the travel, the muscles' work, and the slip (path over travel); largest: elongation or period",
+    "cases[].cpu_s": "processor time of the run with its recording, s",
+    "cases[].times_less_cpu": "on the line levels: processor time that riddle2023 takes for a simulated second, over "
+    "that of the case",
+    "cases[].errors": "by quantity, of the case as it is and of each perturbed one against the converged run of its "
+    "friction: relative errors as fractions, of the elongation of the segment that is furthest off, the period, the "
+    "travel, the muscles' work, and the slip (path over travel); largest: elongation or period",
     "cases[].load_average_1min": "processes that competed for the cores when the case began; quiet below 1",
     "cost_exponents": "slope of log(step_median_ms) against log(segments), by preset and range of segments",
-    "fronts": "by converged run and quantity: the cases that no other beats in both speed and mean error, the fastest "
-    "first",
     "levels": "the case of each level of fidelity",
 }
 
@@ -121,36 +122,19 @@ def bench(
 
 
 def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Compares measurements: errors, fronts, exponents, levels.
+    """Compares measurements: errors, processor times, exponents, levels.
 
     Args:
         cases: The cases.
         measured: What was measured of each, by its name; ``{"failed": reason}`` where nothing was.
     """
-    references = {case.name: measured[case.name] for case in cases if case.kind == "converged"}
-    entries = [_entry(case, measured[case.name], references) for case in cases]
+    finest, papers = (measured.get(case.name, {}) for case in (converged(), as_it_is(CHAIN)))
+    entries = [_entry(case, measured[case.name], finest, papers) for case in cases]
     usable = [entry for entry in entries if "failed" not in entry]
-    # The period of a run that is not ordered is no measure of it.
-    ordered = [entry for entry in usable if entry["kind"] == "judged" and entry["rhythm"]["verdict"] == "ordered"]
-    fronts = {
-        name: {quantity: front(_points(ordered, name, quantity)) for quantity in QUANTITIES}
-        for name, run in references.items()
-        if "failed" not in run
-    }
     return {
         "cases": entries,
         "cost_exponents": {preset: _exponents(usable, line) for preset, line in ((RODS, "segments"), (CHAIN, "chain"))},
-        "fronts": fronts,
-        "levels": {entry["level"]: entry["name"] for entry in entries if entry["level"]},
-    }
-
-
-def _points(entries: Sequence[Mapping[str, Any]], reference: str, quantity: str) -> dict[str, tuple[float, float]]:
-    """Speed and mean error of those entries that have both."""
-    return {
-        entry["name"]: (entry["real_time_factor"], float(np.mean(errors)))
-        for entry in entries
-        if None not in (errors := entry["errors"][reference][quantity])
+        "levels": {case.level: case.name for case in cases if case.level},
     }
 
 
@@ -160,13 +144,15 @@ def _cost_s(case: BenchCase) -> float:
     return n_runs * case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
 
 
-def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _entry(
+    case: BenchCase, measured: Mapping[str, Any], finest: Mapping[str, Any], papers: Mapping[str, Any]
+) -> dict[str, Any]:
     config = case.case.config
     entry = {
         "name": case.name,
         "kind": case.kind,
         "lines": list(case.lines),
-        "level": level_of(config) if "levels" in case.lines else None,
+        "level": case.level,
         "preset": case.case.preset,
         "formulation": case.body.formulation.kind,
         "n_segments": config.body.n_segments,
@@ -176,13 +162,17 @@ def _entry(case: BenchCase, measured: Mapping[str, Any], references: Mapping[str
         "command": case.case.command,
         **{name: value for name, value in measured.items() if name != "perturbed"},
     }
-    if case.kind != "speed" and "failed" not in measured:
-        entry["errors"] = {
-            name: errors(_summaries(measured), _summaries(reference))
-            for name, reference in references.items()
-            if name != case.name and "failed" not in reference
-        }
+    if "levels" in case.lines:
+        cpu, papers_cpu = _cpu_of_a_second(measured), _cpu_of_a_second(papers)
+        entry["times_less_cpu"] = papers_cpu / cpu if cpu and papers_cpu else None
+    if case.kind == "judged" and "summary" in measured and "summary" in finest:
+        entry["errors"] = errors(_summaries(measured), _summaries(finest))
     return entry
+
+
+def _cpu_of_a_second(measured: Mapping[str, Any]) -> float | None:
+    """Processor time of a simulated second, s; None where nothing was measured."""
+    return measured["cpu_s"] / measured["simulated_s"] if measured.get("simulated_s") else None
 
 
 def _exponents(entries: Sequence[Mapping[str, Any]], line: str) -> dict[str, float | None]:
@@ -278,23 +268,6 @@ def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:
     if len(set(sizes)) < 2:
         return None
     return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
-
-
-def front(points: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Names the points that no other one beats, from the fastest to the most exact.
-
-    Args:
-        points: Speed and error of each; more of the first and less of the second is better.
-
-    Returns:
-        Names of those for which no other point is at least as good in both and better in one.
-    """
-    best, least = [], float("inf")
-    for name, (_, error) in sorted(points.items(), key=lambda item: (-item[1][0], item[1][1])):
-        if error < least:
-            best.append(name)
-            least = error
-    return best
 
 
 def _relative(value: float | None, reference: float | None) -> float | None:

@@ -1,29 +1,31 @@
-"""The benchmark as a table, and in one picture: error against speed, cost against length, where a step's time goes."""
+"""The benchmark as a table, and in one picture: error against speed, processor time, cost against length, shares."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import SubFigure
-from matplotlib.lines import Line2D
 from rich.table import Table as TerminalTable
 
+from annelid.config import LEVELS
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
+from annelid_studies.bench.benchmark import QUANTITIES
+from annelid_studies.bench.cases import CONVERGED_ELEMENTS, CONVERGED_STEP_S
 from annelid_studies.tables import terminal_table
-from annelid_studies.worms import CHAIN
+from annelid_studies.worms import CHAIN, RODS
 
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""
 
-_MARKERS = "osD^v<>PX*"
+_MARKERS = "osD^"
+_WAYS = ("o-", "s", "D", "^", "x")
 _LEAST_PERCENT = 0.02
-_LABELS = {"riddle2023": "paper's chain", "riddle2023-rods": "rods"}
+_LABELS = {CHAIN: "paper's chain", RODS: "rods"}
 _FADED = "0.35"
 # Cold within the engine, warm around it.
 _SHARE_COLORS = ("#1b2a6b", "#3658a7", "#5f8fd0", "#35b5a0", "#8fd3c5", "#c5cdd6", "#e3b428", "#c2410c", "#7a2a0a")
@@ -31,10 +33,10 @@ _SHARE_COLORS = ("#1b2a6b", "#3658a7", "#5f8fd0", "#35b5a0", "#8fd3c5", "#c5cdd6
 
 def bench_table(report: Mapping[str, Any]) -> TerminalTable:
     """Lays out the cases of a benchmark, the content of ``bench.json``, for the terminal, one a row."""
-    references = list(report["fronts"])
-    header = ["case", "ms a step", "x real time", "memory, MB", *(f"error, %, against {name}" for name in references)]
-    rows = [_row(entry, references) for entry in report["cases"]]
-    return terminal_table(Table(header, rows), f"{report['machine']}, recording on")
+    header = ["case", "ms a step", "x real time", f"times less processor time than {CHAIN}", "memory, MB", "error, %"]
+    caption = "error: of elongation or period against the converged run, the larger, over runs of perturbed friction"
+    table = Table(header, [_row(entry) for entry in report["cases"]])
+    return terminal_table(table, f"{report['machine']}, recording on", caption=caption)
 
 
 def slowdown_table(slowdowns: Mapping[str, float], tolerated: float) -> TerminalTable:
@@ -47,19 +49,16 @@ def slowdown_table(slowdowns: Mapping[str, float], tolerated: float) -> Terminal
     return terminal_table(Table(["case", "time of a step", ""], rows), "Against the earlier benchmark", caption=caption)
 
 
-def _row(entry: Mapping[str, Any], references: Sequence[str]) -> list[str]:
+def _row(entry: Mapping[str, Any]) -> list[str]:
     name = f"{entry['name']} ({entry['level']})" if entry["level"] else entry["name"]
     if "failed" in entry:
         return [name, f"failed: {entry['failed']}"]
-    compared = entry.get("errors", {})
-    if compared and entry["rhythm"]["verdict"] != "ordered":
+    if "errors" in entry and entry["rhythm"]["verdict"] != "ordered":
         name = f"{name}: {entry['rhythm']['reason']}"
-    percents = [_percent(compared[name]["largest"]) if name in compared else "" for name in references]
-    return [name, *_numbers(entry), _shown(entry["peak_memory_MB"], ".0f"), *percents]
-
-
-def _numbers(entry: Mapping[str, Any]) -> list[str]:
-    return [_shown(entry[key], ".3g") for key in ("step_mean_ms", "real_time_factor")]
+    numbers = [_shown(entry[key], ".3g") for key in ("step_mean_ms", "real_time_factor")]
+    less = _shown(entry["times_less_cpu"], ".3g") if "times_less_cpu" in entry else ""
+    percent = _percent(entry["errors"]["largest"]) if "errors" in entry else ""
+    return [name, *numbers, less, _shown(entry["peak_memory_MB"], ".0f"), percent]
 
 
 def _percent(errors: Sequence[float | None]) -> str:
@@ -75,18 +74,22 @@ def _shown(value: float | None, digits: str) -> str:
 def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
     """Draws a benchmark, the content of ``bench.json``.
 
-    Above: errors against the finest converged run over times real time, one panel for each quantity, with bars over the
-    perturbed runs; one colour for each number of elements, one marker for each step, hollow where the rhythm is not
-    ordered; the dotted line joins the cases that no other beats. Below: time of a step against the number of segments
-    with the slope, and its shares by phase. Panels for which nothing was measured stay out.
+    Above: errors against the converged run over times real time, one panel for each quantity, with bars over the
+    perturbed runs: a line through the steps, marks of the levels of fidelity, and crosses where the rhythm is not
+    ordered. Below: by how much less processor time levels and presets take than the paper's formulation, the time of a
+    step against the number of segments with the slope, and its shares by phase. Panels for which nothing was measured
+    stay out.
     """
     measured = [entry for entry in report["cases"] if "failed" not in entry]
-    judged = [entry for entry in measured if entry["kind"] == "judged"]
+    judged = [entry for entry in measured if "elongation" in entry.get("errors", {})]
+    compared = {_label(entry): less for entry in measured if (less := entry.get("times_less_cpu"))}
     scaled = [entry for entry in measured if {"segments", "chain"} & set(entry["lines"])]
     divided = _divided(measured)
     panels: list[tuple[float, Callable[[SubFigure], None]]] = []
-    if judged and report["fronts"]:
-        panels.append((5.4, lambda part: _fronts(part, report, judged)))
+    if judged:
+        panels.append((5.4, lambda part: _errors(part, judged)))
+    if compared:
+        panels.append((0.8 + 0.24 * len(compared), lambda part: _compared(part, compared)))
     if scaled:
         panels.append((2.7, lambda part: _cost(part, scaled, report["cost_exponents"])))
     if divided:
@@ -100,65 +103,73 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
         return save_both(figure, stem)
 
 
-def _fronts(part: SubFigure, report: Mapping[str, Any], judged: Sequence[Any]) -> None:
-    reference = list(report["fronts"])[-1]
-    elements = sorted({entry["elements_per_side"] for entry in judged})
-    steps = sorted({entry["physics_step_ms"] for entry in judged})
-    colors = dict(zip(elements, segment_colors(len(elements)), strict=True))
-    markers = dict(zip(steps, cycle(_MARKERS), strict=False))
+def _label(entry: Mapping[str, Any]) -> str:
+    """A level of fidelity with its resolution, or a preset."""
+    step = f"{entry['physics_step_ms']:g} ms"
+    return f"{entry['level']}: {entry['elements_per_side']} elements, {step}" if entry["level"] else entry["preset"]
+
+
+def _errors(part: SubFigure, judged: Sequence[Any]) -> None:
+    steps = sorted((entry for entry in judged if "steps" in entry["lines"]), key=lambda entry: entry["physics_step_ms"])
+    groups = {
+        "steps in ms": steps,
+        **{level: [entry for entry in judged if entry["level"] == level] for level in LEVELS},
+        "not ordered": [entry for entry in judged if entry["rhythm"]["verdict"] != "ordered"],
+    }
+    look: dict[str, Any] = {"markersize": 5.0, "linewidth": 1.0, "elinewidth": 0.8}
     *panels, legend = part.subplots(2, 3, sharex=True, squeeze=True).ravel()
-    for axes, (quantity, front) in zip(panels, report["fronts"][reference].items(), strict=True):
-        means = {}
-        for entry in judged:
-            errors = entry["errors"][reference][quantity]
-            if None in (*errors, entry["real_time_factor"]):
+    for axes, quantity in zip(panels, QUANTITIES, strict=True):
+        for (name, entries), color, marker in zip(groups.items(), [*segment_colors(4), "k"], _WAYS, strict=True):
+            if not entries:
                 continue
-            low, mean, high = np.maximum(100.0 * np.array([min(errors), np.mean(errors), max(errors)]), _LEAST_PERCENT)
-            means[entry["name"]] = point = entry["real_time_factor"], mean
-            color = colors[entry["elements_per_side"]]
-            face = color if entry["rhythm"]["verdict"] == "ordered" else "none"
-            look: dict[str, Any] = {"color": color, "markerfacecolor": face, "markersize": 5.0, "elinewidth": 0.8}
-            bar = [[mean - low], [high - mean]]
-            axes.errorbar(*point, yerr=bar, fmt=markers[entry["physics_step_ms"]], zorder=2, **look)
-        best = [means[name] for name in front if name in means]
-        axes.plot(*np.reshape(best, (-1, 2)).T, ":", color=_FADED, linewidth=1.0, zorder=1)
-        _front_axes(axes, report, quantity.capitalize(), limit=quantity in ("elongation", "period"))
+            # An error that is not known is not a number here, and is not drawn.
+            known = np.array([(entry["real_time_factor"], *entry["errors"][quantity]) for entry in entries], float)
+            speeds, percents = known[:, 0], np.maximum(100.0 * known[:, 1:].T, _LEAST_PERCENT)
+            low, mean, high = percents.min(axis=0), percents.mean(axis=0), percents.max(axis=0)
+            axes.errorbar(speeds, mean, np.abs([mean - low, high - mean]), fmt=marker, color=color, label=name, **look)
+            for entry, *point in zip(steps if entries is steps else (), speeds, mean, strict=False):
+                axes.annotate(f"{entry['physics_step_ms']:g}", point, xytext=(0, 4), textcoords="offset points")
+        _error_axes(axes, quantity)
     panels[0].set_ylabel("error (%)")
     panels[3].set_ylabel("error (%)")
     legend.set_axis_off()
-    meshes = [
-        Line2D([], [], color=color, linewidth=4, label=f"{n} element{'s' if n > 1 else ''}")
-        for n, color in colors.items()
-    ]
-    grey: dict[str, Any] = {"color": _FADED, "linestyle": "", "markersize": 5}
-    paces = [Line2D([], [], marker=marker, label=f"{step:g} ms", **grey) for step, marker in markers.items()]
-    if any(entry["rhythm"]["verdict"] != "ordered" for entry in judged):
-        paces.append(Line2D([], [], marker="o", markerfacecolor="none", label="not ordered", **grey))
     legend.legend(
-        handles=[*meshes, *paces], loc="center", ncols=2, title=f"Against {reference} (1 ms);\none core, recording on"
+        *panels[0].get_legend_handles_labels(),
+        loc="center",
+        title=f"Against the converged run\n({CONVERGED_ELEMENTS} elements, {1e3 * CONVERGED_STEP_S:g} ms);\n"
+        "one core, recording on",
     )
 
 
-def _front_axes(axes: Axes, report: Mapping[str, Any], title: str, *, limit: bool) -> None:
+def _error_axes(axes: Axes, quantity: str) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     words: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5}
-    if limit:
+    if quantity in ("elongation", "period"):
         axes.axhline(TOLERATED_PERCENT, color="#c2410c", linewidth=0.8, linestyle="--", zorder=0)
         look = {"xycoords": axes.get_yaxis_transform(), "xytext": (0, 2), "ha": "left", "color": "#c2410c"}
         axes.annotate(f"{TOLERATED_PERCENT:g} %", (0.1, TOLERATED_PERCENT), **look, **words)
-    # A speed to compare with that has no error of the same kind: the paper's own worm.
-    chains = [one for one in report["cases"] if one["preset"] == CHAIN and one["n_segments"] == 3]
-    papers = [one.get("real_time_factor") for one in chains]
     upright = {"xycoords": axes.get_xaxis_transform(), "rotation": 90, "va": "top", "color": _FADED}
-    for speed, name in [(1.0, "real time"), *((speed, "paper's chain") for speed in papers if speed)]:
-        axes.axvline(speed, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
-        axes.annotate(name, (speed, 0.99), xytext=(2, 0), ha="left", **upright, **words)
+    axes.axvline(1.0, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
+    axes.annotate("real time", (1.0, 0.99), xytext=(2, 0), ha="left", **upright, **words)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    # Errors of one kind may lie within a decade.
+    axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
     axes.margins(x=0.08, y=0.12)
     axes.set_xlabel("times real time")
-    panel_title(axes, title)
+    panel_title(axes, quantity.capitalize())
+
+
+def _compared(part: SubFigure, times_less: Mapping[str, float]) -> None:
+    axes = part.subplots()
+    bars = axes.barh(list(times_less), list(times_less.values()), 0.72, color=_SHARE_COLORS[1])
+    axes.bar_label(bars, [f"{less:.3g}" for less in times_less.values()], padding=3, fontsize=8)
+    axes.invert_yaxis()
+    axes.grid(axis="y", visible=False)
+    axes.tick_params(axis="y", length=0)
+    axes.margins(x=0.08)
+    panel_title(axes, f"Times less processor time than {CHAIN}, for a simulated second")
 
 
 def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mapping[str, float]]) -> None:
@@ -171,7 +182,7 @@ def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mappi
         sizes = sorted(points)
         slopes = [f"N^{slope:.2f} ({span.replace('-', '..')})" for span, slope in exponents.get(preset, {}).items()]
         step = points[sizes[0]]["physics_step_ms"]
-        label = f"{_LABELS.get(preset, preset)}, steps of {step:g} ms"
+        label = f"{_LABELS[preset]}, steps of {step:g} ms"
         label += f": {', '.join(slopes)}" if slopes else ""
         axes.plot(sizes, [points[n]["step_median_ms"] for n in sizes], f"{marker}-", color=color, label=label)
         axes.axhline(step, color=color, linewidth=0.8, linestyle=":")
@@ -188,17 +199,12 @@ def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mappi
 
 
 def _divided(measured: Sequence[Any]) -> dict[str, Any]:
-    """The cases whose shares are drawn: the levels of fidelity, and the longest worm of each line."""
-    found = {
-        f"{entry['level']}: {entry['elements_per_side']} elements, {entry['physics_step_ms']:g} ms": entry
-        for entry in sorted(measured, key=lambda entry: entry.get("real_time_factor") or 0.0)
-        if entry["level"]
-    }
+    """The cases whose shares are drawn: levels of fidelity and presets, and the longest worm of each line."""
+    found = {_label(entry): entry for entry in measured if "levels" in entry["lines"]}
     for line in ("segments", "chain"):
-        on_line = [entry for entry in measured if line in entry["lines"] and not entry["level"]]
-        if on_line:
+        if on_line := [entry for entry in measured if line in entry["lines"]]:
             longest = max(on_line, key=lambda entry: entry["n_segments"])
-            found[f"{_LABELS.get(longest['preset'], longest['preset'])}, N = {longest['n_segments']}"] = longest
+            found[f"{_LABELS[longest['preset']]}, N = {longest['n_segments']}"] = longest
     return found
 
 

@@ -360,8 +360,8 @@ def test_five_seconds_of_the_paper_s_worm_are_ordered(tmp_path: Path) -> None:
     found = rhythm_score(simulate("riddle2023-rods", tmp_path, progress=False))
     assert (found.verdict, found.reason) == ("ordered", "a wave of 1 front from front to rear")
     assert found.order == (1, 2, 3, 1, 2, 3)
-    # Onsets are read at the preset's steps of 20 ms.
-    assert found.period_s == pytest.approx(2.626, abs=0.02)
+    # Onsets are read at the preset's steps of 10 ms.
+    assert found.period_s == pytest.approx(2.626, abs=0.01)
     assert found.last_onset_s == pytest.approx(4.24, abs=0.01)
     assert found.mean_contracted == pytest.approx(1.0, abs=0.05)
 

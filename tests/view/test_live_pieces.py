@@ -153,7 +153,7 @@ def test_pause_seek_play_and_restart() -> None:
 
 
 def test_a_living_worm_keeps_pace_and_can_be_looked_back_on() -> None:
-    player, _ = player_of(load_config("riddle2023-rods"), speed=2.0)
+    player, _ = player_of(load_config("riddle2023-rods", {"clock.physics_timestep_s": 0.02}), speed=2.0)
     for _ in range(15):
         player.tick(1 / 30)
     # Steps of 20 ms: never behind the clock by more than rounding, never ahead by more than a step.

@@ -40,7 +40,7 @@ def compared(run: Outcome, **numbers: Any) -> Check:
 
 def test_rods_are_refined_in_step_and_mesh_and_others_say_what_is_left() -> None:
     (half, more), left_out = refinements(load_config("riddle2023-rods"))
-    assert (half.name, half.changes["clock.physics_timestep_s"]) == (HALF, 0.01)
+    assert (half.name, half.changes["clock.physics_timestep_s"]) == (HALF, 0.005)
     assert (more.name, more.changes) == (MORE, {"body.mesh.elements_per_side": 3})
     assert left_out == ()
     for preset, words in (

@@ -29,7 +29,7 @@ from annelid.simulation import Run, simulate
 STEPS_MS = (20, 10, 5, 2)
 TARGET = Path(__file__).parent.parent / "docs" / "results" / "orders.csv"
 AT_ONCE = {"body.rings.activation_dynamics": False}
-FLIGHT = {"arena.gravity_m_per_s2": 0.0, "arena.floor_gap_m": 100.0, "duration_s": 4.0}
+FLIGHT = {"arena.gravity_m_per_s2": 0.0, "arena.floor_gap_m": 1.0, "guard.height_m": 5.0, "duration_s": 4.0}
 SLOW = {
     "controller.rise_s": 0.492,
     "controller.hold_s": 1.185,

@@ -306,7 +306,7 @@ def test_what_the_firmware_says_is_what_the_robot_does(tmp_path: Path) -> None:
     """Each command is computed from the lengths that the command before it made."""
     clock = FakeClock()
     robot, firmware = (Line(peer, clock) for peer in robot_and_firmware())
-    config = annelid.load_config("riddle2023-rods", {"duration_s": 0.5})
+    config = annelid.load_config("riddle2023-rods", {"duration_s": 0.5, "record.signals_interval_s": 0.02})
     driven = drive(
         config, tmp_path, robot=robot, firmware=firmware, rate_hz=25.0, watchdog=20, clock=clock, sleep=clock.sleep
     )

@@ -84,7 +84,6 @@ STALE: tuple[str, ...] = (
     "levels.csv",
     "limits.csv",
     "pipes.csv",
-    "resolution.csv",
     "riddle2025.csv",
     "robustness_three_segments.json",
     "slip.csv",

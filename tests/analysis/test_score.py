@@ -368,14 +368,16 @@ def test_five_seconds_of_the_paper_s_worm_are_ordered(tmp_path: Path) -> None:
 
 def test_sensors_that_never_switch_off_silence_the_worm(tmp_path: Path) -> None:
     """At a tolerance of 8 cm segment 1 is felt at rest while it contracts, so it lets go and none takes over."""
-    config = load_config("riddle2023-rods", {"sensor.tolerance_m": 0.08, "duration_s": 3.0})
+    step_s = 0.02
+    steps = {"clock.physics_timestep_s": step_s, "record.signals_interval_s": step_s}
+    config = load_config("riddle2023-rods", {**steps, "sensor.tolerance_m": 0.08, "duration_s": 3.0})
     run = simulate(config, tmp_path, progress=False)
     found = rhythm_score(run)
     assert (found.verdict, found.order) == ("silent", (1,))
     # Its muscles contract from the start, long before the hold of its sensor ends.
     assert found.last_onset_s is not None
     assert found.last_onset_s < config.sensor.startup_hold_s / 2
-    on = run.data["sensor_on"].sel(time=slice(config.sensor.startup_hold_s + 0.02, None))
+    on = run.data["sensor_on"].sel(time=slice(config.sensor.startup_hold_s + step_s, None))
     assert on.values.all()
     longer_m = (run.data["stretch_length"] - run.data["stretch_rest_length"]).mean("sensor")
     usual_m = load_config("riddle2023-rods").sensor.tolerance_m

@@ -82,7 +82,6 @@ STALE: tuple[str, ...] = (
     "gaits.csv",
     "lems.csv",
     "levels.csv",
-    "limits.csv",
     "pipes.csv",
     "riddle2025.csv",
     "robustness_three_segments.json",

@@ -31,7 +31,6 @@ from annelid.experiment.uncertainty import (
     finer_steps,
     largest_difference,
     more_elements,
-    order_of_convergence,
     plan,
     read_spread,
     readings,
@@ -256,7 +255,7 @@ errors = st.one_of(st.none(), st.floats(0.0, 1e6))
 def quantity(
     value: float | None, parameters: float | None, time_step: float | None, elements: float | None
 ) -> Quantity:
-    return Quantity("elongation_mean_max_m.1", value, parameters, time_step, elements, None, 8)
+    return Quantity("elongation_mean_max_m.1", value, parameters, time_step, elements, 8)
 
 
 @given(errors, errors, errors)
@@ -300,17 +299,6 @@ def test_differences_take_the_largest_that_is_known() -> None:
     assert largest_difference(1.0, [1.5, None, 0.2]) == 0.8
     assert largest_difference(None, [1.0]) is None
     assert largest_difference(1.0, [None]) is None
-
-
-@given(order=st.floats(0.5, 4.0), limit=st.floats(-10.0, 10.0), slope=st.floats(0.1, 10.0))
-def test_the_order_of_an_error_that_is_a_power_of_the_step(order: float, limit: float, slope: float) -> None:
-    values = [limit + slope * step**order for step in (1.0, 0.5, 0.25)]
-    assert order_of_convergence(*values) == pytest.approx(order, rel=1e-6)
-
-
-@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.0, 1.0), (None, 1.0, 2.0), (1.0, 2.0, 2.0)])
-def test_no_order_where_halvings_disagree(values: tuple[float | None, float | None, float | None]) -> None:
-    assert order_of_convergence(*values) is None
 
 
 def test_values_are_written_to_two_digits_of_their_error() -> None:

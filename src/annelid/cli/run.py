@@ -114,7 +114,7 @@ def run_command(
     below the folder: the same command with the same --out goes on where it was stopped.
 
     \b
-    annelid run riddle2023-rods --uncertainty 8 --out walk   13 runs, a few seconds each
+    annelid run riddle2023-rods --uncertainty 8 --out walk   12 runs, a few seconds each
     annelid run wang --uncertainty 8 --out wang              the robot: several minutes
     annelid run riddle2023-rods --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
     annelid run riddle2023-rods --uncertainty 8 --uncertainty-from calibration/calibration.json

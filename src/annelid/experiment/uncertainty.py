@@ -10,7 +10,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import floor, log2, log10, sqrt
+from math import floor, log10, sqrt
 from pathlib import Path
 from statistics import stdev
 from typing import Any, Literal
@@ -51,7 +51,6 @@ DEFINITIONS = {
     "time step": "largest difference between the run and one of finer physics steps",
     "elements": "largest difference between the run and one of more elements a side",
     "total": "root of the sum of the squares of those that are known",
-    "order": "p of an error that goes as step**p, where two halvings change the value in the same direction",
     "not converged": "the difference of time step or of elements exceeds half of the value",
 }
 NOT_CONVERGED = 0.5
@@ -83,8 +82,6 @@ class Quantity:
         parameters: Sample standard deviation over the Monte Carlo samples.
         time_step: Largest difference between the run and one of finer steps.
         discretization: Largest difference between the run and one of more elements.
-        order: Order in which the value converges with the step, from two halvings; None unless both change it in the
-            same direction.
         n_drawn: Number of Monte Carlo samples that it was read in.
     """
 
@@ -93,7 +90,6 @@ class Quantity:
     parameters: float | None
     time_step: float | None
     discretization: float | None
-    order: float | None
     n_drawn: int
 
     @property
@@ -319,7 +315,6 @@ def combine(nominal: Mapping[str, float | None], runs: Sequence[VariantRun]) -> 
                 parameters=scatter(drawn),
                 time_step=largest_difference(value, steps),
                 discretization=largest_difference(value, values("elements", name)),
-                order=order_of_convergence(value, *steps) if len(steps) > 1 else None,
                 n_drawn=sum(one is not None for one in drawn),
             )
         )
@@ -336,16 +331,6 @@ def largest_difference(value: float | None, finer: Sequence[float | None]) -> fl
     """Largest distance of a value from those of finer runs; None if it or all of them are unknown."""
     differences = [abs(value - other) for other in finer if value is not None and other is not None]
     return max(differences, default=None)
-
-
-def order_of_convergence(value: float | None, half: float | None, quarter: float | None) -> float | None:
-    """Order p of an error that goes as ``step**p``, from values at a step, its half and its quarter.
-
-    None where one is unknown, or the halvings do not change the value in the same direction.
-    """
-    if value is None or half is None or quarter is None or (value - half) * (half - quarter) <= 0.0:
-        return None
-    return log2((value - half) / (half - quarter))
 
 
 def uncertainty_table(result: Uncertainty) -> Table:
@@ -452,7 +437,6 @@ def _row(quantity: Quantity) -> dict[str, Any]:
         "time_step": quantity.time_step,
         "elements": quantity.discretization,
         "total": quantity.total,
-        "order": quantity.order,
         "n_drawn": quantity.n_drawn,
         "converged": quantity.converged,
         "note": quantity.note,

@@ -2,7 +2,7 @@
 
     python benchmarks/orders.py
 
-writes ``docs/results/orders.csv``. The order is that of the steps of 20, 10 and 5 ms: ``log2 |(a - b) / (b - c)|``.
+writes ``docs/results/orders.csv``. The order is that of the steps of 20, 10 and 5 ms: ``log2 ((a - b) / (b - c))``.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from annelid.analysis import gait
+from annelid.analysis import Gait, gait
 from annelid.config import load_config
 from annelid.control import SnsController
 from annelid.control.sns import Sns
 from annelid.output import write_csv
 from annelid.protocols import Array, Controller, Sensation
-from annelid.simulation import Run, simulate
+from annelid.simulation import simulate
 
 STEPS_MS = (20, 10, 5, 2)
 TARGET = Path(__file__).parent.parent / "docs" / "results" / "orders.csv"
@@ -48,51 +48,38 @@ class HeldSensors(SnsController):
         return super().stride(replace(sensation, stretch_rate_m_per_s=np.zeros((0, 0))), n_steps)
 
 
-class Line(NamedTuple):
-    """One number of one worm, with something switched."""
+class Worm(NamedTuple):
+    """One worm, with something switched, and the numbers that are read from it."""
 
     name: str
     preset: str
     changes: dict[str, Any]
-    number: Callable[[Run], float | None]
-    scale: float = 1.0
+    numbers: tuple[str, ...]
     held: bool = False
 
 
-def work_J(run: Run) -> float | None:
-    """Work of the muscles, J."""
-    energy = gait(run).energy
-    return None if energy is None else energy.muscle_work_J
-
-
-def travel_m(run: Run) -> float | None:
-    """Travel in a cycle, m."""
-    return gait(run).stride_m
-
-
-def period_s(run: Run) -> float | None:
-    """Period, s."""
-    return gait(run).period_s
-
-
-LINES = (
-    Line("no feedback, free flight: muscles' work (J)", "crawler-timed", FLIGHT, work_J),
-    Line("the same, muscles at once", "crawler-timed", {**FLIGHT, **AT_ONCE}, work_J),
-    Line("no feedback, on the ground: travel a cycle (mm)", "crawler-timed", {}, travel_m, 1e3),
-    Line("the same, muscles at once", "crawler-timed", AT_ONCE, travel_m, 1e3),
-    Line("the same, friction 0.3", "crawler-timed", {"arena.friction": 0.3}, travel_m, 1e3),
-    Line("the same, a wave three times as slow", "crawler-timed", SLOW, travel_m, 1e3),
-    Line("with feedback: period (s)", "riddle2025-muscles", LOOP, period_s),
-    Line("the same, sensors held between movements", "riddle2025-muscles", LOOP, period_s, held=True),
-    Line("the same, muscles at once", "riddle2025-muscles", {**LOOP, **AT_ONCE}, period_s),
-    Line("with feedback: travel a cycle (mm)", "riddle2025-muscles", LOOP, travel_m, 1e3),
-    Line("the same, sensors held between movements", "riddle2025-muscles", LOOP, travel_m, 1e3, held=True),
+READ: dict[str, Callable[[Gait], float | None]] = {
+    "muscles' work (J)": lambda found: None if found.energy is None else found.energy.muscle_work_J,
+    "travel a cycle (mm)": lambda found: None if found.stride_m is None else 1e3 * found.stride_m,
+    "period (s)": lambda found: found.period_s,
+}
+WORK, TRAVEL, PERIOD = READ
+WORMS = (
+    Worm("no feedback, free flight", "crawler-timed", FLIGHT, (WORK,)),
+    Worm("the same, muscles at once", "crawler-timed", {**FLIGHT, **AT_ONCE}, (WORK,)),
+    Worm("no feedback, on the ground", "crawler-timed", {}, (TRAVEL,)),
+    Worm("the same, muscles at once", "crawler-timed", AT_ONCE, (TRAVEL,)),
+    Worm("the same, friction 0.3", "crawler-timed", {"arena.friction": 0.3}, (TRAVEL,)),
+    Worm("the same, a wave three times as slow", "crawler-timed", SLOW, (TRAVEL,)),
+    Worm("with feedback", "riddle2025-muscles", LOOP, (PERIOD, TRAVEL)),
+    Worm("the same, sensors held between movements", "riddle2025-muscles", LOOP, (PERIOD, TRAVEL), held=True),
+    Worm("the same, muscles at once", "riddle2025-muscles", {**LOOP, **AT_ONCE}, (PERIOD, TRAVEL)),
 )
 
 
-def measured(line: int, step_ms: int) -> float:
-    """Returns the number of a line at a step."""
-    one, step_s = LINES[line], step_ms / 1000
+def measured(number: int, step_ms: int) -> list[float]:
+    """Returns the numbers of a worm at a step."""
+    one, step_s = WORMS[number], step_ms / 1000
     timing = {"clock.physics_timestep_s": step_s, "record.signals_interval_s": step_s}
     config = load_config(one.preset, {**timing, **one.changes})
     controller: Controller | None = None
@@ -101,22 +88,22 @@ def measured(line: int, step_ms: int) -> float:
         assert isinstance(config.controller, Sns)
         controller = HeldSensors(config.controller, config.sensor, n, n, config.clock.control_timestep_s)
     with tempfile.TemporaryDirectory() as folder:
-        value = one.number(simulate(config, folder, controller=controller, progress=False))
-    return math.nan if value is None else one.scale * value
+        found = gait(simulate(config, folder, controller=controller, progress=False))
+    values = [READ[name](found) for name in one.numbers]
+    return [math.nan if value is None else value for value in values]
 
 
 def main() -> None:
-    """Measures all lines."""
+    """Measures all worms."""
+    rows = []
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-        found = [[pool.submit(measured, line, step_ms) for step_ms in STEPS_MS] for line in range(len(LINES))]
-        rows = []
-        for line, values in zip(LINES, found, strict=True):
-            a, b, c, d = (value.result() for value in values)
-            order = math.log2(abs((a - b) / (b - c))) if (a - b) * (b - c) > 0 else None
-            rows.append(
-                [line.name, *(f"{value:.7g}" for value in (a, b, c, d)), "" if order is None else f"{order:.2f}"]
-            )
-            print(*rows[-1], sep="  ", flush=True)
+        runs = [[pool.submit(measured, number, step_ms) for step_ms in STEPS_MS] for number in range(len(WORMS))]
+        for worm, its in zip(WORMS, runs, strict=True):
+            for name, values in zip(worm.numbers, zip(*(run.result() for run in its), strict=True), strict=True):
+                a, b, c = values[:3]
+                order = f"{math.log2((a - b) / (b - c)):.2f}" if (a - b) * (b - c) > 0 else ""
+                rows.append([f"{worm.name}: {name}", *(f"{value:.7g}" for value in values), order])
+                print(*rows[-1], sep="  ", flush=True)
     print(write_csv(TARGET, ["line", *(f"at_{step_ms}_ms" for step_ms in STEPS_MS), "order"], rows))
 
 

@@ -101,8 +101,12 @@ def test_worms_of_all_headings_share_a_batch_and_a_model_and_are_their_single_ru
 
 
 @pytest.mark.slow
-def test_a_turned_run_is_told_forwards_and_goes_on_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_turned_run_is_told_forwards_and_goes_on_to_the_last_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Travel, speed and slip of worms that lead along x and along y, and back."""
+    # So that what is left of the solver's error is below what is compared.
+    monkeypatch.setattr("annelid.body.formulations.rods.net.SOLVER_TOLERANCE", 1e-10)
     changes: dict[str, Any] = {
         "controller": WAVE,
         "duration_s": 1.2,

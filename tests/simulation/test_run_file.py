@@ -187,6 +187,24 @@ def test_a_run_of_0_2_0_is_read_and_says_what_is_gone(pins: str, lateral: float)
     assert ("lateral_damping_Nms_per_rad was 0.1" in doubts) == (lateral > 0)
 
 
+@pytest.mark.parametrize(
+    ("kind", "posts"), [("floor", [[1.0, 2.0, 0.1]]), ("steps", None), ("rough", [[1.0, 2.0, 0.1]])]
+)
+def test_a_run_with_walls_and_limits_of_the_solver_is_read(kind: str, posts: list[list[float]] | None) -> None:
+    own = {"arena.kind": kind} | ({"arena.posts": posts} if kind == "floor" else {})
+    config = load_config("riddle2023-rods", own)
+    tree = config.model_dump(mode="json")
+    tree["body"]["formulation"]["solver_iterations"] = 100
+    tree["arena"] |= {"rail_gap_m": None, "posts": posts}
+    attrs = {"schema_version": 5, "config": json.dumps(tree)}
+    read = migrated(xarray.Dataset({"warnings": ((), "")}, attrs=attrs))
+    assert RunConfig.model_validate_json(read.attrs["config"]) == config
+    doubts = str(read["warnings"].values)
+    assert "solver_iterations was 100" in doubts
+    assert ("arena.posts was" in doubts) == (kind == "rough")
+    assert "rail_gap_m" not in doubts
+
+
 @pytest.mark.parametrize("config", ["{", "[]", '"riddle2023"', '{"name": 3}', "[" * 100_000])
 def test_what_is_wrong_with_an_old_configuration_is_left_to_its_reader(config: str) -> None:
     assert migrated(xarray.Dataset(attrs={"config": config})).attrs["config"] == config

@@ -67,7 +67,7 @@ SCRIPTS = (
 LONG = {
     ("annelid", "run", "--uncertainty"): ("thirteen runs", ("--uncertainty", "2", "--duration", "0.5", "--no-video")),
     ("annelid", "paper"): ("an hour, or 6 minutes with --quick", ("--quick",)),
-    ("annelid", "bench"): ("ten minutes", ("--quick",)),
+    ("annelid", "bench"): ("up to half an hour", ("--quick",)),
     ("annelid", "challenge"): ("hours, or minutes with --quick", ("--quick",)),
     ("annelid", "robustness"): ("hours for 300 points", ("--points", "1")),
     ("annelid", "tune"): ("an hour", ("--trials", "2", "--duration", "1")),

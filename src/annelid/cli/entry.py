@@ -194,7 +194,7 @@ def _start(
     annelid run riddle2023             run it as the paper built it: about a minute
     annelid run riddle2022-planar      run the planar worm: a few seconds
     annelid paper                      reproduce and examine the whole paper: about 40 minutes
-    annelid bench                      speed and error side by side: ten minutes
+    annelid bench                      speed and error side by side: up to half an hour
     annelid presets                    what else there is
     annelid doctor                     is everything in place?
 

@@ -83,7 +83,7 @@ def paper_command(
 
 def bench_command(
     output: ResultsFolder = Path("bench"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: about 6 minutes.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: up to a quarter of an hour.")] = False,
     cases: Annotated[
         list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
     ] = None,
@@ -106,7 +106,7 @@ def bench_command(
     --cases chain       the paper's formulation, 3 to 12 segments
     --cases duration    10 and 60 s, for the memory
 
-    The whole takes about ten minutes. Leave the machine alone meanwhile: what else runs is measured too.
+    The whole takes up to half an hour. Leave the machine alone meanwhile: what else runs is measured too.
     Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
     a full run takes over what --quick measured. Delete that folder to measure again.
 

@@ -81,7 +81,6 @@ STALE: tuple[str, ...] = (
     "firmware.csv",
     "gaits.csv",
     "lems.csv",
-    "levels.csv",
     "pipes.csv",
     "riddle2025.csv",
     "robustness_three_segments.json",

@@ -11,7 +11,6 @@ import typer
 from annelid.cli.common import (
     RIGID_PRESET,
     Assignments,
-    ClusterName,
     FidelityLevel,
     Force,
     Jobs,
@@ -19,6 +18,7 @@ from annelid.cli.common import (
     Output,
     Quiet,
     ResultsFolder,
+    SchedulerAddress,
     config_of,
     kept_runs,
     overrides_of,
@@ -39,7 +39,7 @@ def speed_command(
     output: Output = Path("speed"),
     quick: Annotated[bool, typer.Option("--quick", help="Two values of each quantity.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out how fast gaits crawl over friction and number of segments.
@@ -57,7 +57,7 @@ def speed_command(
     """
     from annelid_studies import crawling
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings = crawling.crawl(store, gaits or crawling.GAITS, "quick" if quick else "full")
     path = crawling.write_readings(readings, output / "speed.csv")
     tables = (crawling.crawling_table(readings, quantity) for quantity in crawling.VALUES)
@@ -73,7 +73,7 @@ def gaits_command(
     output: Output = Path("gaits"),
     quick: Annotated[bool, typer.Option("--quick", help="Two perturbed runs, and half the step only.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure gaits with error bars: is a speed an accident of its run, or of the resolution?
@@ -94,7 +94,7 @@ def gaits_command(
 
     found: list[crawling.Headline] = []
     path = output / "gaits.csv"
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         for one in crawling.headlines(store, gaits or crawling.HEADLINES, "quick" if quick else "full"):
             found.append(one)
             crawling.write_headlines(found, path)
@@ -107,7 +107,7 @@ def slip_command(
     quick: Annotated[bool, typer.Option("--quick", help="Two frictions and two draws only.")] = False,
     half_step: Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure what pressure feedback saves of the work lost to friction, against a wave by the clock.
@@ -124,7 +124,7 @@ def slip_command(
     """
     from annelid_studies import slip
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings = slip.slip_feedback(store, "quick" if quick else "full", half_step=half_step)
     path = slip.write_readings(readings, output / "slip.csv")
     written = path, slip.feedback_figure(readings, path.with_suffix(""))
@@ -136,7 +136,7 @@ def slip_detector_command(
     output: Output = SLIP,
     quick: Annotated[bool, typer.Option("--quick", help="Two runs only.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Judge the slip detector, which knows stretch and pressure only, by the slip that the simulator knows of.
@@ -152,7 +152,7 @@ def slip_detector_command(
     """
     from annelid_studies import slip
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         found = slip.slip_detection(store, slip.QUICK_CASES if quick else tuple(slip.CASES))
     scores = slip.scores(found)
     path = slip.write_scores(scores, output / "slip_detector.csv")
@@ -165,7 +165,7 @@ def turning_command(
     output: Output = Path("turning"),
     quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out on which radius the worm turns.
@@ -184,7 +184,7 @@ def turning_command(
     from annelid_studies.tables import write_fields
     from annelid_studies.turning import MODULATIONS, QUICK, Reading, turning, turning_picture, turning_table
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings, tracks = turning(store, QUICK if quick else MODULATIONS)
     path = write_fields(Reading, readings, output / "turning.csv")
     written = path, turning_picture(readings, tracks, path.with_suffix(""))
@@ -196,7 +196,7 @@ def pipes_command(
     output: Output = Path("pipes"),
     quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out which pipes the worm passes, and how fast.
@@ -217,7 +217,7 @@ def pipes_command(
     from annelid_studies.pipes import Reading, pass_pipes, pipes_picture, pipes_table, trials
     from annelid_studies.tables import write_fields
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings, courses = pass_pipes(store, trials(quick))
     path = write_fields(Reading, readings, output / "pipes.csv")
     written = path, pipes_picture(readings, courses, path.with_suffix(""))
@@ -229,7 +229,7 @@ def riddle2025_command(
     output: Output = Path("riddle2025"),
     quick: Annotated[bool, typer.Option("--quick", help="One friction, and one bend.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Compare the six-segment robot with its authors' model, on their axes.
@@ -248,7 +248,7 @@ def riddle2025_command(
     from annelid_studies.riddle2025 import Reading, compare, comparison_picture, comparison_table, points
     from annelid_studies.tables import write_fields
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings = compare(store, points(quick))
     path = write_fields(Reading, readings, output / "riddle2025.csv")
     print_results((path, comparison_picture(readings, path.with_suffix(""))), comparison_table(readings), quiet=quiet)
@@ -311,7 +311,7 @@ def weak_middle_command(
     output: Output = Path("weak-middle"),
     quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out why the middle of the worm elongates less than its ends.
@@ -334,7 +334,7 @@ def weak_middle_command(
     from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, asymmetry, weak_middle
 
     found = None
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         set_to, readings = weak_middle(store, "quick" if quick else "full")
         if not quick:
             found = asymmetry(store, set_to[BASE_KEY].force_N)

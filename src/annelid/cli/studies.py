@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +12,6 @@ import typer
 from annelid.cli.common import (
     RIGID_PRESET,
     Assignments,
-    ClusterName,
     Force,
     Jobs,
     NamedPreset,
@@ -21,6 +19,7 @@ from annelid.cli.common import (
     Output,
     Quiet,
     ResultsFolder,
+    SchedulerAddress,
     going_on,
     kept_runs,
     overrides_of,
@@ -40,7 +39,7 @@ def paper_command(
         typer.Option(metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
     ] = None,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     claims: Annotated[
         Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
     ] = None,
@@ -68,9 +67,9 @@ def paper_command(
         claims = with_suffix(claims, (".md",), "Markdown", default=".md")
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         effort = "quick" if quick else "full"
-        report = reproduce(output, effort, only=only or None, workers=store.workers, progress=store.progress)
+        report = reproduce(output, effort, only=only or None, executor=store.executor, progress=store.progress)
         html = write_report(report, output)
     written = [html, html.with_suffix(".md")]
     if claims is not None:
@@ -158,7 +157,7 @@ def robustness_command(
         bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
     ] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: OnlyPaths = False,
 ) -> None:
     """Compare how often controllers make different worms walk.
@@ -177,14 +176,14 @@ def robustness_command(
     """
     from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         judged = robustness(
             output,
             points,
             controllers=tuple(controller or CONTROLLERS),
             n_segments=segments,
             keep=keep,
-            workers=store.workers,
+            executor=store.executor,
             progress=store.progress,
         )
     if not (quiet or wants_json()):
@@ -228,7 +227,7 @@ def challenge_command(
     ] = None,
     output: Output = Path("challenge"),
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Rank controllers in a benchmark of crawling.
@@ -260,7 +259,7 @@ def challenge_command(
     duration_s = tasks.QUICK_DURATION_S if quick else None
     found = tasks.find_entrants(entrants or [])
     wanted = tasks.entries(found, task or [], seeds, finer=finer, duration_s=duration_s)
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         scores = challenge(store, wanted, earlier)
     ranked = standings(scores)
     taus = [agreement(mean_speeds(scores), other) for other in others]
@@ -279,7 +278,7 @@ def sweep_command(
         Path | None, typer.Argument(metavar="STUDY.toml", help="What is varied, and how; --example prints one.")
     ] = None,
     output: Output = Path("sweep"),
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     jobs: Jobs = None,
     samples: Annotated[
         int | None, typer.Option(min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]")
@@ -295,16 +294,13 @@ def sweep_command(
 ) -> None:
     """Vary fields over a grid or in samples.
 
-    Runs are computed on this machine or on a cluster.
-
     A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
     ranges, in every combination or as random, Latin hypercube or Sobol samples.
 
     Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, one row per run; sweep.png
     and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A
     run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on.
-    Needs the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the
-    study describes is used where --cluster names the file.
+    Several machines need the extra: pip install 'annelid[sweep]'; docs/sweeps.md has them, and Slurm.
 
     With --check N, N complete runs, spread evenly over the sweep, run also at half the step and with one more element a
     side. A sentence at the end says which of them are not resolved; the column check of sweep.csv says what moves, and
@@ -313,8 +309,7 @@ def sweep_command(
     \b
     annelid sweep --example > study.toml
     annelid sweep study.toml
-    annelid sweep study.toml --cluster tcp://10.0.0.1:8786
-    annelid sweep study.toml --cluster study.toml
+    annelid sweep study.toml --scheduler tcp://10.0.0.1:8786
     annelid sweep study.toml --samples 512
     annelid sweep study.toml --check 4                 do its results depend on step and mesh?
     """
@@ -327,16 +322,13 @@ def sweep_command(
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
-    from annelid.experiment.progress import study_progress
     from annelid.experiment.sweep import checked_sentence, results_table, swept, write_results
 
     loaded = load_study(study)
     if samples is not None:
         loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
-    lock(output)
-    with going_on(output / "runs"), study_progress(quiet=quiet) as progress:
-        to_use = f"add --cluster {shlex.quote(str(study))}"
-        done = swept(loaded, output, cluster=cluster, jobs=jobs, check=check, progress=progress, to_use=to_use)
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        done = swept(loaded, output, executor=store.executor, check=check, progress=store.progress)
     sentences = [checked_sentence(done)] if check else []
     results = {"check": {i: one.to_dict() for i, one in done.checks.items()}} if check else {}
     print_results(write_results(done), results_table(done), *sentences, quiet=quiet, results=results)
@@ -375,7 +367,7 @@ def tune_command(
         ),
     ] = None,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Search for a faster, cheaper or less slipping gait.
@@ -405,7 +397,7 @@ def tune_command(
     task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed, numerics)
     found: list[tune.Trial] = []
     written: list[Path] = []
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         for generation in tune.search(task, store):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)
@@ -433,7 +425,7 @@ def calibrate_command(
         typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: those of the study]"),
     ] = None,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     example: Annotated[bool, typer.Option("--example", help="Print the study of the robot, to begin with.")] = False,
     quiet: Quiet = False,
     force: Force = False,
@@ -470,9 +462,9 @@ def calibrate_command(
     source = ROBOT if study is None else study
     loaded = load_identify_study(source).but(overrides_of(assignments))
     loaded = loaded.only(free) if free else loaded
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         refuse_existing(output / REPORT, force)
-        simulations = Simulations(store.folder, store.workers, store.progress)
+        simulations = Simulations(store.folder, store.executor, store.progress)
         found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))
     for sentence in found.intervals.confused:
         complain(f"note: {sentence}")

@@ -24,7 +24,6 @@ from annelid.config.checking import (
     unit_of,
     whole_path,
 )
-from annelid.config.cluster import Cluster, find_cluster
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
 from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, class_named, kinds_of
 from annelid.config.loading import (
@@ -56,7 +55,6 @@ __all__ = [
     "ArenaKind",
     "BodyKind",
     "Clock",
-    "Cluster",
     "ControllerKind",
     "Fidelity",
     "Guard",
@@ -77,7 +75,6 @@ __all__ = [
     "field_paths",
     "field_value",
     "fields_of",
-    "find_cluster",
     "find_level",
     "has_field",
     "kinds_of",

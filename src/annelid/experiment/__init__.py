@@ -20,12 +20,11 @@ if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
     from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
     from annelid.experiment.fingerprint import code_fingerprint
-    from annelid.experiment.lifeline import end_after
     from annelid.experiment.outcome import Hold, Outcome
+    from annelid.experiment.processes import Processes, end_after
     from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import Judged, judge, numerical_problem
-    from annelid.experiment.workers import Workers
 
 __all__ = [
     "SHEAR_OVER_YOUNG",
@@ -34,9 +33,9 @@ __all__ = [
     "Hold",
     "Judged",
     "Outcome",
+    "Processes",
     "Store",
     "StudyProgress",
-    "Workers",
     "case_key",
     "check",
     "code_fingerprint",

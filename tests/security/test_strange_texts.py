@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from annelid import Network, simulate
-from annelid.config import find_cluster, load_config, load_study, parse_assignments
+from annelid.config import load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
 from annelid.experiment.load_frame import read_loop
 from annelid.experiment.spread import read_spread
@@ -70,7 +70,6 @@ def test_strange_toml_is_refused_by_every_reader(tmp_path: Path, text: str) -> N
         return
     refused(lambda: load_study(path))
     refused(lambda: Network.from_toml(text))
-    refused(lambda: find_cluster(str(path)))
     refused(lambda: load_config("riddle2023-rods", arena=path))
 
 
@@ -100,7 +99,7 @@ FILES: dict[str, Callable[[Path], object]] = {
 def test_what_is_no_text_file_is_refused_by_every_reader(tmp_path: Path, make: Callable[[Path], object]) -> None:
     path = tmp_path / "w.toml"
     make(path)
-    readers = [load_config, load_study, lambda p: find_cluster(str(p)), lambda p: load_config("crawler", arena=p)]
+    readers = [load_config, load_study, lambda p: load_config("crawler", arena=p)]
     for read in [*readers, read_spread, read_loop]:
         assert str(path) in refused(lambda read=read: read(path))
 

@@ -14,10 +14,8 @@ from annelid.errors import ClusterError, ConfigError, MissingDependency, shown
 from annelid.textfiles import read_json
 
 MISSING = "runs on a cluster need Dask: install it with  pip install 'annelid[sweep]'"
-RECONNECT_S = 60.0
-"""How long a scheduler may be gone before the study gives up, s."""
-HANDSHAKE_S = 5.0
-"""For how long a scheduler may take that has been reached, s."""
+JOIN_S = 10.0
+"""How long a scheduler may take to answer, s."""
 _FORM = "must be tcp://HOST:PORT, tls://HOST:PORT, or the path of a scheduler file (.json)"
 
 
@@ -44,7 +42,7 @@ def joined(where: str) -> Iterator[Executor]:
         # In a thread, since this one may have a loop that runs, as in a notebook.
         with ThreadPoolExecutor(1) as thread:
             thread.submit(asyncio.run, _greet(address)).result()
-        client = Client(address, timeout=RECONNECT_S)
+        client = Client(address, timeout=JOIN_S)
     except (OSError, ValueError, TypeError) as error:
         raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
     try:
@@ -71,5 +69,5 @@ async def _greet(address: str) -> None:
     from distributed import Security
     from distributed.comm.core import connect
 
-    greeting = connect(address, timeout=RECONNECT_S, **Security().get_connection_args("client"))
-    (await asyncio.wait_for(greeting, RECONNECT_S + HANDSHAKE_S)).abort()
+    greeting = connect(address, timeout=JOIN_S, **Security().get_connection_args("client"))
+    (await asyncio.wait_for(greeting, JOIN_S)).abort()

@@ -266,7 +266,7 @@ def attempt(key: str, config_json: str, folder: str, mark: str) -> bytes | None:
     try:
         with _draft_of(home) as draft:
             compute_run(config, draft)
-    except OSError:
+    except (OSError, RunFileError):
         # Where another attempt has won, this one's folder may have been cleared away under it.
         if stored_outcome(home) is None:
             raise

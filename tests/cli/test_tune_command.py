@@ -49,6 +49,6 @@ def test_a_tuned_gait_runs_and_a_second_call_computes_nothing(
     assert done.out.splitlines()[-3:] == [str(Path("tune", name)) for name in ("trials.csv", "tuning.png", "best.toml")]
     best = load_config("tune/best.toml")
     assert best.name == "best"
-    monkeypatch.setattr("annelid.experiment.workers.ProcessPoolExecutor", None)
+    monkeypatch.setattr("annelid.experiment.store.attempt", None)
     assert annelid(*arguments).exit_code == 0
     assert load_config("tune/best.toml") == best

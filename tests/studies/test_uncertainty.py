@@ -483,7 +483,7 @@ def test_a_worm_without_weight_feels_its_strands_and_not_the_floor(
 def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
     config, folder = load_config(RODS, SHORT | {"body.mesh.elements_per_side": 1}), tmp_path / "run"
 
-    def stop_after_two(finished: int, _total: int, _share: float) -> None:
+    def stop_after_two(_stage: str, finished: int, _total: int, _share: float) -> None:
         if finished >= 2:
             raise KeyboardInterrupt
 

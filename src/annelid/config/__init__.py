@@ -20,7 +20,6 @@ from annelid.config.checking import (
     unit_of,
     whole_path,
 )
-from annelid.config.cluster import Cluster, find_cluster
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
 from annelid.config.kinds import (
     BodyKind,
@@ -55,7 +54,6 @@ __all__ = [
     "BodyKind",
     "Choice",
     "Clock",
-    "Cluster",
     "ControllerKind",
     "Fidelity",
     "Guard",
@@ -84,7 +82,6 @@ __all__ = [
     "field_paths",
     "field_value",
     "fields_of",
-    "find_cluster",
     "find_level",
     "has_field",
     "kinds_of",

@@ -21,7 +21,7 @@ from annelid.nervous.half_centre import (
     half_centre_of_period,
     oscillation_periods,
 )
-from annelid.nervous.network import Connection, Network
+from annelid.nervous.network import Network
 from annelid.nervous.neurons import (
     Channel,
     ConnectionKind,
@@ -54,6 +54,7 @@ from annelid.nervous.shc import (
 )
 from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
 from annelid.nervous.toolbox import export_network, import_network
+from annelid.nervous.wiring import Connection
 
 __all__ = [
     "Channel",

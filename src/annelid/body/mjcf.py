@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from annelid.arena.grammar import ROBOT
 from annelid.arena.mjcf import names_in, read_mjcf, stated_in, validator
-from annelid.config.kinds import BodyKind, OwnModel
+from annelid.config.run import BodyKind, OwnModel
 from annelid.config.sections import Line
 from annelid.errors import listed, shown
 

@@ -11,13 +11,13 @@ from pydantic import Field, field_validator, model_validator
 
 from annelid.body.actuators import ActuatorKind
 from annelid.body.formulations import FormulationKind
-from annelid.config.kinds import BodyKind, Choice, default_of
+from annelid.config.kinds import Choice, default_of
+from annelid.config.run import BodyKind, RunConfig
 from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, Positive, Section
 from annelid.errors import ConfigError, shown
 
 if TYPE_CHECKING:
     from annelid.body.actuators.muscle import Rings
-    from annelid.config.run import RunConfig
     from annelid.protocols import Plant
 
 EQUAL_STIFFNESS_RADIUS_M = 0.00299

@@ -12,7 +12,6 @@ import warnings
 from importlib import import_module
 from typing import Any
 
-from annelid.config.arena import ArenaKind
 from annelid.config.checking import (
     REPLACED,
     check_config,
@@ -26,7 +25,7 @@ from annelid.config.checking import (
 )
 from annelid.config.cluster import Cluster, find_cluster
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
-from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, class_named, kinds_of
+from annelid.config.kinds import Knob, class_named, kinds_of
 from annelid.config.loading import (
     arena_names,
     arena_summary,
@@ -37,13 +36,14 @@ from annelid.config.loading import (
     preset_names,
     preset_text,
 )
-from annelid.config.run import Clock, Guard, Record, RunConfig, StretchSensor
+from annelid.config.run import ArenaKind, BodyKind, ControllerKind, RunConfig, TurningKind
 from annelid.config.sections import Section
+from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 
 _MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
-    "Contraction": "annelid.control.open_loop",
+    "Contraction": "annelid.config.settings",
     "DescendingDrive": "annelid.control.robust",
 }
 """Sections that are no kinds, which the first edition had here."""

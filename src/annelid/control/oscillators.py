@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from annelid.config.kinds import ControllerKind, Knob
+from annelid.config.kinds import Knob
+from annelid.config.run import ControllerKind
 from annelid.config.sections import NonNegative, Positive, Share
 from annelid.control.base import SegmentController, Slope
 from annelid.control.sns import DRIVE_HINT

@@ -14,7 +14,8 @@ from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
 
 if TYPE_CHECKING:
-    from annelid.config.run import Clock, RunConfig
+    from annelid.config.run import RunConfig
+    from annelid.config.settings import Clock
 
 
 class PlanarBody(PlanarWorm):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from annelid.config.kinds import BodyKind
+from annelid.config.run import BodyKind
 from annelid.config.sections import NonNegative, Positive
 
 if TYPE_CHECKING:

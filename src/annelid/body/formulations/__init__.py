@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 
 from annelid.config.kinds import Kind
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry
 from annelid.registry import Registry
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
     from annelid.body.estimates import Finding
     from annelid.body.worm import Strands, WormBody
-    from annelid.config.arena import ArenaKind
-    from annelid.config.run import RunConfig
 
 
 def stiffness_shares(geometry: MeshGeometry, strands: Strands) -> Array:

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from annelid.body.estimates import Finding, rhombus_of, softened
 from annelid.body.formulations import FormulationKind, PinReader
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Impedance, NonNegative, Positive
 from annelid.morphology import Array, MeshGeometry, norm
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     import mujoco
 
     from annelid.body.worm import WormBody
-    from annelid.config.arena import ArenaKind
-    from annelid.config.run import RunConfig
 
 _RK4_DAMPED, _RK4_SWUNG = 2.78, 2.83
 """Largest products of step and rate, or frequency, at which the explicit Runge-Kutta method is stable."""

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from annelid.body.estimates import Finding
 from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader, Tie
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Positive
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     import mujoco
 
     from annelid.body.worm import WormBody
-    from annelid.config.arena import ArenaKind
-    from annelid.config.run import RunConfig
 
 
 class Rods(FormulationKind):

@@ -18,7 +18,8 @@ from annelid.body.actuation import (
     add_springs,
     stretch_sensors,
 )
-from annelid.body.worm import Mesh, WormBody
+from annelid.body.mesh import Mesh
+from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh

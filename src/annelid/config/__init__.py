@@ -42,7 +42,7 @@ from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 
-_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
+_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.mesh") | {
     "Contraction": "annelid.config.settings",
     "DescendingDrive": "annelid.control.robust",
 }

@@ -13,7 +13,8 @@ from typing import Any
 
 from annelid.body.assemble import build_spec, compile_spec
 from annelid.body.estimates import bearable_force_N, rhombus_of
-from annelid.body.worm import Mesh, WormBody
+from annelid.body.mesh import Mesh
+from annelid.body.worm import WormBody
 from annelid.config import RunConfig, check_section, load_config, toml_value
 from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus

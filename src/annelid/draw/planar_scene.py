@@ -7,6 +7,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from annelid.draw.canvas import activation_color, canvas
@@ -31,8 +32,6 @@ class PlanarScene(AbstractContextManager):
     """
 
     def __init__(self, run: Run, width: int, height: int, *, dark: bool = False) -> None:
-        from matplotlib.patches import Polygon
-
         data = run.data
         if data.sizes.get("time", 0) == 0:
             raise RunFileError(f"{run.path} holds no samples to draw")

@@ -6,6 +6,9 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
+from rich import box
+from rich.table import Table
+
 from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
 from annelid.analysis.gait import Gait
 from annelid.analysis.paper import (
@@ -103,9 +106,6 @@ _ROUNDING = 1e-12
 
 def framed_table(*headings: str, title: str | None = None, caption: str | None = None, min_width: int = 0) -> Table:
     """Returns an empty table in the project's look, whose long words go on in the next line."""
-    from rich import box
-    from rich.table import Table
-
     table = Table(
         *headings,
         title=title,
@@ -367,8 +367,6 @@ def field_lines(config: RunConfig) -> list[str]:
 
 
 def _list(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    from rich.table import Table
-
     table = Table(*headings, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)

@@ -19,6 +19,8 @@ from annelid.export.page import write_page
 from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_tables
 from annelid.output import with_suffix, write_text
 from annelid.registry import Registry
+from annelid.simulation.runfile import read_checkpoint
+from annelid.simulation.worm import WormPlant
 
 if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
@@ -102,9 +104,6 @@ def write_mjcf(run: Run, path: Path) -> Path:
         ConfigError: The worm is planar or started with a heading, or its friction depends on the direction.
         RunFileError: The file cannot be written.
     """
-    from annelid.simulation.runfile import read_checkpoint
-    from annelid.simulation.worm import WormPlant
-
     keyframes: list[dict[str, Any]] = []
     if not run.config.body.is_planar and run.config.body.own_model is None:
         plant = WormPlant(run.config)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.patches import Polygon
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from annelid.draw.canvas import activation_color, canvas
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
-
-if TYPE_CHECKING:
-    from matplotlib.text import Text
 
 _DPI = 100
 _CM = 100.0

@@ -29,8 +29,6 @@ from annelid.config import field_value, fields_of, toml_value
 from annelid.errors import listed, shortened
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from annelid.analysis.agreement import Agreement
     from annelid.analysis.limit_cycle import LimitCycle
     from annelid.config import RunConfig

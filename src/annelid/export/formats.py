@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +19,8 @@ from annelid.export.page import write_page
 from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_tables
 from annelid.output import with_suffix, write_text
 from annelid.registry import Registry
-from annelid.simulation.runfile import read_checkpoint
+from annelid.simulation.runfile import Run, read_checkpoint
 from annelid.simulation.worm import WormPlant
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
 
 WINDOW = frozenset({"--from-time", "--to-time"})
 SELECTION = WINDOW | {"--signals", "--every"}

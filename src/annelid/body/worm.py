@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib import import_module
-from typing import Annotated, ClassVar, Literal, Self, cast
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
 from annelid.body.actuators import ActuatorKind
-from annelid.body.actuators.muscle import Rings
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
 from annelid.config.kinds import Choice, default_of
@@ -17,6 +16,9 @@ from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import ConfigError, shown
 from annelid.protocols import Plant
+
+if TYPE_CHECKING:
+    from annelid.body.actuators.muscle import Rings
 
 EQUAL_STIFFNESS_RADIUS_M = 0.00299
 """Radius of a solid strand that bends as the robot's tube: the authors' choice of 2025."""
@@ -81,7 +83,7 @@ class WormBody(MeshBody):
             raise ConfigError(
                 f"body.rings.kind = {self.rings.kind!r} has no muscles; this needs body.rings.kind = 'muscle'"
             )
-        return cast(Rings, muscle)
+        return cast("Rings", muscle)
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns the engine and the robot, and what formulation, strands and actuators rest on."""

@@ -10,7 +10,6 @@ import warnings
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from contextvars import ContextVar
-from importlib.metadata import version
 from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
@@ -176,6 +175,8 @@ def _throw_away(stream: TextIO) -> None:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
+        from importlib.metadata import version
+
         typer.echo(f"annelid {version('annelid')}")
         raise typer.Exit
 

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
-from typer.main import get_command
 
 from annelid.cli.common import Jobs, Quiet, config_of, kept_runs, overrides_of, print_paths
 from annelid.cli.entry import app
@@ -131,6 +130,8 @@ def cases(picture: Picture) -> Mapping[str, Case]:
     """Returns the runs that a picture is drawn from: one, or that in every arena by the arena's name."""
     if picture.maker not in ("frame", "figure7", "track", "video", "arenas"):
         return {}
+    from typer.main import get_command
+
     from annelid.config import arena_names
     from annelid.experiment import Case
 

@@ -23,8 +23,6 @@ from annelid.cli.common import (
 from annelid.cli.entry import EXIT_INTERRUPTED, EXIT_STOPPED, complain
 from annelid.cli.result import wants_json
 from annelid.cli.run import locked_folder
-from annelid.errors import require_finite, require_positive
-from annelid.output import write_csv
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -100,6 +98,7 @@ def loop_command(
     annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
     """
     from annelid.hardware import Limits, Wiring, drive, open_link
+    from annelid.output import write_csv
 
     config = config_of(preset, overrides_of(assignments, duration_s=duration), segments)
     limits = Limits(least, most, math.inf if most_rate is None else most_rate)
@@ -190,6 +189,7 @@ def pseudo_robot_command(
     annelid pseudo-robot riddle2023-rods                     prints, for example, /dev/pts/5
     annelid loop riddle2023-rods --servos /dev/pts/5         in another terminal
     """
+    from annelid.errors import require_finite, require_positive
     from annelid.hardware import PseudoRobot, Wiring, serve_terminal
     from annelid.simulation import build_plant
 

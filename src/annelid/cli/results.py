@@ -26,7 +26,6 @@ from annelid.cli.common import (
 from annelid.cli.entry import complain, lock
 from annelid.cli.result import give, refuse_json, wants_json
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.output import write_json
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -110,6 +109,7 @@ def compare_command(
     from annelid.analysis.comparison import compare
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
     from annelid.draw.table import comparison_table, fields_table
+    from annelid.output import write_json
     from annelid.simulation.runfile import open_run
     from annelid.terminal import Console
 
@@ -145,6 +145,7 @@ def _compare_measured(files: list[Path], log_map: Path, from_s: float, output: P
     from annelid.analysis.measured import read_map, read_measured
     from annelid.draw.figures.comparison import agreement_figure
     from annelid.draw.table import agreement_table
+    from annelid.output import write_json
     from annelid.simulation.runfile import open_run
     from annelid.terminal import Console
 

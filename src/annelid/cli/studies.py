@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shlex
 from dataclasses import asdict
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
 
@@ -31,7 +30,6 @@ from annelid.cli.common import (
 from annelid.cli.entry import EXIT_ALL_FAILED, EXIT_SOME_FAILED, complain, end_study, lock, typed_command
 from annelid.cli.result import refuse_json, wants_json
 from annelid.errors import RunFileError
-from annelid.output import with_suffix, write_text
 
 
 def paper_command(
@@ -60,6 +58,7 @@ def paper_command(
     annelid paper --only pins --only friction          these examinations only
     annelid paper -o report --claims docs/paper.md     and the table of claims for the repository
     """
+    from annelid.output import with_suffix, write_text
     from annelid_studies.riddle2023.paper import reproduce
     from annelid_studies.riddle2023.report import claims_page, write_report
 
@@ -321,6 +320,8 @@ def sweep_command(
     """
     refuse_json(example, "--example")
     if example:
+        from importlib.resources import files
+
         typer.echo((files("annelid.experiment") / "sweep_example.toml").read_text(encoding="utf-8"), nl=False)
         return
     if study is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated
 
 import typer
 
@@ -24,7 +24,6 @@ from annelid.cli.common import (
 from annelid.cli.entry import EXIT_USAGE
 from annelid.cli.result import give, refuse_json, wants_json
 from annelid.errors import shown, suggest
-from annelid.output import with_suffix, write_text
 
 
 def new(
@@ -52,6 +51,7 @@ def new(
     annelid run mine.toml
     """
     from annelid.experiment.similar import worm_text
+    from annelid.output import write_text
 
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
@@ -106,6 +106,7 @@ def build(
     annelid build riddle2023-rods --segments 6 --set body.mesh.radius_m=0.1 -o thin.xml
     """
     from annelid.body.assemble import mjcf_text
+    from annelid.output import write_text
 
     refuse_existing(output, force)
     config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
@@ -242,9 +243,12 @@ def export_network(
     annelid export-network riddle2023-rods --to lems -o network.xml
     annelid export-network network.xml --to toml
     """
+    from typing import cast
+
     from annelid.config import preset_names
     from annelid.export import controller_firmware, controller_network, lems_text, network_firmware, read_lems
     from annelid.nervous import Network, Scheme
+    from annelid.output import with_suffix, write_text
     from annelid.simulation import build_controller, build_plant
     from annelid.textfiles import read_text, read_toml
 

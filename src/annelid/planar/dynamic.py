@@ -15,7 +15,7 @@ from annelid.planar.sections import DynamicPlanarWorm
 from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
 
 if TYPE_CHECKING:
-    from annelid.config.settings import Clock
+    from annelid.config.run import Clock
 
 _STEEPEST = 0.9999
 _HALVINGS = 80

@@ -14,8 +14,7 @@ from annelid.planar.sections import PlanarWorm
 from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
 
 if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
-    from annelid.config.settings import Clock
+    from annelid.config.run import Clock, RunConfig
 
 
 class PlanarBody(PlanarWorm):

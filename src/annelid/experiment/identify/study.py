@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from importlib.resources import files
 from math import exp, log, log1p, sqrt
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+import annelid
 from annelid.config import RunConfig, Section, check_section, field_paths, load_config, preset_names, whole_path
 from annelid.config.kinds import Choice
 from annelid.config.sections import Line, Positive
@@ -20,7 +20,7 @@ from annelid.textfiles import check_depth, read_toml
 
 MOST = 20
 """Parameters, and experiments, that a study may have."""
-ROBOT = Path(str(files("annelid") / "data" / "identify_robot.toml"))
+ROBOT = Path(annelid.__file__).parent / "data" / "identify_robot.toml"
 """The study of the robot that annelid's data are of."""
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "Plant",
     "Recordable",
     "Records",
+    "SavedAndRecorded",
     "Sensation",
     "Signal",
     "State",

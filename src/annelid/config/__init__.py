@@ -8,10 +8,6 @@ overridden by its dotted path (``body.mesh.n_segments=4``). A level of `fidelity
 
 from __future__ import annotations
 
-import warnings
-from importlib import import_module
-from typing import Any
-
 from annelid.config.checking import (
     REPLACED,
     check_config,
@@ -25,8 +21,9 @@ from annelid.config.checking import (
 )
 from annelid.config.cluster import Cluster, find_cluster
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
-from annelid.config.kinds import Knob, class_named, kinds_of
+from annelid.config.kinds import Choice, Kind, Knob, kinds_of
 from annelid.config.loading import (
+    add_presets,
     arena_names,
     arena_summary,
     arena_text,
@@ -36,38 +33,39 @@ from annelid.config.loading import (
     preset_names,
     preset_text,
 )
-from annelid.config.run import ArenaKind, BodyKind, ControllerKind, RunConfig, TurningKind
-from annelid.config.sections import Section
+from annelid.config.run import ArenaKind, BodyKind, ControllerKind, OwnModel, RunConfig, TurningKind
+from annelid.config.sections import Length, Line, NonNegative, Positive, Section, Share
 from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
-
-_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.mesh") | {
-    "Contraction": "annelid.config.settings",
-    "DescendingDrive": "annelid.control.robust",
-}
-"""Sections that are no kinds, which the first edition had here."""
-_RENAMED = {"SnsController": "Sns", "Arena": "ArenaKind"}
-"""Names of the first edition that differ from today's."""
 
 __all__ = [
     "LEVELS",
     "REPLACED",
     "ArenaKind",
     "BodyKind",
+    "Choice",
     "Clock",
     "Cluster",
     "ControllerKind",
     "Fidelity",
     "Guard",
+    "Kind",
     "Knob",
+    "Length",
+    "Line",
+    "NonNegative",
+    "OwnModel",
+    "Positive",
     "Record",
     "RunConfig",
     "Section",
+    "Share",
     "StretchSensor",
     "Study",
     "TurningKind",
     "Vary",
+    "add_presets",
     "arena_names",
     "arena_summary",
     "arena_text",
@@ -90,16 +88,3 @@ __all__ = [
     "unit_of",
     "whole_path",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Finds names of the first edition where they are now, for one release."""
-    if name in _MOVED:
-        found = getattr(import_module(_MOVED[name]), name)
-    else:
-        found = class_named(_RENAMED.get(name, name)) if not name.startswith("_") else None
-    if found is None:
-        raise AttributeError(f"module 'annelid.config' has no attribute {name!r}")
-    where = f"{found.__module__}.{found.__name__}"
-    warnings.warn(f"annelid.config.{name} is now {where}", DeprecationWarning, stacklevel=2)
-    return found

@@ -167,9 +167,7 @@ class BodyKind(Checked, Kind):
         n_segments: Actuated segments.
     """
 
-    registry: ClassVar[Registry[type[Any]]] = Registry(
-        "body.kind", "annelid.body.worm", "annelid.body.mjcf", "annelid.planar"
-    )
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.kind", "annelid.body.worm")
     default: ClassVar[str] = "worm"
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False

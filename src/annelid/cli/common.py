@@ -93,6 +93,9 @@ def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | N
         jobs: Runs at a time, or None.
         scheduler: Address of a Dask scheduler, or None for processes of this machine.
         quiet: Whether progress is not shown.
+
+    Raises:
+        BadParameter: Both jobs and a scheduler are given.
     """
     from annelid.experiment.processes import Processes
     from annelid.experiment.progress import study_progress

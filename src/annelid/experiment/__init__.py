@@ -19,9 +19,9 @@ from annelid.lazy import lazy
 if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
     from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
+    from annelid.experiment.executors import Processes, end_after
     from annelid.experiment.fingerprint import code_fingerprint
     from annelid.experiment.outcome import Hold, Outcome
-    from annelid.experiment.processes import Processes, end_after
     from annelid.experiment.progress import StudyProgress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import Judged, judge, numerical_problem

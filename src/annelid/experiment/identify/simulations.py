@@ -13,9 +13,9 @@ import numpy as np
 
 from annelid.config import RunConfig
 from annelid.errors import ClusterError
+from annelid.experiment.executors import answers
 from annelid.experiment.fingerprint import physics_fingerprint, room_of
 from annelid.experiment.identify.base import Found, Test
-from annelid.experiment.processes import answers
 from annelid.experiment.progress import StudyProgress
 from annelid.output import whole_file
 
